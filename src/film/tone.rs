@@ -1,0 +1,1 @@
+//! From radiance to what a display shows.

@@ -1,0 +1,35 @@
+//! Triangle meshes as plain data.
+
+use crate::math::{Vec2, Vec3};
+
+/// Triangles over shared vertices, in the mesh's own coordinates. Every index is in range and every position
+/// finite; no triangle has coincident corners.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Unit vertex normals, or empty.
+    pub normals: Vec<Vec3>,
+    /// Vertex texture coordinates, or empty; v = 0 is the bottom row of an image.
+    pub uvs: Vec<Vec2>,
+    /// Corners of each triangle; front along (b − a) × (c − a).
+    pub triangles: Vec<[u32; 3]>,
+    /// Material of each triangle as an index into the file's own list, or empty; `u32::MAX`: none.
+    pub materials: Vec<u32>,
+}
+
+impl TriangleMesh {
+    /// The three corners of a triangle.
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.positions.as_slice())
+            + size_of_val(self.normals.as_slice())
+            + size_of_val(self.uvs.as_slice())
+            + size_of_val(self.triangles.as_slice())
+            + size_of_val(self.materials.as_slice())
+    }
+}

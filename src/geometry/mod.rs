@@ -1,0 +1,3 @@
+//! Rays, boxes, shapes and hits with error bounds.
+
+pub mod mesh;

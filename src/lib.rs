@@ -1,0 +1,75 @@
+//! # glimt: a ray tracer that lives in the terminal
+//!
+//! A scene file is read, lowered to a small description, made ready to trace, rendered in passes
+//! and written as a picture; the terminal UI and `--once` drive the same pipeline by messages.
+//!
+//! ## The rooms
+//!
+//! | room | what it knows |
+//! | --- | --- |
+//! | [`math`] | numbers, vectors, transforms, colour |
+//! | [`control`] | the cancel token and the progress sink |
+//! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
+//! | [`accel`] | trees over boxes and ids; a closure tests the shape |
+//! | [`sampling`] | sample streams, warps, distributions |
+//! | [`materials`] | phong, mirror, glass; texture lookup, normal maps, Fresnel |
+//! | [`lights`] | point and area lights |
+//! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
+//! | [`assets`] | bytes → meshes, textures, orbiter cameras |
+//! | [`world`] | everything ready to trace, immutable |
+//! | [`film`] | sums of samples, tone mapping, pictures |
+//! | [`integrators`] | whitted, views |
+//! | [`output`] | encoders, atomic writes, metadata |
+//! | [`pipeline`] | stages, caches, the worker, watching files |
+//! | [`tui`] | the terminal front end |
+//! | [`cli`] | arguments, the headless front end |
+//!
+//! ## The arrows
+//!
+//! Each room uses only the rooms on its right; `tests/suite/house.rs` reads the `use` lines and holds them to
+//! this table.
+//!
+//! ```text
+//! math        ->
+//! control     ->
+//! geometry    -> math
+//! accel       -> geometry math control
+//! sampling    -> math
+//! materials   -> sampling math
+//! lights      -> geometry sampling math
+//! scene       -> math
+//! assets      -> geometry materials math control
+//! world       -> scene assets accel materials lights geometry sampling math control
+//! film        -> math
+//! integrators -> world scene materials lights geometry sampling film math control
+//! output      -> film math
+//! pipeline    -> integrators world assets scene film output geometry materials math control
+//! tui         -> pipeline scene film math
+//! cli         -> pipeline tui output scene film
+//! ```
+//!
+//! ## What holds everywhere
+//!
+//! - The same scene, settings and seed give the same bits, whatever the number of threads: random numbers
+//!   are a function of pixel, sample and dimension, and every sum has a fixed order.
+//! - Rays travel in batches; a hit carries a bound on its error; no epsilon constants.
+//! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
+//! - Files are touched in `assets`, `output`, `scene` (the scene itself) and `pipeline::watch` alone.
+//! - `tui` does not know `world`; `world` does not know pixels or time.
+
+pub mod accel;
+pub mod assets;
+pub mod cli;
+pub mod control;
+pub mod film;
+pub mod geometry;
+pub mod integrators;
+pub mod lights;
+pub mod materials;
+pub mod math;
+pub mod output;
+pub mod pipeline;
+pub mod sampling;
+pub mod scene;
+pub mod tui;
+pub mod world;

@@ -1,0 +1,3 @@
+//! What surfaces do with light, in a local frame.
+
+pub mod texels;

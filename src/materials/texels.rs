@@ -1,0 +1,56 @@
+//! The numbers of an image, as compact as they came.
+
+use crate::math::Vec3;
+use crate::math::color::srgb8_to_linear;
+
+/// An image in memory, rows from top to bottom, RGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texels {
+    /// Columns, ≥ 1.
+    pub width: u32,
+    /// Rows, ≥ 1.
+    pub height: u32,
+    /// `width·height` texels.
+    pub data: TexelData,
+}
+
+/// How texels are stored.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TexelData {
+    /// sRGB bytes, decoded at each look-up.
+    Srgb8(Vec<[u8; 3]>),
+    /// Bytes / 255, linear.
+    Linear8(Vec<[u8; 3]>),
+    /// Linear floats: 16-bit and float files.
+    Float(Vec<Vec3>),
+}
+
+impl Texels {
+    /// Linear value of column `x`, row `y` from the top; both in range.
+    pub fn get(&self, x: u32, y: u32) -> Vec3 {
+        let index = y as usize * self.width as usize + x as usize;
+        match &self.data {
+            TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[index]),
+            TexelData::Linear8(bytes) => Vec3::from_array(bytes[index].map(|byte| f32::from(byte) / 255.0)),
+            TexelData::Float(floats) => floats[index],
+        }
+    }
+
+    /// Texels in all.
+    pub fn len(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Never: an image has at least one texel.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        match &self.data {
+            TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => size_of_val(bytes.as_slice()),
+            TexelData::Float(floats) => size_of_val(floats.as_slice()),
+        }
+    }
+}

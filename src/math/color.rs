@@ -1,0 +1,54 @@
+//! Colours: linear Rec. 709 RGB as [`Vec3`], and the sRGB curve.
+
+use glam::Vec3;
+
+/// Weights of linear Rec. 709 primaries in relative luminance (IEC 61966-2-1).
+pub const LUMINANCE_WEIGHTS: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+
+/// Relative luminance of a linear colour.
+pub fn luminance(color: Vec3) -> f32 {
+    color.dot(LUMINANCE_WEIGHTS)
+}
+
+/// One sRGB component in [0, 1] to linear (IEC 61966-2-1).
+pub fn srgb_to_linear(encoded: f32) -> f32 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// One linear component in [0, 1] to sRGB (IEC 61966-2-1).
+pub fn linear_to_srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// A linear component, clamped to [0, 1], as an sRGB byte; NaN becomes 0.
+pub fn linear_to_srgb8(linear: f32) -> u8 {
+    let encoded = linear_to_srgb(linear.clamp(0.0, 1.0));
+    // A float to integer cast saturates and takes NaN to 0.
+    (encoded * 255.0 + 0.5) as u8
+}
+
+/// An sRGB byte triple as a linear colour.
+pub fn srgb8_to_linear(bytes: [u8; 3]) -> Vec3 {
+    Vec3::from_array(bytes.map(|byte| srgb_to_linear(f32::from(byte) / 255.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_survives_the_round_trip() {
+        for byte in 0..=255_u8 {
+            assert_eq!(linear_to_srgb8(srgb_to_linear(f32::from(byte) / 255.0)), byte);
+        }
+    }
+
+    #[test]
+    fn known_values_of_the_curve() {
+        assert!((srgb_to_linear(0.5) - 0.214_041_14).abs() < 1e-6);
+        assert!((linear_to_srgb(0.18) - 0.461_356).abs() < 1e-5);
+        assert_eq!(linear_to_srgb8(f32::NAN), 0);
+        assert_eq!(linear_to_srgb8(f32::INFINITY), 255);
+        assert_eq!(linear_to_srgb8(-1.0), 0);
+    }
+}

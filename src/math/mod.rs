@@ -1,0 +1,8 @@
+//! Numbers, vectors, transforms and colour: what every other room may use.
+
+pub mod color;
+pub mod float;
+pub mod frame;
+pub mod transform;
+
+pub use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};

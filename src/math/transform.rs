@@ -1,0 +1,122 @@
+//! Affine transforms in double precision, inverted once.
+
+use glam::{DMat3, DVec3};
+
+/// An affine map `x ↦ linear·x + translation` with its inverse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform {
+    /// Linear part.
+    pub linear: DMat3,
+    /// Translation.
+    pub translation: DVec3,
+    /// Inverse of the linear part.
+    pub inverse_linear: DMat3,
+}
+
+impl Transform {
+    /// The map that changes nothing.
+    pub const IDENTITY: Self =
+        Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO, inverse_linear: DMat3::IDENTITY };
+
+    /// Scale first, then rotate about x, then y, then z (degrees), then translate. Scales must not be 0.
+    pub fn scale_rotate_translate(scale: DVec3, degrees: DVec3, translation: DVec3) -> Self {
+        let rotation = rotation_xyz(degrees);
+        Self {
+            linear: rotation * DMat3::from_diagonal(scale),
+            translation,
+            inverse_linear: DMat3::from_diagonal(scale.recip()) * rotation.transpose(),
+        }
+    }
+
+    /// A point to the outside.
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        self.linear * p + self.translation
+    }
+
+    /// A direction to the outside.
+    pub fn vector(&self, v: DVec3) -> DVec3 {
+        self.linear * v
+    }
+
+    /// A normal to the outside, by the inverse transpose; not normalised.
+    pub fn normal(&self, n: DVec3) -> DVec3 {
+        self.inverse_linear.transpose() * n
+    }
+
+    /// A point from the outside.
+    pub fn inverse_point(&self, p: DVec3) -> DVec3 {
+        self.inverse_linear * (p - self.translation)
+    }
+
+    /// A direction from the outside.
+    pub fn inverse_vector(&self, v: DVec3) -> DVec3 {
+        self.inverse_linear * v
+    }
+
+    /// Whether the map turns right-handed axes into left-handed ones.
+    pub fn mirrors(&self) -> bool {
+        self.linear.determinant() < 0.0
+    }
+}
+
+/// Rotation by `degrees.x` about x, then `degrees.y` about y, then `degrees.z` about z. Multiples of 90°
+/// are exact.
+pub fn rotation_xyz(degrees: DVec3) -> DMat3 {
+    let exact = |axis: DVec3, angle: f64| {
+        let quarters = angle / 90.0;
+        let (sin, cos) = if quarters == quarters.round() {
+            match (quarters.rem_euclid(4.0)) as i64 {
+                0 => (0.0, 1.0),
+                1 => (1.0, 0.0),
+                2 => (0.0, -1.0),
+                _ => (-1.0, 0.0),
+            }
+        } else {
+            angle.to_radians().sin_cos()
+        };
+        if axis.x > 0.0 {
+            DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, cos, sin, 0.0, -sin, cos])
+        } else if axis.y > 0.0 {
+            DMat3::from_cols_array(&[cos, 0.0, -sin, 0.0, 1.0, 0.0, sin, 0.0, cos])
+        } else {
+            DMat3::from_cols_array(&[cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0])
+        }
+    };
+    exact(DVec3::Z, degrees.z) * exact(DVec3::Y, degrees.y) * exact(DVec3::X, degrees.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::EulerRot;
+
+    #[test]
+    fn rotates_about_x_then_y_then_z() {
+        let degrees = DVec3::new(31.0, -72.0, 155.0);
+        let r = degrees * (std::f64::consts::PI / 180.0);
+        let euler = DMat3::from_euler(EulerRot::ZYX, r.z, r.y, r.x);
+        let ours = rotation_xyz(degrees);
+        assert!((ours - euler).to_cols_array().iter().all(|d| d.abs() < 1e-14));
+    }
+
+    #[test]
+    fn quarter_turns_are_exact() {
+        let turned = rotation_xyz(DVec3::new(0.0, 0.0, 90.0)) * DVec3::X;
+        assert_eq!(turned, DVec3::Y);
+        assert_eq!(rotation_xyz(DVec3::new(-90.0, 450.0, 720.0)).determinant(), 1.0);
+    }
+
+    #[test]
+    fn inverse_undoes_the_map() {
+        let t = Transform::scale_rotate_translate(
+            DVec3::new(2.0, 0.5, -3.0),
+            DVec3::new(10.0, 20.0, 30.0),
+            DVec3::new(1e3, -5.0, 7.0),
+        );
+        let p = DVec3::new(0.3, -0.8, 12.0);
+        assert!((t.inverse_point(t.point(p)) - p).length() < 1e-12);
+        assert!(t.mirrors());
+        // A normal stays perpendicular to a transformed tangent.
+        assert!(t.normal(DVec3::Y).dot(t.vector(DVec3::new(1.0, 0.0, 2.0))).abs() < 1e-12);
+    }
+}

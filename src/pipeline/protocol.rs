@@ -1,0 +1,361 @@
+//! What the front ends and the worker say to each other.
+//!
+//! A front end sends [`Command`]s and receives [`Event`]s, each with the generation of the request that it is
+//! about; events of older generations are dropped by the receiver. The queue of requests holds one: a newer one
+//! replaces it and cancels the render under way. Preview pictures do not travel in events but in a slot that
+//! holds the latest only ([`Event::Preview`] says that it changed).
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::settings::Overrides;
+use crate::film::Picture;
+use crate::scene::diagnostic::Diagnostic;
+
+/// From a front end to the worker.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Render this; whatever is under way is cancelled.
+    Render(Box<Request>),
+    /// Write the picture as it is now to its files.
+    Write,
+    /// Stop the render under way.
+    Cancel,
+    /// Hold the render, or let it go on.
+    Pause(bool),
+    /// End the worker.
+    Quit,
+}
+
+/// One order for a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// Larger than that of every request before.
+    pub generation: u64,
+    /// The scene file.
+    pub scene: PathBuf,
+    /// What the command line and the keys change of it.
+    pub overrides: Overrides,
+    /// The preview wanted: a picture of at most this many pixels across and down, with the picture's aspect
+    /// ratio; none: no previews.
+    pub preview: Option<PreviewSize>,
+    /// Whether the finished picture is written to disk.
+    pub write: bool,
+    /// Render again even where nothing changed.
+    pub force: bool,
+}
+
+/// Upper bounds of a preview picture, in pixels of square shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PreviewSize {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// From the worker to a front end.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The worker took a request up.
+    Started {
+        /// Which.
+        generation: u64,
+    },
+    /// A stage began or ended.
+    Stage {
+        /// Of which request.
+        generation: u64,
+        /// What happened.
+        stage: StageReport,
+    },
+    /// An asset is loading.
+    Asset {
+        /// Of which request.
+        generation: u64,
+        /// How far it is.
+        progress: AssetProgress,
+    },
+    /// The scene was understood: these settings hold now.
+    Settings {
+        /// Of which request.
+        generation: u64,
+        /// The settings.
+        settings: Box<Effective>,
+    },
+    /// The render went on.
+    Progress {
+        /// Of which request.
+        generation: u64,
+        /// How far it is.
+        progress: RenderProgress,
+    },
+    /// A newer picture is in the slot.
+    Preview {
+        /// Of which request.
+        generation: u64,
+    },
+    /// A picture was written.
+    Written {
+        /// Of which request.
+        generation: u64,
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+    },
+    /// Everything that was asked for is done.
+    Done {
+        /// Of which request.
+        generation: u64,
+        /// What it took.
+        report: Box<Report>,
+        /// Warnings.
+        warnings: Vec<Diagnostic>,
+        /// Whether the request found everything as it was, so that nothing was rendered.
+        unchanged: bool,
+    },
+    /// The request could not be done. The last picture stands.
+    Failed {
+        /// Of which request.
+        generation: u64,
+        /// Why.
+        failure: Failure,
+    },
+    /// The request was stopped by a newer one or by [`Command::Cancel`].
+    Cancelled {
+        /// Which.
+        generation: u64,
+    },
+}
+
+/// Why a request could not be done.
+#[derive(Clone, Debug)]
+pub enum Failure {
+    /// The scene or something it names is wrong (exit code 2): errors and warnings.
+    Scene(Vec<Diagnostic>),
+    /// The work failed (exit code 1): a file that could not be written, a worker that died.
+    Work(String),
+}
+
+/// The stages, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// Reading and validating the scene file.
+    Parse,
+    /// Reading mesh files.
+    Meshes,
+    /// Reading textures.
+    Textures,
+    /// Building trees.
+    Accel,
+    /// Gathering the lights.
+    Lights,
+    /// Shooting photons.
+    Photons,
+    /// Tracing.
+    Render,
+    /// Encoding and writing pictures.
+    Write,
+}
+
+impl Stage {
+    /// All of them, in order.
+    pub const ALL: [Self; 8] = [
+        Self::Parse,
+        Self::Meshes,
+        Self::Textures,
+        Self::Accel,
+        Self::Lights,
+        Self::Photons,
+        Self::Render,
+        Self::Write,
+    ];
+
+    /// Its name in reports and on the screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Parse => "parse",
+            Self::Meshes => "meshes",
+            Self::Textures => "textures",
+            Self::Accel => "accel",
+            Self::Lights => "lights",
+            Self::Photons => "photons",
+            Self::Render => "render",
+            Self::Write => "write",
+        }
+    }
+}
+
+/// How a stage stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// At work. Never in a finished report.
+    Running,
+    /// Done in this request.
+    Done,
+    /// Its inputs did not change.
+    Reused,
+    /// This scene does not need it.
+    Skipped,
+}
+
+/// One line of the table of stages.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct StageReport {
+    /// Which.
+    pub name: Stage,
+    /// How it stands.
+    pub status: Status,
+    /// What it took.
+    pub seconds: f64,
+    /// Why it was skipped or reused, or what it made, in a few words; may be empty.
+    pub why: String,
+}
+
+/// An asset that is loading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssetProgress {
+    /// Its name: a texture's name in the scene, a mesh's file name.
+    pub name: String,
+    /// Work units done.
+    pub done: u64,
+    /// Work units in all; `done == total` ends it.
+    pub total: u64,
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderProgress {
+    /// From 0 to 1, never falling within a generation; 1 when the render is over.
+    pub fraction: f64,
+    /// Seconds since the render stage began.
+    pub elapsed_seconds: f64,
+    /// Seconds still to go, from the work done; none until it can be told.
+    pub eta_seconds: Option<f64>,
+    /// Samples per pixel of the passes that are complete.
+    pub samples: u32,
+    /// Samples per pixel asked for.
+    pub total_samples: u32,
+}
+
+/// The settings a request renders with, for status lines.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Effective {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// `whitted`.
+    pub integrator: &'static str,
+    /// `off`, `hard` or `soft`.
+    pub shadows: &'static str,
+    /// Whether photons are on.
+    pub photons: bool,
+    /// Whether depth of field is on.
+    pub dof: bool,
+    /// `bvh`.
+    pub accel: &'static str,
+    /// The view's name.
+    pub view: &'static str,
+    /// The seed.
+    pub seed: u32,
+    /// Threads that render.
+    pub threads: usize,
+    /// The files the picture is written to.
+    pub outputs: Vec<PathBuf>,
+}
+
+/// The report of one finished request: the JSON of `--report`.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Report {
+    /// Version.
+    pub glimt: &'static str,
+    /// The scene file as named by the caller.
+    pub scene: String,
+    /// The picture.
+    pub image: ImageReport,
+    /// The settings it was made with.
+    pub settings: Effective,
+    /// All eight stages, in order.
+    pub stages: Vec<StageReport>,
+    /// What was done.
+    pub counters: Counters,
+    /// Wall-clock time of the request.
+    pub seconds: f64,
+    /// Highest resident memory of the process so far.
+    pub peak_memory_bytes: u64,
+}
+
+/// The picture in a report.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct ImageReport {
+    /// The first output, or none where nothing was written.
+    pub path: Option<String>,
+    /// Every output.
+    pub paths: Vec<String>,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Samples per pixel.
+    pub samples: SampleCounts,
+    /// Whether every pixel got the samples that were asked for.
+    pub complete: bool,
+}
+
+/// Samples per pixel over a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct SampleCounts {
+    /// Fewest.
+    pub min: u32,
+    /// On average.
+    pub mean: f64,
+    /// Most.
+    pub max: u32,
+}
+
+/// What a request did, counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counters {
+    /// Triangles over all mesh instances and single triangles.
+    pub triangles: u64,
+    /// Shapes of any kind; a mesh instance counts as one.
+    pub objects: u64,
+    /// Rays from the camera.
+    pub camera_rays: u64,
+    /// Rays towards lights.
+    pub shadow_rays: u64,
+    /// Mirrored rays.
+    pub reflected_rays: u64,
+    /// Refracted rays.
+    pub refracted_rays: u64,
+    /// Photons sent out.
+    pub photons_emitted: u64,
+    /// Photons stored.
+    pub photons_stored: u64,
+    /// Texels read from files.
+    pub texels_loaded: u64,
+    /// Texture look-ups.
+    pub texture_lookups: u64,
+    /// Samples that were not finite and count as 0.
+    pub non_finite_samples: u64,
+    /// Bytes held by trees.
+    pub accel_memory_bytes: u64,
+}
+
+/// The slot that holds the latest preview.
+pub type PreviewSlot = Arc<std::sync::Mutex<Option<LatestPreview>>>;
+
+/// A preview picture with what it is of.
+#[derive(Clone, Debug)]
+pub struct LatestPreview {
+    /// Of which request.
+    pub generation: u64,
+    /// The picture, at most as large as was asked for.
+    pub picture: Arc<Picture>,
+}

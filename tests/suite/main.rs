@@ -1,0 +1,3 @@
+//! The program as a whole: one crate, so that it links once.
+
+mod house;
