@@ -1,3 +1,19 @@
 //! Rays, boxes, shapes and hits with error bounds.
+//!
+//! Triangles of meshes are tested in `f32` by a watertight method; every other shape is a quadric or a flat
+//! piece computed in `f64`, so that no `f32` ray sees its rounding.
 
+pub mod aabb;
+pub mod cuboid;
 pub mod mesh;
+pub mod parallelogram;
+pub mod plane;
+pub mod ray;
+pub mod sphere;
+pub mod surface;
+pub mod triangle;
+pub mod watertight;
+
+pub use aabb::Aabb;
+pub use ray::{Ray, RayF64};
+pub use surface::{ShapeHit, SurfacePoint};

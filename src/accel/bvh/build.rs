@@ -1,0 +1,260 @@
+//! Building by binned surface area (Wald, *On fast Construction of SAH-based Bounding Volume Hierarchies*, 2007), the
+//! halves of large nodes in parallel. The tree is a function of the boxes alone, not of the threads.
+
+use super::{Bvh, Child, LEAF_SIZE, Node, SURFACE_AREA_LEVELS};
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+
+const BINS: usize = 16;
+
+/// Nodes with more primitives than this build their halves in parallel, and poll the token.
+const PARALLEL_SIZE: usize = 4096;
+
+/// What one step of traversal costs, in tests of a primitive.
+const TRAVERSAL_COST: f32 = 1.0;
+
+/// A box with its id while the tree is built.
+#[derive(Clone, Copy)]
+struct Reference {
+    bounds: Aabb,
+    id: u32,
+}
+
+impl Reference {
+    /// Twice the centre.
+    fn centroid(&self) -> Vec3 {
+        self.bounds.min + self.bounds.max
+    }
+}
+
+/// A subtree under construction; node indices count from its own start.
+struct Subtree {
+    nodes: Vec<Node>,
+    root: Child,
+    bounds: Aabb,
+}
+
+impl Bvh {
+    /// Build over boxes; empty ones and those with a NaN are in no leaf.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build(boxes: &[Aabb], token: &CancelToken) -> Result<Self, Cancelled> {
+        let mut references: Vec<Reference> = boxes
+            .iter()
+            .enumerate()
+            .filter(|(_, bounds)| !bounds.is_empty() && bounds.extent().is_finite())
+            .map(|(id, &bounds)| Reference { bounds, id: id as u32 })
+            .collect();
+        if references.is_empty() {
+            return Ok(Self { nodes: Vec::new(), order: Vec::new(), bounds: Aabb::EMPTY });
+        }
+        let mut tree = build_subtree(&mut references, 0, 0, token)?;
+        if tree.nodes.is_empty() {
+            tree.nodes.push(Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root, Child::NONE] });
+        }
+        let order = references.iter().map(|reference| reference.id).collect();
+        Ok(Self { nodes: tree.nodes, order, bounds: tree.bounds })
+    }
+}
+
+/// Build over references that start at place `first` of the final order.
+fn build_subtree(
+    references: &mut [Reference],
+    first: usize,
+    depth: usize,
+    token: &CancelToken,
+) -> Result<Subtree, Cancelled> {
+    let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
+    let leaf = Child { first: first as u32, count: references.len() as u32 };
+    let Some(middle) = partition(references, bounds, depth) else {
+        return Ok(Subtree { nodes: Vec::new(), root: leaf, bounds });
+    };
+    let parallel = references.len() > PARALLEL_SIZE;
+    let (left, right) = references.split_at_mut(middle);
+    let (left, right) = if parallel {
+        token.check()?;
+        let (left, right) = rayon::join(
+            || build_subtree(left, first, depth + 1, token),
+            || build_subtree(right, first + middle, depth + 1, token),
+        );
+        (left?, right?)
+    } else {
+        (build_subtree(left, first, depth + 1, token)?, build_subtree(right, first + middle, depth + 1, token)?)
+    };
+    Ok(join(left, right, bounds))
+}
+
+/// A node over two subtrees: itself, the left one's nodes, the right one's.
+fn join(left: Subtree, right: Subtree, bounds: Aabb) -> Subtree {
+    let mut nodes = Vec::with_capacity(1 + left.nodes.len() + right.nodes.len());
+    let right_start = 1 + left.nodes.len() as u32;
+    let moved = |child: Child, by: u32| if child.count == 0 { Child { first: child.first + by, count: 0 } } else { child };
+    nodes.push(Node {
+        bounds: [left.bounds, right.bounds],
+        child: [moved(left.root, 1), moved(right.root, right_start)],
+    });
+    for (part, by) in [(left.nodes, 1), (right.nodes, right_start)] {
+        nodes.extend(part.into_iter().map(|mut node| {
+            node.child = node.child.map(|child| if child == Child::NONE { child } else { moved(child, by) });
+            node
+        }));
+    }
+    Subtree { nodes, root: Child { first: 0, count: 0 }, bounds }
+}
+
+/// Sort the references into two halves; none where a leaf is cheaper.
+fn partition(references: &mut [Reference], bounds: Aabb, depth: usize) -> Option<usize> {
+    let count = references.len();
+    if count == 1 {
+        return None;
+    }
+    let centroids = Aabb::around(references.iter().map(Reference::centroid));
+    let split = (depth < SURFACE_AREA_LEVELS).then(|| best_split(references, centroids)).flatten();
+    let leaf_cost = count as f32;
+    match split {
+        Some(split) if count > LEAF_SIZE || split.cost / bounds.half_area() + TRAVERSAL_COST < leaf_cost => {
+            let middle = partition_by(references, |reference| split.is_left(reference));
+            (middle > 0 && middle < count).then_some(middle).or(Some(count / 2))
+        }
+        None if count > LEAF_SIZE => {
+            let axis = longest_axis(centroids.extent());
+            references.select_nth_unstable_by(count / 2, |a, b| {
+                a.centroid()[axis].total_cmp(&b.centroid()[axis]).then(a.id.cmp(&b.id))
+            });
+            Some(count / 2)
+        }
+        _ => None,
+    }
+}
+
+/// A plane between two bins of an axis.
+struct Split {
+    axis: usize,
+    start: f32,
+    bins_per_length: f32,
+    /// Bins below this one are on the left.
+    bin: usize,
+    /// Area-weighted count of both sides.
+    cost: f32,
+}
+
+impl Split {
+    fn is_left(&self, reference: &Reference) -> bool {
+        bin_of(reference.centroid()[self.axis], self.start, self.bins_per_length) < self.bin
+    }
+}
+
+fn bin_of(centroid: f32, start: f32, bins_per_length: f32) -> usize {
+    (((centroid - start) * bins_per_length) as usize).min(BINS - 1)
+}
+
+/// The cheapest of all planes between bins; none where all centroids fall together.
+fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
+    let extent = centroids.extent();
+    let bins_per_length = extent.map(|length| BINS as f32 / length);
+    let mut bounds = [[Aabb::EMPTY; BINS]; 3];
+    let mut counts = [[0_u32; BINS]; 3];
+    for reference in references {
+        let centroid = reference.centroid();
+        for axis in 0..3 {
+            let bin = bin_of(centroid[axis], centroids.min[axis], bins_per_length[axis]);
+            bounds[axis][bin] = bounds[axis][bin].union(reference.bounds);
+            counts[axis][bin] += 1;
+        }
+    }
+    (0..3)
+        .filter(|&axis| extent[axis] > 0.0 && bins_per_length[axis].is_finite())
+        .filter_map(|axis| {
+            let (bin, cost) = cheapest_plane(&bounds[axis], &counts[axis])?;
+            Some(Split { axis, start: centroids.min[axis], bins_per_length: bins_per_length[axis], bin, cost })
+        })
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Sweep from both ends over the bins of an axis.
+fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize, f32)> {
+    let mut right_cost = [0.0_f32; BINS];
+    let (mut box_so_far, mut count) = (Aabb::EMPTY, 0);
+    for bin in (1..BINS).rev() {
+        box_so_far = box_so_far.union(bounds[bin]);
+        count += counts[bin];
+        right_cost[bin] = if count == 0 { f32::INFINITY } else { box_so_far.half_area() * count as f32 };
+    }
+    (box_so_far, count) = (Aabb::EMPTY, 0);
+    let mut best: Option<(usize, f32)> = None;
+    for bin in 1..BINS {
+        box_so_far = box_so_far.union(bounds[bin - 1]);
+        count += counts[bin - 1];
+        let cost = box_so_far.half_area() * count as f32 + right_cost[bin];
+        if count > 0 && cost.is_finite() && best.is_none_or(|(_, least)| cost < least) {
+            best = Some((bin, cost));
+        }
+    }
+    best
+}
+
+/// Those for which `is_left` holds first; how many there are.
+fn partition_by(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) -> usize {
+    let (mut start, mut end) = (0, references.len());
+    while start < end {
+        if is_left(&references[start]) {
+            start += 1;
+        } else {
+            end -= 1;
+            references.swap(start, end);
+        }
+    }
+    start
+}
+
+fn longest_axis(extent: Vec3) -> usize {
+    if extent.x >= extent.y && extent.x >= extent.z {
+        0
+    } else if extent.y >= extent.z {
+        1
+    } else {
+        2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn built(boxes: &[Aabb]) -> Bvh {
+        let tree = Bvh::build(boxes, &CancelToken::new()).expect("nobody cancels");
+        tree.validate(boxes).expect("a sound tree");
+        tree
+    }
+
+    fn unit_box(at: Vec3) -> Aabb {
+        Aabb { min: at, max: at + Vec3::ONE }
+    }
+
+    #[test]
+    fn sound_over_grids_duplicates_slivers_and_nothing() {
+        built(&[]);
+        built(&[unit_box(Vec3::ZERO)]);
+        built(&vec![unit_box(Vec3::ONE); 1000]);
+        built(&[Aabb::EMPTY, unit_box(Vec3::ZERO), Aabb { min: Vec3::NAN, max: Vec3::ONE }]);
+        let grid: Vec<_> = (0..20_000).map(|i| unit_box(Vec3::new((i % 40) as f32, (i / 40) as f32, 0.0))).collect();
+        built(&grid);
+        // Each box twice as far as the one before: the surface area heuristic peels them off one by one.
+        let geometric: Vec<_> = (0..250).map(|i| unit_box(Vec3::X * 2.0_f32.powi(i / 2))).collect();
+        built(&geometric);
+    }
+
+    #[test]
+    fn the_tree_does_not_depend_on_the_threads() {
+        let boxes: Vec<_> = (0..30_000_u32)
+            .map(|i| unit_box(Vec3::new((i.wrapping_mul(2_654_435_761) >> 20) as f32, (i % 97) as f32, (i % 31) as f32)))
+            .collect();
+        let order = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| built(&boxes).order().to_vec())
+        };
+        assert_eq!(order(1), order(7));
+    }
+}

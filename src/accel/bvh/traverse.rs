@@ -1,0 +1,146 @@
+//! Ordered traversal for the closest hit, and for any.
+
+use super::{Bvh, Child, STACK_SIZE};
+use crate::geometry::Ray;
+use crate::geometry::aabb::SlabRay;
+
+impl Bvh {
+    /// Visit the leaves that the ray may meet, near ones first. `test(place, id, t_max)` tests one primitive, where `place`
+    /// is its place in [`Bvh::order`], and returns the new end of the ray if it hits; primitives at exactly the
+    /// ray's end are still tested, so that the caller can break ties by id.
+    #[inline]
+    pub fn closest(&self, ray: &Ray, mut test: impl FnMut(u32, u32, f32) -> Option<f32>) {
+        let slabs = SlabRay::new(ray.origin, ray.direction);
+        let mut t_max = ray.t_max;
+        let mut stack = [(0.0_f32, Child::NONE); STACK_SIZE];
+        let mut size = 0;
+        let mut current = Child { first: 0, count: 0 };
+        if self.nodes.is_empty() {
+            return;
+        }
+        loop {
+            if current.count > 0 {
+                for place in current.first..current.first + current.count {
+                    if let Some(t) = test(place, self.order[place as usize], t_max) {
+                        t_max = t;
+                    }
+                }
+            } else {
+                let node = &self.nodes[current.first as usize];
+                let [left, right] = [0, 1].map(|side| {
+                    let bounds = &node.bounds[side];
+                    slabs.enter(bounds.min, bounds.max, t_max)
+                });
+                match (left, right) {
+                    (Some(left), Some(right)) => {
+                        let (near, far) = if right < left { (1, 0) } else { (0, 1) };
+                        stack[size] = (left.max(right), node.child[far]);
+                        size += 1;
+                        current = node.child[near];
+                        continue;
+                    }
+                    (Some(_), None) => {
+                        current = node.child[0];
+                        continue;
+                    }
+                    (None, Some(_)) => {
+                        current = node.child[1];
+                        continue;
+                    }
+                    (None, None) => {}
+                }
+            }
+            loop {
+                if size == 0 {
+                    return;
+                }
+                size -= 1;
+                let (t, child) = stack[size];
+                if t <= t_max {
+                    current = child;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Whether `test(place, id)` holds for any primitive that the ray may meet.
+    #[inline]
+    pub fn any(&self, ray: &Ray, mut test: impl FnMut(u32, u32) -> bool) -> bool {
+        let slabs = SlabRay::new(ray.origin, ray.direction);
+        let mut stack = [Child::NONE; STACK_SIZE];
+        let mut size = 1;
+        if self.nodes.is_empty() {
+            return false;
+        }
+        while size > 0 {
+            size -= 1;
+            let current = stack[size];
+            if current.count > 0 {
+                let mut places = current.first..current.first + current.count;
+                if places.any(|place| test(place, self.order[place as usize])) {
+                    return true;
+                }
+                continue;
+            }
+            let node = &self.nodes[current.first as usize];
+            for side in 0..2 {
+                let bounds = &node.bounds[side];
+                if slabs.enter(bounds.min, bounds.max, ray.t_max).is_some() {
+                    stack[size] = node.child[side];
+                    size += 1;
+                }
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::CancelToken;
+    use crate::geometry::Aabb;
+    use crate::math::Vec3;
+
+    /// Boxes as shapes: the hit is where the ray enters.
+    fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
+        let slabs = SlabRay::new(ray.origin, ray.direction);
+        let hits = boxes.iter().zip(0_u32..).filter_map(|(b, id)| Some((slabs.enter(b.min, b.max, ray.t_max)?, id)));
+        hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+    }
+
+    #[test]
+    fn the_same_hits_as_testing_every_box() {
+        let mut state = 1_u64;
+        let mut next = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
+        };
+        // A coarse grid of positions makes coplanar faces and exact ties.
+        let boxes: Vec<_> = (0..500)
+            .map(|_| {
+                let at = Vec3::new(next(), next(), next()).map(|x| (x * 8.0).round());
+                Aabb { min: at, max: at + Vec3::ONE }
+            })
+            .collect();
+        let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+        for _ in 0..5000 {
+            let origin = Vec3::new(next(), next(), next()) * 20.0;
+            let ray = Ray::new(origin, Vec3::new(next(), next(), next()) * 8.0 - origin);
+            let slabs = SlabRay::new(ray.origin, ray.direction);
+            let mut best: Option<(f32, u32)> = None;
+            tree.closest(&ray, |_, id, t_max| {
+                let t = slabs.enter(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
+                let better = best.is_none_or(|(least, least_id)| (t, id) < (least, least_id));
+                better.then(|| best = Some((t, id)))?;
+                Some(t)
+            });
+            assert_eq!(best, brute(&boxes, &ray));
+            let any = tree.any(&ray, |_, id| {
+                slabs.enter(boxes[id as usize].min, boxes[id as usize].max, ray.t_max).is_some()
+            });
+            assert_eq!(any, best.is_some());
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Oriented boxes, in double precision.
+
+use super::surface::flat_axes;
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use crate::math::transform::rotation_xyz;
+use crate::math::{DMat3, DVec3, Vec2};
+
+/// A box with its own axes; the front is outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid {
+    center: DVec3,
+    half: DVec3,
+    /// From the box's axes to the world's.
+    axes: DMat3,
+}
+
+impl Cuboid {
+    /// From its centre, edge lengths > 0 and rotation in degrees about x, then y, then z.
+    pub fn new(center: DVec3, size: DVec3, rotate_degrees: DVec3) -> Self {
+        Self { center, half: size * 0.5, axes: rotation_xyz(rotate_degrees) }
+    }
+
+    /// The nearest face in the ray's interval, from outside or inside. Faces are numbered −x, +x, −y, +y, −z, +z.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        let origin = self.axes.transpose() * (ray.origin - self.center);
+        let direction = self.axes.transpose() * ray.direction;
+        let (mut near, mut far) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
+        for axis in 0..3 {
+            let (o, d, h) = (origin[axis], direction[axis], self.half[axis]);
+            if d == 0.0 {
+                if o.abs() > h {
+                    return None;
+                }
+                continue;
+            }
+            let (enter, leave) = ((-h.copysign(d) - o) / d, (h.copysign(d) - o) / d);
+            let positive = u32::from(d > 0.0);
+            let face = 2 * axis as u32;
+            if enter > near.0 {
+                near = (enter, face + 1 - positive);
+            }
+            if leave < far.0 {
+                far = (leave, face + positive);
+            }
+        }
+        if !(near.0 <= far.0) {
+            return None;
+        }
+        [near, far]
+            .into_iter()
+            .find_map(|(t, face)| ray.accept(t).map(|t| ShapeHit { t, primitive: face, u: 0.0, v: 0.0 }))
+    }
+
+    /// The surface at a hit: the point is put onto the face.
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let mut local = self.axes.transpose() * (ray.at(f64::from(hit.t)) - self.center);
+        local = local.clamp(-self.half, self.half);
+        let (axis, normal) = face_normal(hit.primitive);
+        local[axis] = self.half[axis] * normal[axis];
+        let (u, v) = flat_axes(normal);
+        let (width, height) = (2.0 * self.half.dot(u.abs()), 2.0 * self.half.dot(v.abs()));
+        let uv = Vec2::new((0.5 + local.dot(u) / width) as f32, (0.5 + local.dot(v) / height) as f32);
+        SurfacePoint::exact(
+            self.center + self.axes * local,
+            self.axes * normal,
+            uv,
+            self.axes * (u * width),
+            self.axes * (v * height),
+        )
+    }
+
+    /// The box around it.
+    pub fn bounds(&self) -> Aabb {
+        let reach = DVec3::new(
+            self.axes.row(0).abs().dot(self.half),
+            self.axes.row(1).abs().dot(self.half),
+            self.axes.row(2).abs().dot(self.half),
+        );
+        Aabb::around_f64([self.center - reach, self.center + reach])
+    }
+
+    /// A face as a parallelogram (corner, u, v) whose front is outside.
+    pub fn face(&self, face: u32) -> (DVec3, DVec3, DVec3) {
+        let (_, normal) = face_normal(face);
+        let (u, v) = flat_axes(normal);
+        let corner = (normal - u - v) * self.half;
+        (self.center + self.axes * corner, self.axes * (u * self.half * 2.0), self.axes * (v * self.half * 2.0))
+    }
+}
+
+/// Axis and outward normal of a numbered face.
+fn face_normal(face: u32) -> (usize, DVec3) {
+    let axis = (face / 2) as usize;
+    let mut normal = DVec3::ZERO;
+    normal[axis] = if face % 2 == 1 { 1.0 } else { -1.0 };
+    (axis, normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::math::Vec3;
+
+    #[test]
+    fn hit_from_outside_and_inside_with_the_face_s_normal() {
+        let cube = Cuboid::new(DVec3::ZERO, DVec3::new(2.0, 4.0, 6.0), DVec3::ZERO);
+        for (direction, t) in [(Vec3::X, 1.0), (Vec3::Y, 2.0), (Vec3::NEG_Z, 3.0)] {
+            let inside = Ray::new(Vec3::ZERO, direction).to_f64();
+            let hit = cube.intersect(&inside).expect("a ray from inside hits");
+            assert_eq!(hit.t, t);
+            assert_eq!(cube.surface(&inside, &hit).normal, direction);
+            let outside = Ray::new(-direction * 10.0, direction).to_f64();
+            let hit = cube.intersect(&outside).expect("a ray to the middle hits");
+            assert_eq!(hit.t, 10.0 - t);
+            assert_eq!(cube.surface(&outside, &hit).normal, -direction);
+        }
+    }
+
+    #[test]
+    fn a_turned_box_is_hit_where_its_corner_is() {
+        let cube = Cuboid::new(DVec3::ZERO, DVec3::splat(2.0), DVec3::new(0.0, 45.0, 0.0));
+        let ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X).to_f64();
+        let hit = cube.intersect(&ray).expect("the edge is on the axis");
+        assert!((f64::from(hit.t) - (5.0 - 2.0_f64.sqrt())).abs() < 1e-6);
+        assert_eq!(cube.intersect(&Ray::new(Vec3::new(-5.0, 0.0, 1.42), Vec3::X).to_f64()), None);
+    }
+
+    #[test]
+    fn faces_are_parallelograms_of_the_surface_facing_outwards() {
+        let cube = Cuboid::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, 30.0));
+        for face in 0..6 {
+            let (corner, u, v) = cube.face(face);
+            let middle = corner + (u + v) * 0.5;
+            let ray = RayF64 { origin: cube.center, direction: middle - cube.center, t_max: f64::INFINITY };
+            let hit = cube.intersect(&ray).expect("a ray from inside hits");
+            assert_eq!((hit.primitive, hit.t), (face, 1.0));
+            let surface = cube.surface(&ray, &hit);
+            assert!((surface.normal - u.cross(v).normalize().as_vec3()).length() < 1e-6);
+            assert!((surface.uv - Vec2::splat(0.5)).length() < 1e-6);
+            assert!((surface.dpdu - u.as_vec3()).length() < 1e-5 && (surface.dpdv - v.as_vec3()).length() < 1e-5);
+        }
+    }
+}

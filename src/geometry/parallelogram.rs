@@ -1,0 +1,103 @@
+//! Quads: squares and any other parallelograms, in double precision.
+
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use crate::math::{DVec3, Vec2};
+
+/// Room given to a quad's border in units of its edges, so that two quads which share an edge leave no gap between
+/// them; far below what an `f32` ray can tell apart.
+const BORDER: f64 = 1e-14;
+
+/// The points corner + s·u + t·v with s, t in [0, 1]; the front is along u × v.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parallelogram {
+    /// The corner at s = t = 0.
+    pub corner: DVec3,
+    /// First edge.
+    pub u: DVec3,
+    /// Second edge.
+    pub v: DVec3,
+    /// u × v.
+    normal: DVec3,
+    /// Vectors whose products with point − corner are s and t.
+    dual_u: DVec3,
+    dual_v: DVec3,
+}
+
+impl Parallelogram {
+    /// From a corner and two edges that are not parallel.
+    pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
+        let normal = u.cross(v);
+        let area_squared = normal.length_squared();
+        Self { corner, u, v, normal, dual_u: v.cross(normal) / area_squared, dual_v: normal.cross(u) / area_squared }
+    }
+
+    /// The one root of the plane, inside the edges.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        let to_corner = self.corner - ray.origin;
+        let t = self.normal.dot(to_corner) / self.normal.dot(ray.direction);
+        let accepted = ray.accept(t)?;
+        let from_corner = ray.direction * t - to_corner;
+        let (s, t) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
+        let inside = |x: f64| (-BORDER..=1.0 + BORDER).contains(&x);
+        (inside(s) && inside(t)).then(|| ShapeHit::at(accepted))
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let from_corner = ray.at(f64::from(hit.t)) - self.corner;
+        let (s, t) = (from_corner.dot(self.dual_u).clamp(0.0, 1.0), from_corner.dot(self.dual_v).clamp(0.0, 1.0));
+        let point = self.corner + self.u * s + self.v * t;
+        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v)
+    }
+
+    /// The box around it.
+    pub fn bounds(&self) -> Aabb {
+        let c = self.corner;
+        Aabb::around_f64([c, c + self.u, c + self.v, c + self.u + self.v])
+    }
+
+    /// Area.
+    pub fn area(&self) -> f64 {
+        self.normal.length()
+    }
+
+    /// Unit normal of the front.
+    pub fn unit_normal(&self) -> DVec3 {
+        self.normal.normalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::math::Vec3;
+
+    #[test]
+    fn oblique_edges_give_their_own_coordinates() {
+        let quad = Parallelogram::new(
+            DVec3::new(1.0, 2.0, 3.0),
+            DVec3::new(2.0, 0.5, 0.0),
+            DVec3::new(1.0, 3.0, 1.0),
+        );
+        let target = (quad.corner + quad.u * 0.25 + quad.v * 0.75).as_vec3();
+        let origin = Vec3::new(4.0, 3.0, 20.0);
+        let ray = Ray::new(origin, target - origin).to_f64();
+        let hit = quad.intersect(&ray).expect("the ray is aimed at the quad");
+        assert!((hit.t - 1.0).abs() < 1e-6);
+        let surface = quad.surface(&ray, &hit);
+        assert!((surface.uv - Vec2::new(0.25, 0.75)).length() < 1e-6);
+        assert!((surface.point - target).length() < 1e-5);
+        let outside = (quad.corner + quad.u * 1.01 + quad.v * 0.5).as_vec3();
+        assert_eq!(quad.intersect(&Ray::new(origin, outside - origin).to_f64()), None);
+    }
+
+    #[test]
+    fn parallel_and_coplanar_rays_miss() {
+        let quad = Parallelogram::new(DVec3::ZERO, DVec3::X, DVec3::Y);
+        for z in [0.0, 1.0] {
+            let ray = Ray::new(Vec3::new(-1.0, 0.5, z), Vec3::X).to_f64();
+            assert_eq!(quad.intersect(&ray), None);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Infinite planes, in double precision.
+
+use super::surface::flat_axes;
+use super::{RayF64, ShapeHit, SurfacePoint};
+use crate::math::{DVec3, Vec2};
+
+/// All points p with (p − point)·normal = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// A point of it, where (u, v) = (0, 0).
+    pub point: DVec3,
+    /// Unit normal of its front.
+    normal: DVec3,
+    u: DVec3,
+    v: DVec3,
+}
+
+impl Plane {
+    /// From a point and a normal of any length but 0.
+    pub fn new(point: DVec3, normal: DVec3) -> Self {
+        let normal = normal.normalize();
+        let (u, v) = flat_axes(normal);
+        Self { point, normal, u, v }
+    }
+
+    /// Its one root; none for rays in it or parallel to it.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
+        (t < f64::from(f32::MAX)).then(|| ray.accept(t)).flatten().map(ShapeHit::at)
+    }
+
+    /// The surface at a hit; one texture tile per unit of length.
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let offset = ray.at(f64::from(hit.t)) - self.point;
+        let (s, t) = (offset.dot(self.u), offset.dot(self.v));
+        let point = self.point + self.u * s + self.v * t;
+        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::math::Vec3;
+
+    #[test]
+    fn one_root_or_none() {
+        let floor = Plane::new(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 5.0, 0.0));
+        let down = Ray::new(Vec3::new(2.25, 3.0, -1.5), Vec3::NEG_Y).to_f64();
+        let hit = floor.intersect(&down).expect("the floor is below");
+        assert_eq!(hit.t, 2.0);
+        let surface = floor.surface(&down, &hit);
+        assert_eq!((surface.point, surface.uv), (Vec3::new(2.25, 1.0, -1.5), Vec2::new(2.25, 1.5)));
+        for parallel in [Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 2.0, 0.0)] {
+            assert_eq!(floor.intersect(&Ray::new(parallel, Vec3::X).to_f64()), None);
+        }
+    }
+}

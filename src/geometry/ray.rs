@@ -1,0 +1,106 @@
+//! Rays as half-lines and segments, and where to start one that leaves a surface.
+
+use crate::math::{DVec3, Vec3};
+
+/// The points `origin + t·direction` for t in (0, `t_max`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Where it goes; of any length, which is the unit of t.
+    pub direction: Vec3,
+    /// Its end; ∞ for a half-line.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// A half-line.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, t_max: f32::INFINITY }
+    }
+
+    /// The segment that ends just before `to`, shortened by the rounding errors of its two ends, so that a surface
+    /// through `to` is not hit (t = 1 is the far end before that).
+    pub fn segment(from: Vec3, to: Vec3) -> Self {
+        let direction = to - from;
+        let size = from.abs().max_element() + to.abs().max_element();
+        let relative = size / direction.abs().max_element().max(f32::MIN_POSITIVE);
+        let shortening = 4.0 * f32::EPSILON * (1.0 + relative);
+        Self { origin: from, direction, t_max: 1.0 - shortening.min(0.5) }
+    }
+
+    /// The point at `t`.
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.origin + self.direction * t
+    }
+
+    /// The same ray in double precision.
+    pub fn to_f64(&self) -> RayF64 {
+        RayF64 { origin: self.origin.as_dvec3(), direction: self.direction.as_dvec3(), t_max: f64::from(self.t_max) }
+    }
+}
+
+/// A [`Ray`] in double precision, for the shapes that are computed so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayF64 {
+    /// Where it starts.
+    pub origin: DVec3,
+    /// Where it goes.
+    pub direction: DVec3,
+    /// Its end.
+    pub t_max: f64,
+}
+
+impl RayF64 {
+    /// The point at `t`.
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.origin + self.direction * t
+    }
+
+    /// `t` as `f32`, if the ray has such a point.
+    pub fn accept(&self, t: f64) -> Option<f32> {
+        let single = t as f32;
+        (single > 0.0 && f64::from(single) <= self.t_max).then_some(single)
+    }
+}
+
+/// A start for a ray that leaves `point` towards `direction`: on that side of the surface for certain, where each
+/// component of `point` is off by at most `error` (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th
+/// ed., section 6.8.6).
+pub fn offset_origin(point: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
+    let distance = normal.abs().dot(error);
+    let offset = if normal.dot(direction) < 0.0 { -normal * distance } else { normal * distance };
+    let moved = point + offset;
+    let round = |moved: f32, offset: f32| {
+        if offset > 0.0 {
+            moved.next_up()
+        } else if offset < 0.0 {
+            moved.next_down()
+        } else {
+            moved
+        }
+    };
+    Vec3::new(round(moved.x, offset.x), round(moved.y, offset.y), round(moved.z, offset.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_origin_is_beyond_the_error() {
+        let (p, error) = (Vec3::new(1e4, -3.0, 0.25), Vec3::splat(1e-3));
+        let n = Vec3::new(0.6, 0.0, 0.8);
+        assert!((offset_origin(p, error, n, n) - p).as_dvec3().dot(n.as_dvec3()) >= 0.0013);
+        assert!((offset_origin(p, error, n, -n) - p).as_dvec3().dot(n.as_dvec3()) <= -0.0013);
+    }
+
+    #[test]
+    fn a_segment_ends_before_its_target_at_any_scale() {
+        for scale in [1e-8_f32, 1.0, 1e8] {
+            let (from, to) = (Vec3::new(3.0, 4.0, 5.0) * scale, Vec3::new(3.0, 4.5, 5.0) * scale);
+            let ray = Ray::segment(from, to);
+            assert!(ray.at(ray.t_max).y < to.y && ray.at(ray.t_max).y > 4.4999 * scale);
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! What a shape says about a hit.
+
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// The nearest meeting of a ray and a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShapeHit {
+    /// Distance along the ray in units of its direction's length.
+    pub t: f32,
+    /// Which part of the shape: triangle of a mesh, face of a box; else 0.
+    pub primitive: u32,
+    /// Weight of a triangle's second corner; else 0.
+    pub u: f32,
+    /// Weight of a triangle's third corner; else 0.
+    pub v: f32,
+}
+
+impl ShapeHit {
+    /// A hit of a shape with a single part.
+    pub fn at(t: f32) -> Self {
+        Self { t, primitive: 0, u: 0.0, v: 0.0 }
+    }
+}
+
+/// A point of a surface, in world coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// The point, on the surface but for rounding.
+    pub point: Vec3,
+    /// Bound on each component's error, including that of the shape's own intersection test.
+    pub error: Vec3,
+    /// Unit geometric normal of the front side.
+    pub normal: Vec3,
+    /// Unit interpolated normal on the same side.
+    pub shading_normal: Vec3,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// Change of the point with u, any length; 0 where the parametrisation has none.
+    pub dpdu: Vec3,
+    /// Change of the point with v.
+    pub dpdv: Vec3,
+    /// Weights of a triangle's corners; (1 − u − v, u, v) of the texture coordinates elsewhere.
+    pub barycentric: Vec3,
+}
+
+impl SurfacePoint {
+    /// A point computed in double precision on a surface without shading normals: its error is that of rounding to `f32`.
+    pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3) -> Self {
+        let normal = normal.normalize().as_vec3();
+        let point = point.as_vec3();
+        Self {
+            point,
+            error: rounding_error(point),
+            normal,
+            shading_normal: normal,
+            uv,
+            dpdu: dpdu.as_vec3(),
+            dpdv: dpdv.as_vec3(),
+            barycentric: Vec3::new(1.0 - uv.x - uv.y, uv.x, uv.y),
+        }
+    }
+}
+
+/// Twice the error of rounding a point to `f32`: the second half is for the `f64` arithmetic before it.
+pub fn rounding_error(point: Vec3) -> Vec3 {
+    point.abs() * f32::EPSILON + Vec3::splat(f32::MIN_POSITIVE)
+}
+
+/// Tangents (u, v) of a flat surface with unit normal `n`, such that u × v = n: v goes up where the surface
+/// stands, and towards −z where it lies and faces up.
+pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
+    let across = DVec3::Y.cross(n);
+    let u = if across.length_squared() > 1e-12 { across.normalize() } else { DVec3::X };
+    (u, n.cross(u))
+}

@@ -1,0 +1,81 @@
+//! Single triangles, in double precision.
+
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// A triangle; the front is along (b − a) × (c − a).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    /// First corner.
+    pub a: DVec3,
+    /// Second corner.
+    pub b: DVec3,
+    /// Third corner.
+    pub c: DVec3,
+}
+
+impl Triangle {
+    /// The hit, from either side. Edges are tested by triple products of the corners as seen from the origin, which
+    /// two triangles at one edge compute alike but for the sign: no gap between them.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
+        let d = ray.direction;
+        let (wa, wb, wc) = (d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a)));
+        if (wa < 0.0 || wb < 0.0 || wc < 0.0) && (wa > 0.0 || wb > 0.0 || wc > 0.0) {
+            return None;
+        }
+        let sum = wa + wb + wc;
+        let normal = (b - a).cross(c - a);
+        let t = ray.accept(normal.dot(a) / normal.dot(d))?;
+        (sum != 0.0).then(|| ShapeHit { t, primitive: 0, u: (wb / sum) as f32, v: (wc / sum) as f32 })
+    }
+
+    /// The surface at a hit; its texture coordinates are (0, 0), (1, 0), (0, 1) at the corners.
+    pub fn surface(&self, hit: &ShapeHit) -> SurfacePoint {
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        let (ab, ac) = (self.b - self.a, self.c - self.a);
+        SurfacePoint::exact(self.a + ab * u + ac * v, ab.cross(ac), Vec2::new(hit.u, hit.v), ab, ac)
+    }
+
+    /// The box around it.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around_f64([self.a, self.b, self.c])
+    }
+
+    /// Area.
+    pub fn area(&self) -> f64 {
+        0.5 * (self.b - self.a).cross(self.c - self.a).length()
+    }
+
+    /// The point with barycentric weights `(1 − u − v, u, v)`.
+    pub fn point(&self, weights: Vec3) -> DVec3 {
+        let w = weights.as_dvec3();
+        self.a * w.x + self.b * w.y + self.c * w.z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+
+    #[test]
+    fn barycentrics_of_an_aimed_ray_from_both_sides() {
+        let triangle = Triangle { a: DVec3::new(0.1, 0.2, 0.3), b: DVec3::new(2.0, 0.0, 1.0), c: DVec3::new(0.0, 3.0, -1.0) };
+        let target = triangle.point(Vec3::new(0.5, 0.2, 0.3)).as_vec3();
+        for z in [-5.0_f32, 5.0] {
+            let origin = Vec3::new(0.3, 0.4, z);
+            let hit = triangle.intersect(&Ray::new(origin, target - origin).to_f64()).expect("aimed inside");
+            assert!((hit.t - 1.0).abs() < 1e-6 && (hit.u - 0.2).abs() < 1e-6 && (hit.v - 0.3).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn degenerate_triangles_are_never_hit() {
+        let flat = Triangle { a: DVec3::ZERO, b: DVec3::X, c: DVec3::X * 2.0 };
+        for direction in [Vec3::NEG_Z, Vec3::X, Vec3::new(0.25, 0.0, -1.0)] {
+            let ray = Ray::new(Vec3::new(0.5, 0.0, 1.0), direction).to_f64();
+            assert_eq!(flat.intersect(&ray), None);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Discrete distributions.
+
+/// Chooses an index in proportion to weights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Discrete {
+    /// Sums of the weights up to and with each index.
+    sums: Vec<f64>,
+}
+
+impl Discrete {
+    /// From weights ≥ 0; none where they sum to nothing.
+    pub fn new(weights: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let sums: Vec<f64> = weights
+            .into_iter()
+            .scan(0.0, |sum, weight| {
+                *sum += weight;
+                Some(*sum)
+            })
+            .collect();
+        sums.last().is_some_and(|&total| total > 0.0 && total.is_finite()).then_some(Self { sums })
+    }
+
+    /// Sum of the weights.
+    pub fn total(&self) -> f64 {
+        self.sums.last().copied().unwrap_or(0.0)
+    }
+
+    /// The index that `u` in [0, 1) falls on, and where in its share `u` is, in [0, 1).
+    pub fn sample(&self, u: f32) -> (usize, f32) {
+        let target = f64::from(u) * self.total();
+        let index = self.sums.partition_point(|&sum| sum <= target).min(self.sums.len() - 1);
+        let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
+        let share = self.sums[index] - before;
+        let rest = if share > 0.0 { ((target - before) / share) as f32 } else { 0.0 };
+        (index, rest.clamp(0.0, 1.0_f32.next_down()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn indices_come_as_often_as_their_weights_and_empty_ones_never() {
+        let distribution = Discrete::new([1.0, 0.0, 3.0, 0.0]).expect("some weight");
+        let mut counts = [0; 4];
+        let mut rests = 0.0;
+        for i in 0..1000 {
+            let (index, rest) = distribution.sample((i as f32 + 0.5) / 1000.0);
+            counts[index] += 1;
+            rests += rest;
+        }
+        assert_eq!(counts, [250, 0, 750, 0]);
+        assert!((rests / 1000.0 - 0.5).abs() < 0.01);
+        assert_eq!(distribution.sample(1.0_f32.next_down()).0, 2);
+        assert_eq!(Discrete::new([0.0]), None);
+        assert_eq!(Discrete::new([]), None);
+    }
+}

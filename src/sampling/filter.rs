@@ -1,0 +1,154 @@
+//! Pixel filters by importance: samples are placed as the filter weighs, and all count alike but for a sign (Ernst,
+//! Stamminger, Greiner, *Filter Importance Sampling*, 2006).
+
+use std::sync::LazyLock;
+
+use crate::math::Vec2;
+
+/// A reconstruction filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filter {
+    /// One pixel wide.
+    Box,
+    /// Two pixels wide.
+    Tent,
+    /// Standard deviation ½ pixel, three pixels wide.
+    Gaussian,
+    /// Mitchell and Netravali 1988, B = C = 1/3, four pixels wide.
+    Mitchell,
+}
+
+/// A place relative to the pixel's centre, in pixels, and what a sample there counts: ∫|f|/∫f with f's sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterSample {
+    /// Offset from the centre.
+    pub offset: Vec2,
+    /// Weight; the mean over samples is 1.
+    pub weight: f32,
+}
+
+impl Filter {
+    /// Warp a point of the unit square.
+    pub fn sample(self, u: Vec2) -> FilterSample {
+        match self {
+            Self::Box => FilterSample { offset: u - Vec2::splat(0.5), weight: 1.0 },
+            Self::Tent => FilterSample { offset: Vec2::new(tent(u.x), tent(u.y)), weight: 1.0 },
+            Self::Gaussian => GAUSSIAN.sample2(u),
+            Self::Mitchell => MITCHELL.sample2(u),
+        }
+    }
+}
+
+/// Density 1 − |x| on [−1, 1].
+fn tent(u: f32) -> f32 {
+    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
+}
+
+static GAUSSIAN: LazyLock<Table> = LazyLock::new(|| {
+    let at = |x: f64| (-2.0 * x * x).exp();
+    Table::new(1.5, |x| at(x) - at(1.5))
+});
+
+static MITCHELL: LazyLock<Table> = LazyLock::new(|| {
+    Table::new(2.0, |x| {
+        let x = x.abs();
+        // B = C = 1/3 in the general cubic.
+        if x < 1.0 {
+            (7.0 * x.powi(3) - 12.0 * x.powi(2) + 16.0 / 3.0) / 6.0
+        } else {
+            (-7.0 / 3.0 * x.powi(3) + 12.0 * x.powi(2) - 20.0 * x + 32.0 / 3.0) / 6.0
+        }
+    })
+});
+
+/// A tabulated even function in one dimension, sampled by its absolute value.
+struct Table {
+    radius: f64,
+    sums: Vec<f64>,
+    signs: Vec<f64>,
+    /// ∫|f|/∫f.
+    excess: f64,
+}
+
+impl Table {
+    const CELLS: usize = 1024;
+
+    fn new(radius: f64, f: impl Fn(f64) -> f64) -> Self {
+        let middle = |cell: usize| ((cell as f64 + 0.5) / Self::CELLS as f64 * 2.0 - 1.0) * radius;
+        let values: Vec<f64> = (0..Self::CELLS).map(|cell| f(middle(cell))).collect();
+        let mut sum = 0.0;
+        let sums = values.iter().map(|value| {
+            sum += value.abs();
+            sum
+        });
+        let sums: Vec<f64> = sums.collect();
+        let excess = sum / values.iter().sum::<f64>();
+        Self { radius, sums, signs: values.iter().map(|value| value.signum()).collect(), excess }
+    }
+
+    fn sample(&self, u: f32) -> (f32, f64) {
+        let target = f64::from(u) * self.sums[Self::CELLS - 1];
+        let cell = self.sums.partition_point(|&sum| sum <= target).min(Self::CELLS - 1);
+        let before = if cell == 0 { 0.0 } else { self.sums[cell - 1] };
+        let rest = (target - before) / (self.sums[cell] - before).max(f64::MIN_POSITIVE);
+        let x = ((cell as f64 + rest.clamp(0.0, 1.0)) / Self::CELLS as f64 * 2.0 - 1.0) * self.radius;
+        (x as f32, self.signs[cell] * self.excess)
+    }
+
+    fn sample2(&self, u: Vec2) -> FilterSample {
+        let ((x, wx), (y, wy)) = (self.sample(u.x), self.sample(u.y));
+        FilterSample { offset: Vec2::new(x, y), weight: (wx * wy) as f32 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Moments over a fine grid: weights average to 1, offsets to 0, their squares to ∫x²f/∫f.
+    #[test]
+    fn every_filter_has_its_weight_and_width() {
+        let n = 2048;
+        for (filter, moment) in [
+            (Filter::Box, 1.0 / 12.0),
+            (Filter::Tent, 1.0 / 6.0),
+            (Filter::Gaussian, gaussian_moment()),
+            (Filter::Mitchell, mitchell_moment()),
+        ] {
+            let (mut weight, mut second, mut mean) = (0.0, 0.0, 0.0);
+            for i in 0..n * n {
+                let u = Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32;
+                let sample = filter.sample(u);
+                weight += f64::from(sample.weight);
+                mean += f64::from(sample.weight * sample.offset.x);
+                second += f64::from(sample.weight * sample.offset.x * sample.offset.x);
+            }
+            let count = f64::from(n * n);
+            assert!((weight / count - 1.0).abs() < 4e-3, "{filter:?}: weight {}", weight / count);
+            assert!((mean / count).abs() < 2e-3, "{filter:?}");
+            assert!((second / count - moment).abs() < 4e-3, "{filter:?}: {} is not {moment}", second / count);
+        }
+    }
+
+    fn moment_of(radius: f64, f: impl Fn(f64) -> f64) -> f64 {
+        let xs = (0..20_000).map(|i| (f64::from(i) + 0.5) / 20_000.0 * radius);
+        let (zeroth, second) = xs.fold((0.0, 0.0), |(a, b), x| (a + f(x), b + x * x * f(x)));
+        second / zeroth
+    }
+
+    fn gaussian_moment() -> f64 {
+        moment_of(1.5, |x| (-x * x / 0.5).exp() - (-4.5_f64).exp())
+    }
+
+    /// The general Mitchell–Netravali cubic at B = C = 1/3.
+    fn mitchell_moment() -> f64 {
+        let (b, c) = (1.0 / 3.0, 1.0 / 3.0);
+        moment_of(2.0, |x| {
+            if x < 1.0 {
+                (12.0 - 9.0 * b - 6.0 * c) * x.powi(3) + (-18.0 + 12.0 * b + 6.0 * c) * x.powi(2) + (6.0 - 2.0 * b)
+            } else {
+                (-b - 6.0 * c) * x.powi(3) + (6.0 * b + 30.0 * c) * x.powi(2) + (-12.0 * b - 48.0 * c) * x + (8.0 * b + 24.0 * c)
+            }
+        })
+    }
+}

@@ -1,0 +1,81 @@
+//! Warps of the unit square.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use crate::math::{Vec2, Vec3};
+
+/// Uniform on the unit disk (Shirley and Chiu, *A Low Distortion Map Between Disk and Square*, 1997).
+pub fn disk(u: Vec2) -> Vec2 {
+    let offset = u * 2.0 - Vec2::ONE;
+    if offset == Vec2::ZERO {
+        return Vec2::ZERO;
+    }
+    let (radius, angle) = if offset.x.abs() > offset.y.abs() {
+        (offset.x, FRAC_PI_4 * (offset.y / offset.x))
+    } else {
+        (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
+    };
+    let (sin, cos) = angle.sin_cos();
+    Vec2::new(cos, sin) * radius
+}
+
+/// Uniform barycentric weights of a triangle, with little distortion (Heitz, *A Low-Distortion Map Between
+/// Triangle and Square*, 2019).
+pub fn triangle(u: Vec2) -> Vec3 {
+    let (b0, b1) = if u.x < u.y {
+        let b0 = u.x * 0.5;
+        (b0, u.y - b0)
+    } else {
+        let b1 = u.y * 0.5;
+        (u.x - b1, b1)
+    };
+    Vec3::new(b0, b1, 1.0 - b0 - b1)
+}
+
+/// Uniform over the solid angle of a cone about z, given 1 − cos of its half angle, which keeps its digits for
+/// narrow cones.
+pub fn cone(u: Vec2, one_minus_cos_max: f32) -> Vec3 {
+    let one_minus_cos = u.x * one_minus_cos_max;
+    let sin = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
+    Vec3::new(sin * cos_phi, sin * sin_phi, 1.0 - one_minus_cos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid() -> impl Iterator<Item = Vec2> {
+        (0..10_000).map(|i| Vec2::new((i % 100) as f32 + 0.5, (i / 100) as f32 + 0.5) / 100.0)
+    }
+
+    #[test]
+    fn the_disk_is_uniform() {
+        let inner = grid().filter(|&u| disk(u).length() < 0.5).count();
+        let right = grid().filter(|&u| disk(u).x > 0.0).count();
+        assert_eq!(inner, 2500);
+        assert!((right as i32 - 5000).abs() < 60);
+        assert!(grid().all(|u| disk(u).length() <= 1.0));
+        assert_eq!(disk(Vec2::splat(0.5)), Vec2::ZERO);
+    }
+
+    #[test]
+    fn the_triangle_is_uniform() {
+        let mean = grid().map(triangle).sum::<Vec3>() / 10_000.0;
+        assert!((mean - Vec3::splat(1.0 / 3.0)).length() < 2e-3);
+        let corner = grid().filter(|&u| triangle(u).x > 0.5).count();
+        assert!((corner as i32 - 2500).abs() < 60);
+    }
+
+    #[test]
+    fn the_cone_is_uniform_over_solid_angle_also_when_narrow() {
+        for one_minus_cos in [2.0, 0.5, 1e-9] {
+            let z = grid().map(|u| 1.0 - f64::from(cone(u, one_minus_cos).z)).sum::<f64>() / 10_000.0;
+            let sin2 = grid().map(|u| f64::from(cone(u, one_minus_cos).truncate().length_squared())).sum::<f64>() / 1e4;
+            let c = f64::from(one_minus_cos);
+            assert!(one_minus_cos < 1e-6 || (z / (c / 2.0) - 1.0).abs() < 1e-3);
+            // ∫(2c − c²) over the cone.
+            assert!((sin2 / (c - c * c / 3.0) - 1.0).abs() < 1e-3, "{one_minus_cos}");
+        }
+    }
+}
