@@ -3,4 +3,3 @@
 pub mod bvh;
 
 pub use bvh::Bvh;
-

@@ -1,5 +1,7 @@
 //! Bytes → meshes, textures and cameras. Every error names the file and, where it has lines, the line.
 
+pub mod normals;
+
 use std::path::PathBuf;
 
 use crate::geometry::mesh::TriangleMesh;

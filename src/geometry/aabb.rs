@@ -18,7 +18,9 @@ impl Aabb {
 
     /// The smallest box around some points.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |bounds, p| Self { min: bounds.min.min(p), max: bounds.max.max(p) })
+        points
+            .into_iter()
+            .fold(Self::EMPTY, |bounds, p| Self { min: bounds.min.min(p), max: bounds.max.max(p) })
     }
 
     /// The smallest `f32` box around double-precision points: every corner is rounded outwards.

@@ -84,7 +84,11 @@ impl Cuboid {
         let (_, normal) = face_normal(face);
         let (u, v) = flat_axes(normal);
         let corner = (normal - u - v) * self.half;
-        (self.center + self.axes * corner, self.axes * (u * self.half * 2.0), self.axes * (v * self.half * 2.0))
+        (
+            self.center + self.axes * corner,
+            self.axes * (u * self.half * 2.0),
+            self.axes * (v * self.half * 2.0),
+        )
     }
 }
 
@@ -128,7 +132,8 @@ mod tests {
 
     #[test]
     fn faces_are_parallelograms_of_the_surface_facing_outwards() {
-        let cube = Cuboid::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, 30.0));
+        let cube =
+            Cuboid::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, 30.0));
         for face in 0..6 {
             let (corner, u, v) = cube.face(face);
             let middle = corner + (u + v) * 0.5;
@@ -138,7 +143,9 @@ mod tests {
             let surface = cube.surface(&ray, &hit);
             assert!((surface.normal - u.cross(v).normalize().as_vec3()).length() < 1e-6);
             assert!((surface.uv - Vec2::splat(0.5)).length() < 1e-6);
-            assert!((surface.dpdu - u.as_vec3()).length() < 1e-5 && (surface.dpdv - v.as_vec3()).length() < 1e-5);
+            assert!(
+                (surface.dpdu - u.as_vec3()).length() < 1e-5 && (surface.dpdv - v.as_vec3()).length() < 1e-5
+            );
         }
     }
 }

@@ -28,7 +28,14 @@ impl Parallelogram {
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let area_squared = normal.length_squared();
-        Self { corner, u, v, normal, dual_u: v.cross(normal) / area_squared, dual_v: normal.cross(u) / area_squared }
+        Self {
+            corner,
+            u,
+            v,
+            normal,
+            dual_u: v.cross(normal) / area_squared,
+            dual_v: normal.cross(u) / area_squared,
+        }
     }
 
     /// The one root of the plane, inside the edges.
@@ -45,7 +52,8 @@ impl Parallelogram {
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let from_corner = ray.at(f64::from(hit.t)) - self.corner;
-        let (s, t) = (from_corner.dot(self.dual_u).clamp(0.0, 1.0), from_corner.dot(self.dual_v).clamp(0.0, 1.0));
+        let (s, t) =
+            (from_corner.dot(self.dual_u).clamp(0.0, 1.0), from_corner.dot(self.dual_v).clamp(0.0, 1.0));
         let point = self.corner + self.u * s + self.v * t;
         SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v)
     }

@@ -36,7 +36,11 @@ impl Ray {
 
     /// The same ray in double precision.
     pub fn to_f64(&self) -> RayF64 {
-        RayF64 { origin: self.origin.as_dvec3(), direction: self.direction.as_dvec3(), t_max: f64::from(self.t_max) }
+        RayF64 {
+            origin: self.origin.as_dvec3(),
+            direction: self.direction.as_dvec3(),
+            t_max: f64::from(self.t_max),
+        }
     }
 }
 

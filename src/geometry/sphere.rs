@@ -38,7 +38,8 @@ impl Sphere {
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let outwards = ray.at(f64::from(hit.t)) - self.center;
-        let n = if outwards.length_squared() > 0.0 { outwards.normalize() } else { -ray.direction.normalize() };
+        let n =
+            if outwards.length_squared() > 0.0 { outwards.normalize() } else { -ray.direction.normalize() };
         let (uv, dpdu, dpdv) = sphere_parametrisation(n);
         SurfacePoint::exact(self.center + n * self.radius, n, uv, dpdu * self.radius, dpdv * self.radius)
     }
@@ -94,7 +95,8 @@ mod tests {
     #[test]
     fn precise_from_far_away() {
         for distance in [2e1_f64, 2e2, 2e3, 2e4, 2e6] {
-            let ray = RayF64 { origin: DVec3::new(0.5, 0.0, -distance), direction: DVec3::Z, t_max: f64::INFINITY };
+            let ray =
+                RayF64 { origin: DVec3::new(0.5, 0.0, -distance), direction: DVec3::Z, t_max: f64::INFINITY };
             let exact = distance - 0.75_f64.sqrt();
             let hit = unit().intersect(&ray).expect("the ray meets the sphere");
             assert!((f64::from(hit.t) - exact).abs() / exact < 6e-8, "at {distance}");

@@ -61,7 +61,11 @@ mod tests {
 
     #[test]
     fn barycentrics_of_an_aimed_ray_from_both_sides() {
-        let triangle = Triangle { a: DVec3::new(0.1, 0.2, 0.3), b: DVec3::new(2.0, 0.0, 1.0), c: DVec3::new(0.0, 3.0, -1.0) };
+        let triangle = Triangle {
+            a: DVec3::new(0.1, 0.2, 0.3),
+            b: DVec3::new(2.0, 0.0, 1.0),
+            c: DVec3::new(0.0, 3.0, -1.0),
+        };
         let target = triangle.point(Vec3::new(0.5, 0.2, 0.3)).as_vec3();
         for z in [-5.0_f32, 5.0] {
             let origin = Vec3::new(0.3, 0.4, z);

@@ -107,7 +107,8 @@ mod tests {
         for a in bad {
             for b in bad {
                 let triangle = [Vec3::new(a, 0.0, b), Vec3::new(1.0, b, 2.0), Vec3::new(0.0, 1.0, a)];
-                let hit = ShearedRay::new(Vec3::new(b, 0.1, 0.0), Vec3::new(a, 0.0, b)).intersect(&triangle, 1e30);
+                let hit =
+                    ShearedRay::new(Vec3::new(b, 0.1, 0.0), Vec3::new(a, 0.0, b)).intersect(&triangle, 1e30);
                 assert!(hit.is_none_or(|hit| hit.t.is_finite()));
             }
         }

@@ -1,11 +1,28 @@
-//! From a world and a tile to radiance.
+//! From a world and a tile to radiance. Rays travel in batches: a queue of camera rays, the shadow rays of their hits,
+//! the queue of the next bounces.
+
+mod batch;
+mod direct;
+mod glass;
+mod medium;
+mod views;
+mod whitted;
 
 use std::ops::Range;
 
+use batch::{SampleBlock, Tracer};
+
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Rect, TileSamples};
+use crate::math::Vec3;
 use crate::scene::description::{PixelFilter, Shadows};
 use crate::world::World;
+
+/// Camera rays that go through the queues together.
+const BATCH_SIZE: usize = 1024;
+
+/// Rays between two looks at the token.
+const POLL_INTERVAL: usize = 256;
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -47,6 +64,11 @@ impl View {
         Self::Specular,
         Self::Shadow,
     ];
+
+    /// Whether it shows numbers about the first hit, which no exposure or tone curve applies to.
+    pub fn is_data(self) -> bool {
+        matches!(self, Self::Normal | Self::Depth | Self::Barycentric | Self::Uv | Self::Albedo)
+    }
 
     /// Its name on the command line and the screen.
     pub fn name(self) -> &'static str {
@@ -117,7 +139,7 @@ impl std::ops::AddAssign for RayCounters {
 /// into tiles and of its samples into ranges gives the same radiances.
 ///
 /// # Errors
-/// [`Cancelled`] when the token says so; it is polled at least every few hundred rays.
+/// [`Cancelled`] when the token says so; it is polled every few hundred rays.
 pub fn render_tile(
     world: &World,
     settings: &RenderSettings,
@@ -125,9 +147,19 @@ pub fn render_tile(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    token.check()?;
-    let count = tile.area() * samples.len();
-    let radiance = (0..count).map(|i| world.background * (i as f32 / count as f32)).collect();
-    let _ = settings;
-    Ok((TileSamples { rect: tile, samples: samples.len() as u32, radiance }, RayCounters::default()))
+    let block = SampleBlock { tile, samples };
+    let mut radiance = vec![Vec3::ZERO; block.len()];
+    let mut counters = RayCounters::default();
+    let tracer = Tracer { world, settings, block: &block, token };
+    for start in (0..block.len()).step_by(BATCH_SIZE) {
+        let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
+        let cameras = tracer.camera_rays(slots);
+        counters.camera_rays += cameras.len() as u64;
+        if settings.view.is_data() {
+            views::shade(&tracer, &cameras, &mut radiance, &mut counters)?;
+        } else {
+            whitted::trace(&tracer, cameras, &mut radiance, &mut counters)?;
+        }
+    }
+    Ok((TileSamples { rect: block.tile, samples: block.samples.len() as u32, radiance }, counters))
 }

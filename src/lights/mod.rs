@@ -1,1 +1,80 @@
-//! lights
+//! Lights: where light comes from, as seen from a point.
+
+pub mod emitter;
+pub mod point;
+pub mod rectangle;
+pub mod sphere;
+pub mod triangles;
+
+pub use emitter::AreaLight;
+pub use point::PointLight;
+
+use crate::math::Vec3;
+
+/// A light of any kind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Light {
+    /// Without extent.
+    Point(PointLight),
+    /// A shape that emits.
+    Area(AreaLight),
+}
+
+/// One way for light to arrive at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// Where it comes from, in world coordinates.
+    pub target: Vec3,
+    /// Unit direction to there.
+    pub direction: Vec3,
+    /// Radiance over the density of the direction in sr⁻¹: times f and the cosine it is a contribution. For lights
+    /// without extent, irradiance at normal incidence.
+    pub weight: Vec3,
+    /// What the shadow ray need not hit: the light itself.
+    pub source: Source,
+}
+
+/// The part of the scene that a light is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Nothing that can be hit.
+    Nothing,
+    /// A convex object: no ray to its near side meets it before.
+    Object(u32),
+    /// One primitive of an object.
+    Primitive(u32, u32),
+}
+
+impl Source {
+    /// Whether a hit is on the light itself.
+    pub fn is(&self, object: u32, primitive: u32) -> bool {
+        match *self {
+            Self::Nothing => false,
+            Self::Object(own) => own == object,
+            Self::Primitive(own, part) => own == object && part == primitive,
+        }
+    }
+}
+
+impl Light {
+    /// Sample the light as seen from `point`; none where it sends nothing there.
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        match self {
+            Self::Point(light) => light.sample(point),
+            Self::Area(light) => light.sample(point, u),
+        }
+    }
+
+    /// The middle of the light with all that it sends, as if it came from there.
+    pub fn middle(&self, point: Vec3) -> Option<LightSample> {
+        match self {
+            Self::Point(light) => light.sample(point),
+            Self::Area(light) => light.middle(point),
+        }
+    }
+
+    /// Whether one sample tells all: a light without extent.
+    pub fn is_delta(&self) -> bool {
+        matches!(self, Self::Point(_))
+    }
+}

@@ -1,7 +1,13 @@
 //! The numbers of an image, as compact as they came.
 
+use std::sync::LazyLock;
+
 use crate::math::Vec3;
-use crate::math::color::srgb8_to_linear;
+use crate::math::color::srgb_to_linear;
+
+/// Every sRGB byte decoded.
+static SRGB: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
 /// An image in memory, rows from top to bottom, RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +36,7 @@ impl Texels {
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
         let index = y as usize * self.width as usize + x as usize;
         match &self.data {
-            TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[index]),
+            TexelData::Srgb8(bytes) => Vec3::from_array(bytes[index].map(|byte| SRGB[usize::from(byte)])),
             TexelData::Linear8(bytes) => Vec3::from_array(bytes[index].map(|byte| f32::from(byte) / 255.0)),
             TexelData::Float(floats) => floats[index],
         }

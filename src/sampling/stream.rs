@@ -43,7 +43,8 @@ impl PixelSampler {
     /// Four numbers for the `i`-th of `n` repetitions of one decision, well distributed over repetitions and samples together.
     pub fn get4_of(&self, purpose: Purpose, i: u32, n: u32) -> [f32; 4] {
         let index = u64::from(self.sample) * u64::from(n) + u64::from(i);
-        let (round, place) = (index / u64::from(SEQUENCE_LENGTH), (index % u64::from(SEQUENCE_LENGTH)) as u32);
+        let (round, place) =
+            (index / u64::from(SEQUENCE_LENGTH), (index % u64::from(SEQUENCE_LENGTH)) as u32);
         sobol_burley::sample_4d(place, 0, mix(self.seed ^ purpose.0) ^ mix(round as u32))
     }
 
@@ -73,7 +74,8 @@ mod tests {
             let mut cells = [0_u32; 64];
             for sample in 0..64 / n {
                 for i in 0..n {
-                    let [x, y, ..] = PixelSampler::new(3, 10, 20, sample).get4_of(Purpose::at_vertex(1, 2), i, n);
+                    let [x, y, ..] =
+                        PixelSampler::new(3, 10, 20, sample).get4_of(Purpose::at_vertex(1, 2), i, n);
                     cells[(x * 8.0) as usize * 8 + (y * 8.0) as usize] += 1;
                 }
             }

@@ -71,7 +71,9 @@ mod tests {
     fn the_cone_is_uniform_over_solid_angle_also_when_narrow() {
         for one_minus_cos in [2.0, 0.5, 1e-9] {
             let z = grid().map(|u| 1.0 - f64::from(cone(u, one_minus_cos).z)).sum::<f64>() / 10_000.0;
-            let sin2 = grid().map(|u| f64::from(cone(u, one_minus_cos).truncate().length_squared())).sum::<f64>() / 1e4;
+            let sin2 =
+                grid().map(|u| f64::from(cone(u, one_minus_cos).truncate().length_squared())).sum::<f64>()
+                    / 1e4;
             let c = f64::from(one_minus_cos);
             assert!(one_minus_cos < 1e-6 || (z / (c / 2.0) - 1.0).abs() < 1e-3);
             // ∫(2c − c²) over the cone.

@@ -81,7 +81,10 @@ fn build_subtree(
         );
         (left?, right?)
     } else {
-        (build_subtree(left, first, depth + 1, token)?, build_subtree(right, first + middle, depth + 1, token)?)
+        (
+            build_subtree(left, first, depth + 1, token)?,
+            build_subtree(right, first + middle, depth + 1, token)?,
+        )
     };
     Ok(join(left, right, bounds))
 }
@@ -90,7 +93,9 @@ fn build_subtree(
 fn join(left: Subtree, right: Subtree, bounds: Aabb) -> Subtree {
     let mut nodes = Vec::with_capacity(1 + left.nodes.len() + right.nodes.len());
     let right_start = 1 + left.nodes.len() as u32;
-    let moved = |child: Child, by: u32| if child.count == 0 { Child { first: child.first + by, count: 0 } } else { child };
+    let moved = |child: Child, by: u32| {
+        if child.count == 0 { Child { first: child.first + by, count: 0 } } else { child }
+    };
     nodes.push(Node {
         bounds: [left.bounds, right.bounds],
         child: [moved(left.root, 1), moved(right.root, right_start)],
@@ -168,7 +173,13 @@ fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
         .filter(|&axis| extent[axis] > 0.0 && bins_per_length[axis].is_finite())
         .filter_map(|axis| {
             let (bin, cost) = cheapest_plane(&bounds[axis], &counts[axis])?;
-            Some(Split { axis, start: centroids.min[axis], bins_per_length: bins_per_length[axis], bin, cost })
+            Some(Split {
+                axis,
+                start: centroids.min[axis],
+                bins_per_length: bins_per_length[axis],
+                bin,
+                cost,
+            })
         })
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
@@ -239,7 +250,8 @@ mod tests {
         built(&[unit_box(Vec3::ZERO)]);
         built(&vec![unit_box(Vec3::ONE); 1000]);
         built(&[Aabb::EMPTY, unit_box(Vec3::ZERO), Aabb { min: Vec3::NAN, max: Vec3::ONE }]);
-        let grid: Vec<_> = (0..20_000).map(|i| unit_box(Vec3::new((i % 40) as f32, (i / 40) as f32, 0.0))).collect();
+        let grid: Vec<_> =
+            (0..20_000).map(|i| unit_box(Vec3::new((i % 40) as f32, (i / 40) as f32, 0.0))).collect();
         built(&grid);
         // Each box twice as far as the one before: the surface area heuristic peels them off one by one.
         let geometric: Vec<_> = (0..250).map(|i| unit_box(Vec3::X * 2.0_f32.powi(i / 2))).collect();
@@ -249,7 +261,13 @@ mod tests {
     #[test]
     fn the_tree_does_not_depend_on_the_threads() {
         let boxes: Vec<_> = (0..30_000_u32)
-            .map(|i| unit_box(Vec3::new((i.wrapping_mul(2_654_435_761) >> 20) as f32, (i % 97) as f32, (i % 31) as f32)))
+            .map(|i| {
+                unit_box(Vec3::new(
+                    (i.wrapping_mul(2_654_435_761) >> 20) as f32,
+                    (i % 97) as f32,
+                    (i % 31) as f32,
+                ))
+            })
             .collect();
         let order = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");

@@ -66,7 +66,8 @@ impl Bvh {
     /// The first fault, in words.
     pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
         let mut seen = vec![false; boxes.len()];
-        let mut pending: Vec<(u32, Aabb)> = if self.nodes.is_empty() { Vec::new() } else { vec![(0, self.bounds)] };
+        let mut pending: Vec<(u32, Aabb)> =
+            if self.nodes.is_empty() { Vec::new() } else { vec![(0, self.bounds)] };
         while let Some((index, outer)) = pending.pop() {
             let node = &self.nodes[index as usize];
             for (child, bounds) in node.child.iter().zip(node.bounds) {

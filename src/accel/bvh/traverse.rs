@@ -106,7 +106,8 @@ mod tests {
     /// Boxes as shapes: the hit is where the ray enters.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
         let slabs = SlabRay::new(ray.origin, ray.direction);
-        let hits = boxes.iter().zip(0_u32..).filter_map(|(b, id)| Some((slabs.enter(b.min, b.max, ray.t_max)?, id)));
+        let hits =
+            boxes.iter().zip(0_u32..).filter_map(|(b, id)| Some((slabs.enter(b.min, b.max, ray.t_max)?, id)));
         hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     }
 

@@ -1,0 +1,109 @@
+//! Rays at the surface of glass.
+
+use super::batch::PathRay;
+use super::medium::Medium;
+use super::whitted::{Wave, leaving, reflected};
+use crate::geometry::SurfacePoint;
+use crate::materials::fresnel::{dielectric, refract};
+use crate::materials::{Glass, Material};
+use crate::math::Vec3;
+use crate::sampling::Purpose;
+use crate::world::{Hit, World};
+
+/// A ray is split in two while the weaker part counts at least this much of its sample; below, chance takes one of them.
+const LEAST_SPLIT: f32 = 0.01;
+
+/// Number of the decision between reflection and refraction.
+const CHOICE: u32 = u32::MAX;
+
+/// What glass leaves of radiance along a ray to its hit: the innermost glass that it is in, or, for a ray that started
+/// inside without knowing, the glass whose back it hits.
+pub fn absorption(world: &World, path: &PathRay, hit: &Hit, surface: &SurfacePoint) -> Vec3 {
+    let of = |material: &Material| match material {
+        Material::Glass(glass) => glass.transmittance(hit.shape.t),
+        _ => Vec3::ONE,
+    };
+    if let Some(object) = path.medium.innermost() {
+        return glass_of(world, object).map_or(Vec3::ONE, |glass| glass.transmittance(hit.shape.t));
+    }
+    let from_inside = surface.normal.dot(path.ray.direction) > 0.0;
+    if from_inside { of(&world.materials[world.material_index(hit)]) } else { Vec3::ONE }
+}
+
+fn glass_of(world: &World, object: u32) -> Option<&Glass> {
+    let first = Hit { shape: crate::geometry::ShapeHit::at(0.0), object };
+    match &world.materials[world.material_index(&first)] {
+        Material::Glass(glass) => Some(glass),
+        _ => None,
+    }
+}
+
+/// Index of refraction of what a ray is in.
+fn ior(world: &World, medium: Medium) -> f32 {
+    medium.innermost().and_then(|object| glass_of(world, object)).map_or(1.0, |glass| glass.ior)
+}
+
+impl Wave<'_> {
+    pub(super) fn shade_glass(&mut self, path: &PathRay, hit: &Hit, surface: &SurfacePoint, glass: &Glass) {
+        let world = self.tracer.world;
+        let entering = surface.normal.dot(path.ray.direction) < 0.0;
+        let (near, far, inside) = if entering {
+            (ior(world, path.medium), glass.ior, path.medium.entered(hit.object))
+        } else {
+            let left = path.medium.left(hit.object);
+            let near = if path.medium.is_in(hit.object) { ior(world, path.medium) } else { glass.ior };
+            (near, ior(world, left), left)
+        };
+        let eta = far / near;
+        let normal = facing_normal(surface, path.ray.direction);
+        let (reflectance, cos_transmitted) = dielectric(-normal.dot(path.ray.direction), eta);
+        let Some(cos_transmitted) = cos_transmitted else {
+            return self.push_reflected(path, surface, 1.0);
+        };
+        let direction = refract(path.ray.direction, normal, eta, cos_transmitted);
+        // Radiance over the square of the index is what refraction conserves.
+        let refracted = PathRay {
+            ray: leaving(surface, direction),
+            throughput: path.throughput / (eta * eta),
+            path: path.path.wrapping_mul(2) | 1,
+            medium: inside,
+            ..*path
+        };
+        let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
+        if weaker >= LEAST_SPLIT {
+            self.push_reflected(path, surface, reflectance);
+            self.push_refracted(refracted, 1.0 - reflectance);
+        } else if self.chance(path) < reflectance {
+            self.push_reflected(path, surface, 1.0);
+        } else {
+            self.push_refracted(refracted, 1.0);
+        }
+    }
+
+    fn chance(&self, path: &PathRay) -> f32 {
+        let sampler = self.tracer.block.sampler(self.tracer.settings.seed, path.slot);
+        sampler.get2(Purpose::at_vertex(path.path, CHOICE)).x
+    }
+
+    fn push_reflected(&mut self, path: &PathRay, surface: &SurfacePoint, weight: f32) {
+        if weight > 0.0 {
+            self.counters.reflected_rays += 1;
+            self.next.push(reflected(path, surface, Vec3::splat(weight)));
+        }
+    }
+
+    fn push_refracted(&mut self, mut refracted: PathRay, weight: f32) {
+        if weight > 0.0 {
+            self.counters.refracted_rays += 1;
+            refracted.throughput *= weight;
+            self.next.push(refracted);
+        }
+    }
+}
+
+/// The shading normal on the ray's side, or the geometric one where the shading normal looks away.
+fn facing_normal(surface: &SurfacePoint, direction: Vec3) -> Vec3 {
+    let side = if surface.normal.dot(direction) < 0.0 { 1.0 } else { -1.0 };
+    let shading = surface.shading_normal * side;
+    if shading.dot(direction) < 0.0 { shading } else { surface.normal * side }
+}

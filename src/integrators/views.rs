@@ -1,0 +1,65 @@
+//! Pictures of numbers at the first hit. Their values are meant as display values in [0, 1], not as radiance.
+
+use super::batch::{RayQueue, Tracer};
+use super::whitted::closest_hits;
+use super::{RayCounters, View};
+use crate::control::Cancelled;
+use crate::geometry::SurfacePoint;
+use crate::materials::Material;
+use crate::math::{Vec2, Vec3};
+
+/// Show what each camera ray hits; black where nothing.
+pub fn shade(
+    tracer: &Tracer<'_>,
+    cameras: &RayQueue,
+    radiance: &mut [Vec3],
+    counters: &mut RayCounters,
+) -> Result<(), Cancelled> {
+    let hits = closest_hits(tracer, cameras)?;
+    for (i, hit) in hits.iter().enumerate() {
+        let Some(hit) = hit else { continue };
+        let surface = tracer.world.geometry.surface(&cameras.ray[i], hit);
+        let material = &tracer.world.materials[tracer.world.material_index(hit)];
+        let value = match tracer.settings.view {
+            View::Normal => (normal(&surface, material, counters) + Vec3::ONE) * 0.5,
+            View::Depth => Vec3::splat(nearness(tracer, &surface)),
+            View::Barycentric => surface.barycentric,
+            View::Uv => fraction(surface.uv).extend(0.0),
+            _ => albedo(material, surface.uv, counters),
+        };
+        radiance[cameras.slot[i] as usize] = value * cameras.throughput[i];
+    }
+    Ok(())
+}
+
+fn normal(surface: &SurfacePoint, material: &Material, counters: &mut RayCounters) -> Vec3 {
+    match material {
+        Material::Phong(phong) if phong.normal_map.is_some() => {
+            counters.texture_lookups += 1;
+            let bent = phong.normal_map.as_ref();
+            bent.map_or(surface.shading_normal, |map| {
+                map.bend(surface.uv, surface.shading_normal, surface.dpdu, surface.dpdv)
+            })
+        }
+        _ => surface.shading_normal,
+    }
+}
+
+/// 1 at the eye, ½ at the distance in focus, towards 0 far away.
+fn nearness(tracer: &Tracer<'_>, surface: &SurfacePoint) -> f32 {
+    let camera = &tracer.world.camera;
+    let depth = camera.depth_of(surface.point.as_dvec3()).max(0.0);
+    (camera.focus / (camera.focus + depth)) as f32
+}
+
+fn fraction(uv: Vec2) -> Vec2 {
+    uv - uv.floor()
+}
+
+fn albedo(material: &Material, uv: Vec2, counters: &mut RayCounters) -> Vec3 {
+    match material {
+        Material::Phong(phong) => phong.diffuse.at(uv, &mut counters.texture_lookups),
+        Material::Mirror(mirror) => mirror.reflectance,
+        Material::Glass(glass) => glass.tint,
+    }
+}

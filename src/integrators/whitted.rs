@@ -1,0 +1,164 @@
+//! Direct light by Phong, mirror, glass and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*,
+//! 1980), over queues instead of recursion.
+
+use super::batch::{PathRay, RayQueue, ShadowQueue, Tracer};
+use super::direct::{self, PhongVertex};
+use super::{POLL_INTERVAL, RayCounters, View, glass};
+use crate::control::Cancelled;
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Ray, SurfacePoint};
+use crate::materials::mirror::reflect;
+use crate::materials::{Material, Mirror, Phong};
+use crate::math::Vec3;
+use crate::world::Hit;
+
+/// Follow camera rays to the end and add what they see to their samples.
+pub fn trace(
+    tracer: &Tracer<'_>,
+    cameras: RayQueue,
+    radiance: &mut [Vec3],
+    counters: &mut RayCounters,
+) -> Result<(), Cancelled> {
+    let mut queue = cameras;
+    let mut shadows = ShadowQueue::default();
+    let mut depth = 0;
+    while queue.len() > 0 {
+        let hits = closest_hits(tracer, &queue)?;
+        let mut wave =
+            Wave { tracer, depth, next: RayQueue::default(), shadows: &mut shadows, radiance, counters };
+        for (i, hit) in hits.iter().enumerate() {
+            let path = queue.get(i);
+            match hit {
+                Some(hit) => wave.shade(path, hit),
+                None => wave.leave(&path),
+            }
+        }
+        queue = wave.next;
+        trace_shadows(tracer, &mut shadows, radiance, counters)?;
+        depth += 1;
+    }
+    Ok(())
+}
+
+/// The nearest hit of every ray.
+pub fn closest_hits(tracer: &Tracer<'_>, queue: &RayQueue) -> Result<Vec<Option<Hit>>, Cancelled> {
+    let mut hits = Vec::with_capacity(queue.len());
+    for rays in queue.ray.chunks(POLL_INTERVAL) {
+        tracer.token.check()?;
+        hits.extend(rays.iter().map(|ray| tracer.world.geometry.closest(ray)));
+    }
+    Ok(hits)
+}
+
+/// Add the contributions that arrive, in the order of the queue.
+fn trace_shadows(
+    tracer: &Tracer<'_>,
+    shadows: &mut ShadowQueue,
+    radiance: &mut [Vec3],
+    counters: &mut RayCounters,
+) -> Result<(), Cancelled> {
+    for i in 0..shadows.len() {
+        if i % POLL_INTERVAL == 0 {
+            tracer.token.check()?;
+        }
+        if !tracer.world.geometry.occluded(&shadows.ray[i], shadows.source[i]) {
+            radiance[shadows.slot[i] as usize] += shadows.contribution[i];
+        }
+    }
+    counters.shadow_rays += shadows.len() as u64;
+    shadows.clear();
+    Ok(())
+}
+
+/// One round of all rays of a batch.
+pub(super) struct Wave<'a> {
+    pub(super) tracer: &'a Tracer<'a>,
+    /// Scatterings before the hits of this round.
+    pub(super) depth: u32,
+    pub(super) next: RayQueue,
+    pub(super) shadows: &'a mut ShadowQueue,
+    pub(super) radiance: &'a mut [Vec3],
+    pub(super) counters: &'a mut RayCounters,
+}
+
+impl Wave<'_> {
+    fn add(&mut self, slot: u32, radiance: Vec3) {
+        self.radiance[slot as usize] += radiance;
+    }
+
+    /// Whether one more scattering is allowed.
+    pub(super) fn may_scatter(&self) -> bool {
+        self.depth < self.tracer.settings.max_depth
+    }
+
+    fn leave(&mut self, path: &PathRay) {
+        if self.tracer.settings.view == View::Beauty {
+            self.add(path.slot, path.throughput * self.tracer.world.background);
+        }
+    }
+
+    fn shade(&mut self, mut path: PathRay, hit: &Hit) {
+        let world = self.tracer.world;
+        let surface = world.geometry.surface(&path.ray, hit);
+        let material = &world.materials[world.material_index(hit)];
+        path.throughput *= glass::absorption(world, &path, hit, &surface);
+        let emission = material.emission();
+        let front = surface.normal.dot(path.ray.direction) < 0.0;
+        if emission != Vec3::ZERO && front && self.tracer.settings.view == View::Beauty {
+            self.add(path.slot, path.throughput * emission);
+        }
+        if !self.may_scatter() {
+            return;
+        }
+        match material {
+            Material::Phong(phong) => self.shade_phong(&path, &surface, phong),
+            Material::Mirror(mirror) => self.shade_mirror(&path, &surface, mirror),
+            Material::Glass(glass) => self.shade_glass(&path, hit, &surface, glass),
+        }
+    }
+
+    fn shade_phong(&mut self, path: &PathRay, surface: &SurfacePoint, phong: &Phong) {
+        let bsdf = phong.at(surface.uv, &mut self.counters.texture_lookups);
+        let view = self.tracer.settings.view;
+        let ambient = self.tracer.world.ambient;
+        if ambient != Vec3::ZERO && matches!(view, View::Beauty | View::Ambient) {
+            self.add(path.slot, path.throughput * ambient * bsdf.ambient);
+        }
+        if view == View::Ambient || bsdf.is_black() {
+            return;
+        }
+        let mut shading_normal = surface.shading_normal;
+        if let Some(map) = &phong.normal_map {
+            self.counters.texture_lookups += 1;
+            shading_normal = map.bend(surface.uv, shading_normal, surface.dpdu, surface.dpdv);
+        }
+        let vertex = PhongVertex::new(path, surface, shading_normal, bsdf);
+        direct::light(self, &vertex);
+    }
+
+    fn shade_mirror(&mut self, path: &PathRay, surface: &SurfacePoint, mirror: &Mirror) {
+        self.counters.reflected_rays += 1;
+        self.next.push(reflected(path, surface, mirror.reflectance));
+    }
+}
+
+/// The mirrored ray; a shading normal that sends it below the surface gives way to the geometric one.
+pub(super) fn reflected(path: &PathRay, surface: &SurfacePoint, reflectance: Vec3) -> PathRay {
+    let incident = path.ray.direction;
+    let side = -incident.dot(surface.normal);
+    let mut direction = reflect(incident, surface.shading_normal);
+    if !(direction.dot(surface.normal) * side > 0.0) {
+        direction = reflect(incident, surface.normal);
+    }
+    PathRay {
+        ray: leaving(surface, direction.normalize()),
+        throughput: path.throughput * reflectance,
+        path: path.path.wrapping_mul(2),
+        ..*path
+    }
+}
+
+/// A ray that starts at a surface.
+pub(super) fn leaving(surface: &SurfacePoint, direction: Vec3) -> Ray {
+    Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction)
+}

@@ -1,0 +1,33 @@
+//! Point lights.
+
+use super::{LightSample, Source};
+use crate::math::{DVec3, Vec3};
+
+/// A light without extent that shines everywhere alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLight {
+    /// Where.
+    pub position: DVec3,
+    /// W·sr⁻¹; without fall-off irradiance at normal incidence.
+    pub intensity: Vec3,
+    /// Whether it weakens with the square of the distance.
+    pub falls_off: bool,
+}
+
+impl PointLight {
+    /// The one way from here.
+    pub fn sample(&self, point: Vec3) -> Option<LightSample> {
+        let to_light = self.position - point.as_dvec3();
+        let distance_squared = to_light.length_squared();
+        if distance_squared == 0.0 {
+            return None;
+        }
+        let weight = if self.falls_off { self.intensity / distance_squared as f32 } else { self.intensity };
+        Some(LightSample {
+            target: self.position.as_vec3(),
+            direction: (to_light / distance_squared.sqrt()).as_vec3(),
+            weight,
+            source: Source::Nothing,
+        })
+    }
+}

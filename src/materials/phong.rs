@@ -1,0 +1,127 @@
+//! The normalised Phong material: f = kd/π + ks·(α+2)/(2π)·max(0, R·V)^α (Lafortune and Willems, *Using the
+//! Modified Phong Reflectance Model for Physically Based Rendering*, 1994).
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use super::normal_map::NormalMap;
+use super::texture::Color;
+use crate::math::{Vec2, Vec3};
+
+/// Diffuse and glossy reflection on both sides, emission on the front.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Phong {
+    /// kd.
+    pub diffuse: Color,
+    /// ks.
+    pub specular: Color,
+    /// α.
+    pub shininess: f32,
+    /// ka; none: kd.
+    pub ambient: Option<Color>,
+    /// Radiance of the front side.
+    pub emission: Vec3,
+    /// Bends the shading normal.
+    pub normal_map: Option<NormalMap>,
+}
+
+/// [`Phong`] at one point: its textures looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhongBsdf {
+    /// kd.
+    pub diffuse: Vec3,
+    /// ks.
+    pub specular: Vec3,
+    /// α.
+    pub shininess: f32,
+    /// ka.
+    pub ambient: Vec3,
+}
+
+impl Phong {
+    /// Look its textures up.
+    pub fn at(&self, uv: Vec2, lookups: &mut u64) -> PhongBsdf {
+        let diffuse = self.diffuse.at(uv, lookups);
+        PhongBsdf {
+            diffuse,
+            specular: self.specular.at(uv, lookups),
+            shininess: self.shininess,
+            ambient: self.ambient.as_ref().map_or(diffuse, |ambient| ambient.at(uv, lookups)),
+        }
+    }
+}
+
+impl PhongBsdf {
+    /// The diffuse part of f in sr⁻¹.
+    pub fn diffuse_value(&self) -> Vec3 {
+        self.diffuse * FRAC_1_PI
+    }
+
+    /// The glossy part of f in sr⁻¹, for unit vectors that point away from the surface.
+    pub fn specular_value(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> Vec3 {
+        if self.specular == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        let mirrored = normal * (2.0 * normal.dot(to_light)) - to_light;
+        let cosine = mirrored.dot(to_eye).clamp(0.0, 1.0);
+        self.specular * ((self.shininess + 2.0) / (2.0 * PI) * cosine.powf(self.shininess))
+    }
+
+    /// Whether light that arrives can change anything.
+    pub fn is_black(&self) -> bool {
+        self.diffuse == Vec3::ZERO && self.specular == Vec3::ZERO
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn glossy(shininess: f32) -> PhongBsdf {
+        PhongBsdf { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess, ambient: Vec3::ZERO }
+    }
+
+    fn at_angle(degrees: f32) -> Vec3 {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Vec3::new(sin, 0.0, cos)
+    }
+
+    #[test]
+    fn the_lobe_of_known_value() {
+        // (n + 2)/2π·cosⁿ 10° at n = 50, looking 10° beside the mirrored direction.
+        let value = glossy(50.0).specular_value(Vec3::Z, at_angle(-30.0), at_angle(20.0)).x;
+        let expected = 52.0 / (2.0 * std::f64::consts::PI) * 10.0_f64.to_radians().cos().powi(50);
+        assert!((f64::from(value) - expected).abs() < 1e-4 * expected, "{value} {expected}");
+    }
+
+    /// Albedo by quadrature over the hemisphere of incoming directions.
+    fn albedo(shininess: f32, degrees: f32) -> f64 {
+        let (rings, steps) = (400, 800);
+        let mut sum = 0.0;
+        for ring in 0..rings {
+            let cos2 = (ring as f32 + 0.5) / rings as f32;
+            let (sin, cos) = ((1.0 - cos2).sqrt(), cos2.sqrt());
+            for step in 0..steps {
+                let (s, c) = (step as f32 / steps as f32 * 2.0 * PI).sin_cos();
+                let light = Vec3::new(sin * c, sin * s, cos);
+                sum += f64::from(glossy(shininess).specular_value(Vec3::Z, at_angle(degrees), light).x);
+            }
+        }
+        // Equal steps of cos² weigh by the cosine: ∫f cos dω = π·mean(f).
+        sum / f64::from(rings * steps) * std::f64::consts::PI
+    }
+
+    #[test]
+    fn the_albedo_stays_below_one_and_has_its_known_values() {
+        for (shininess, values) in
+            [(10.0, [1.0, 0.8661, 0.5047, 0.2281]), (100.0, [1.0, 0.8660, 0.5000, 0.1752])]
+        {
+            for (degrees, expected) in [0.0, 30.0, 60.0, 80.0].into_iter().zip(values) {
+                let value = albedo(shininess, degrees);
+                assert!(
+                    (value - expected).abs() < 2e-3,
+                    "α {shininess} at {degrees}°: {value} is not {expected}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Texture look-up.
+
+use std::sync::Arc;
+
+use super::texels::Texels;
+use crate::math::{Vec2, Vec3};
+
+/// Interpolation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filter {
+    /// The texel that holds the point.
+    Nearest,
+    /// Between the four nearest texel centres.
+    Bilinear,
+}
+
+/// What an image is outside [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrap {
+    /// Periodic.
+    Repeat,
+    /// The border's texels.
+    Clamp,
+    /// Periodic, every second tile mirrored.
+    Mirror,
+}
+
+/// An image with how it is looked up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// The image.
+    pub texels: Arc<Texels>,
+    /// Interpolation.
+    pub filter: Filter,
+    /// Outside [0, 1].
+    pub wrap: Wrap,
+    /// How often it fits into u and v.
+    pub repeat: Vec2,
+}
+
+/// A colour, or a texture of colours.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Color {
+    /// The same everywhere.
+    Constant(Vec3),
+    /// Looked up.
+    Texture(Arc<Texture>),
+}
+
+impl Color {
+    /// The colour at texture coordinates, and how many texture look-ups that took.
+    pub fn at(&self, uv: Vec2, lookups: &mut u64) -> Vec3 {
+        match self {
+            Self::Constant(color) => *color,
+            Self::Texture(texture) => {
+                *lookups += 1;
+                texture.lookup(uv)
+            }
+        }
+    }
+}
+
+impl Texture {
+    /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
+    pub fn lookup(&self, uv: Vec2) -> Vec3 {
+        let size = Vec2::new(self.texels.width as f32, self.texels.height as f32);
+        let tile = |x: f32| if x.is_finite() { x } else { 0.0 };
+        let place = |x: f32, size: f32| self.wrap.fold(tile(x)) * size;
+        let x = place(uv.x * self.repeat.x, size.x);
+        let y = place(1.0 - uv.y * self.repeat.y, size.y);
+        match self.filter {
+            Filter::Nearest => self.texel(x.floor(), y.floor()),
+            Filter::Bilinear => self.bilinear(x - 0.5, y - 0.5),
+        }
+    }
+
+    fn bilinear(&self, x: f32, y: f32) -> Vec3 {
+        let (left, top) = (x.floor(), y.floor());
+        let (fx, fy) = (x - left, y - top);
+        let upper = self.texel(left, top).lerp(self.texel(left + 1.0, top), fx);
+        let lower = self.texel(left, top + 1.0).lerp(self.texel(left + 1.0, top + 1.0), fx);
+        upper.lerp(lower, fy)
+    }
+
+    /// A texel by whole numbers that may lie one outside.
+    fn texel(&self, x: f32, y: f32) -> Vec3 {
+        let column = self.wrap.index(x as i64, i64::from(self.texels.width));
+        let row = self.wrap.index(y as i64, i64::from(self.texels.height));
+        self.texels.get(column, row)
+    }
+}
+
+impl Wrap {
+    /// Into [0, 1].
+    fn fold(self, x: f32) -> f32 {
+        match self {
+            Self::Repeat => x - x.floor(),
+            Self::Clamp => x.clamp(0.0, 1.0),
+            Self::Mirror => {
+                let period = x - 2.0 * (x * 0.5).floor();
+                if period > 1.0 { 2.0 - period } else { period }
+            }
+        }
+    }
+
+    /// An index at most a little outside 0 … size − 1 to one inside.
+    fn index(self, i: i64, size: i64) -> u32 {
+        let inside = match self {
+            Self::Repeat => i.rem_euclid(size),
+            // A mirrored border repeats its own texel.
+            Self::Clamp | Self::Mirror => i.clamp(0, size - 1),
+        };
+        inside as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::materials::texels::TexelData;
+
+    /// [[0, 1], [2, 3]], bottom row first.
+    fn numbered(filter: Filter, wrap: Wrap) -> Texture {
+        let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
+        let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data) });
+        Texture { texels, filter, wrap, repeat: Vec2::ONE }
+    }
+
+    fn bilinear(wrap: Wrap, u: f32, v: f32) -> f32 {
+        numbered(Filter::Bilinear, wrap).lookup(Vec2::new(u, v)).x
+    }
+
+    #[test]
+    fn bilinear_look_ups_of_known_value() {
+        for (u, v, expected) in [(0.25, 0.25, 0.0), (0.5, 0.5, 1.5), (0.5, 0.25, 0.5), (0.75, 0.75, 3.0)] {
+            for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+                assert!((bilinear(wrap, u, v) - expected).abs() < 1e-6, "{wrap:?} at {u}, {v}");
+            }
+        }
+        assert!((bilinear(Wrap::Repeat, 0.0, 0.0) - 1.5).abs() < 1e-6);
+        assert!((bilinear(Wrap::Clamp, 0.0, 0.0) - 0.0).abs() < 1e-6);
+        assert!((bilinear(Wrap::Mirror, 0.0, 0.0) - 0.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn wrapping_outside_the_unit_square() {
+        assert!((bilinear(Wrap::Repeat, -0.75, 3.25) - bilinear(Wrap::Repeat, 0.25, 0.25)).abs() < 1e-5);
+        assert!((bilinear(Wrap::Mirror, 1.25, 0.25) - bilinear(Wrap::Mirror, 0.75, 0.25)).abs() < 1e-5);
+        assert!((bilinear(Wrap::Mirror, -0.25, -0.25) - bilinear(Wrap::Mirror, 0.25, 0.25)).abs() < 1e-5);
+        assert!((bilinear(Wrap::Clamp, 9.0, 9.0) - 3.0).abs() < 1e-6);
+        let mut repeated = numbered(Filter::Nearest, Wrap::Repeat);
+        repeated.repeat = Vec2::new(2.0, 1.0);
+        assert_eq!(repeated.lookup(Vec2::new(0.6, 0.1)).x, 0.0);
+        assert_eq!(repeated.lookup(Vec2::new(0.4, 0.1)).x, 1.0);
+    }
+
+    #[test]
+    fn borders_and_non_finite_coordinates_stay_inside() {
+        for filter in [Filter::Nearest, Filter::Bilinear] {
+            for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+                let texture = numbered(filter, wrap);
+                for bad in [f32::NAN, f32::INFINITY, -1e30, 1e30, 1.0, 0.0, -0.0, 1.0_f32.next_down(), -1e-9]
+                {
+                    assert!(
+                        (0.0..=3.0).contains(&texture.lookup(Vec2::new(bad, bad)).x),
+                        "{filter:?} {wrap:?} {bad}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! All shapes under one tree; those without an end beside it.
+
+use crate::accel::Bvh;
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint};
+use crate::lights::Source;
+use crate::scene::description;
+
+use super::shape::Shape;
+
+/// The nearest hit in a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Where on the object.
+    pub shape: ShapeHit,
+    /// Which object.
+    pub object: u32,
+}
+
+/// Shapes and the tree over them.
+#[derive(Debug)]
+pub struct Geometry {
+    shapes: Vec<Shape>,
+    tree: Bvh,
+    /// Shapes that are not in the tree.
+    unbounded: Vec<u32>,
+    /// What it was built from, to know when it can serve again.
+    described: Vec<description::Shape>,
+}
+
+impl Geometry {
+    /// Build the tree over shapes that were lowered from `described`.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build(
+        shapes: Vec<Shape>,
+        described: Vec<description::Shape>,
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        let bounds: Vec<Option<Aabb>> = shapes.iter().map(Shape::bounds).collect();
+        let unbounded =
+            (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
+        let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
+        Ok(Self { tree: Bvh::build(&boxes, token)?, shapes, unbounded, described })
+    }
+
+    /// The shapes; objects are known by their index.
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
+    }
+
+    /// Whether building from these would give the same.
+    pub fn serves(
+        &self,
+        described: &[description::Shape],
+        meshes: &[std::sync::Arc<super::MeshTree>],
+    ) -> bool {
+        let same_mesh = |(shape, described): (&Shape, &description::Shape)| match (shape, described) {
+            (Shape::Mesh(mesh), description::Shape::Mesh { file, .. }) => {
+                std::sync::Arc::ptr_eq(&mesh.tree, &meshes[*file])
+            }
+            _ => true,
+        };
+        self.described == described && self.shapes.iter().zip(described).all(same_mesh)
+    }
+
+    /// The nearest hit; of hits at one distance the object of the lowest number.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        let mut ray_f64 = ray.to_f64();
+        let mut segment = *ray;
+        let mut test = |id: u32, t_max: f32| {
+            segment.t_max = t_max;
+            ray_f64.t_max = f64::from(t_max);
+            let shape = self.shapes[id as usize].closest(&segment, &ray_f64)?;
+            let nearer = best.is_none_or(|best| (shape.t, id) < (best.shape.t, best.object));
+            nearer.then(|| {
+                best = Some(Hit { shape, object: id });
+                shape.t
+            })
+        };
+        let mut end = ray.t_max;
+        for &id in &self.unbounded {
+            end = test(id, end).unwrap_or(end);
+        }
+        self.tree.closest(&Ray { t_max: end, ..*ray }, |_, id, t_max| test(id, t_max));
+        best
+    }
+
+    /// Whether anything but the light itself lies on the segment.
+    pub fn occluded(&self, ray: &Ray, source: Source) -> bool {
+        let ray_f64 = ray.to_f64();
+        let test = |id: u32| match source {
+            Source::Object(own) if own == id => false,
+            Source::Primitive(own, part) if own == id => {
+                self.shapes[id as usize].any(ray, &ray_f64, Some(part))
+            }
+            _ => self.shapes[id as usize].any(ray, &ray_f64, None),
+        };
+        self.unbounded.iter().any(|&id| test(id)) || self.tree.any(ray, |_, id| test(id))
+    }
+
+    /// The surface at a hit of this ray.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        self.shapes[hit.object as usize].surface(ray, &hit.shape)
+    }
+
+    /// The material that a mesh file gives the triangle that was hit, by the file's own count.
+    pub fn file_material(&self, hit: &Hit) -> Option<u32> {
+        let Shape::Mesh(mesh) = &self.shapes[hit.object as usize] else { return None };
+        let materials = &mesh.tree.loaded().mesh.materials;
+        materials.get(hit.shape.primitive as usize).copied().filter(|&own| own != u32::MAX)
+    }
+
+    /// Bytes held by this tree and by each mesh's once.
+    pub fn memory_bytes(&self) -> usize {
+        let mut seen = Vec::new();
+        let mut bytes = self.tree.memory_bytes();
+        for shape in &self.shapes {
+            if let Shape::Mesh(mesh) = shape
+                && !seen.contains(&std::sync::Arc::as_ptr(&mesh.tree))
+            {
+                seen.push(std::sync::Arc::as_ptr(&mesh.tree));
+                bytes += mesh.tree.memory_bytes();
+            }
+        }
+        bytes
+    }
+}

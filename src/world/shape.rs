@@ -1,0 +1,203 @@
+//! The closed set of shapes.
+
+use std::sync::Arc;
+
+use super::mesh_tree::MeshTree;
+use crate::geometry::cuboid::Cuboid;
+use crate::geometry::parallelogram::Parallelogram;
+use crate::geometry::plane::Plane;
+use crate::geometry::sphere::Sphere;
+use crate::geometry::triangle::Triangle;
+use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint};
+use crate::math::transform::Transform;
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// A shape in world coordinates.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// A sphere.
+    Sphere(Sphere),
+    /// A parallelogram.
+    Quad(Parallelogram),
+    /// An infinite plane.
+    Plane(Plane),
+    /// An oriented box.
+    Box(Cuboid),
+    /// A single triangle.
+    Triangle(Triangle),
+    /// An instance of a mesh.
+    Mesh(Box<MeshInstance>),
+}
+
+/// A mesh, placed.
+#[derive(Clone, Debug)]
+pub struct MeshInstance {
+    /// The triangles.
+    pub tree: Arc<MeshTree>,
+    /// From the mesh's coordinates to the world's.
+    pub transform: Transform,
+    /// Interpolate vertex normals.
+    pub smooth: bool,
+}
+
+impl Shape {
+    /// The nearest hit.
+    pub fn closest(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
+        match self {
+            Self::Sphere(sphere) => sphere.intersect(ray_f64),
+            Self::Quad(quad) => quad.intersect(ray_f64),
+            Self::Plane(plane) => plane.intersect(ray_f64),
+            Self::Box(cuboid) => cuboid.intersect(ray_f64),
+            Self::Triangle(triangle) => triangle.intersect(ray_f64),
+            Self::Mesh(mesh) => mesh.tree.closest(&mesh.local_ray(ray)),
+        }
+    }
+
+    /// Whether the ray hits anything of it but the primitive `except`.
+    pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
+        match self {
+            Self::Mesh(mesh) => mesh.tree.any(&mesh.local_ray(ray), except),
+            _ => self.closest(ray, ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
+        }
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &Ray, hit: &ShapeHit) -> SurfacePoint {
+        let ray = ray.to_f64();
+        match self {
+            Self::Sphere(sphere) => sphere.surface(&ray, hit),
+            Self::Quad(quad) => quad.surface(&ray, hit),
+            Self::Plane(plane) => plane.surface(&ray, hit),
+            Self::Box(cuboid) => cuboid.surface(&ray, hit),
+            Self::Triangle(triangle) => triangle.surface(hit),
+            Self::Mesh(mesh) => mesh.surface(hit),
+        }
+    }
+
+    /// The box around it; none where it has no end.
+    pub fn bounds(&self) -> Option<Aabb> {
+        match self {
+            Self::Sphere(sphere) => Some(sphere.bounds()),
+            Self::Quad(quad) => Some(quad.bounds()),
+            Self::Plane(_) => None,
+            Self::Box(cuboid) => Some(cuboid.bounds()),
+            Self::Triangle(triangle) => Some(triangle.bounds()),
+            Self::Mesh(mesh) => Some(mesh.bounds()),
+        }
+    }
+
+    /// Triangles that it is made of.
+    pub fn triangle_count(&self) -> u64 {
+        match self {
+            Self::Triangle(_) => 1,
+            Self::Mesh(mesh) => mesh.tree.loaded().mesh.triangles.len() as u64,
+            _ => 0,
+        }
+    }
+}
+
+impl MeshInstance {
+    /// The ray in the mesh's coordinates, with the same t.
+    fn local_ray(&self, ray: &Ray) -> Ray {
+        if self.transform == Transform::IDENTITY {
+            return *ray;
+        }
+        Ray {
+            origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
+            direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
+            t_max: ray.t_max,
+        }
+    }
+
+    fn bounds(&self) -> Aabb {
+        let local = self.tree.bounds();
+        if local.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let corner = |i: usize| {
+            let pick = |axis: usize| if i & (1 << axis) == 0 { local.min[axis] } else { local.max[axis] };
+            self.transform.point(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
+        };
+        Aabb::around_f64((0..8).map(corner))
+    }
+
+    /// Corners of a triangle in world coordinates, ordered so that the front is along (b − a) × (c − a).
+    pub fn world_corners(&self, triangle: u32) -> [DVec3; 3] {
+        let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
+        if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
+    }
+
+    fn surface(&self, hit: &ShapeHit) -> SurfacePoint {
+        let mesh = &self.tree.loaded().mesh;
+        let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
+        let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        let (ab, ac) = (b - a, c - a);
+        let local = a + ab * u + ac * v;
+        let normal = self.transform.normal(ab.cross(ac)).normalize().as_vec3();
+        let point = self.transform.point(local).as_vec3();
+        let barycentric = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+        let (uv, dpdu, dpdv) = self.parametrisation(vertices, barycentric, ab, ac);
+        SurfacePoint {
+            point,
+            error: self.error(point, local),
+            normal,
+            shading_normal: self.shading_normal(vertices, barycentric, normal),
+            uv,
+            dpdu,
+            dpdv,
+            barycentric,
+        }
+    }
+
+    /// Rounding of the point, of the next ray's origin in the mesh's coordinates, and of what it is computed from.
+    fn error(&self, point: Vec3, local: DVec3) -> Vec3 {
+        let linear = self.transform.linear;
+        let reach = linear.x_axis.abs() * local.x.abs()
+            + linear.y_axis.abs() * local.y.abs()
+            + linear.z_axis.abs() * local.z.abs();
+        let parts = point.abs() + reach.as_vec3() + self.transform.translation.abs().as_vec3();
+        parts * (2.0 * f32::EPSILON) + Vec3::splat(f32::MIN_POSITIVE)
+    }
+
+    /// Interpolated and on the side of the geometric normal.
+    fn shading_normal(&self, vertices: [usize; 3], barycentric: Vec3, normal: Vec3) -> Vec3 {
+        if !self.smooth {
+            return normal;
+        }
+        let normals = self.tree.normals();
+        let [a, b, c] = vertices.map(|vertex| normals[vertex]);
+        let interpolated = a * barycentric.x + b * barycentric.y + c * barycentric.z;
+        let bent = self.transform.normal(interpolated.as_dvec3()).as_vec3();
+        match bent.try_normalize() {
+            Some(bent) if bent.dot(normal) < 0.0 => -bent,
+            Some(bent) => bent,
+            None => normal,
+        }
+    }
+
+    /// Texture coordinates and their tangents; without any the barycentrics.
+    fn parametrisation(
+        &self,
+        vertices: [usize; 3],
+        barycentric: Vec3,
+        ab: DVec3,
+        ac: DVec3,
+    ) -> (Vec2, Vec3, Vec3) {
+        let uvs = &self.tree.loaded().mesh.uvs;
+        let world = |v: DVec3| self.transform.vector(v).as_vec3();
+        if uvs.is_empty() {
+            return (Vec2::new(barycentric.y, barycentric.z), world(ab), world(ac));
+        }
+        let [a, b, c] = vertices.map(|vertex| uvs[vertex]);
+        let uv = a * barycentric.x + b * barycentric.y + c * barycentric.z;
+        let (duv_b, duv_c) = ((b - a).as_dvec2(), (c - a).as_dvec2());
+        let determinant = duv_b.perp_dot(duv_c);
+        if determinant == 0.0 || !determinant.is_finite() {
+            return (uv, Vec3::ZERO, Vec3::ZERO);
+        }
+        let dpdu = (ab * duv_c.y - ac * duv_b.y) / determinant;
+        let dpdv = (ac * duv_b.x - ab * duv_c.x) / determinant;
+        (uv, world(dpdu), world(dpdv))
+    }
+}

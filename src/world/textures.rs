@@ -1,0 +1,136 @@
+//! Which image files a scene looks up.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::assets::{FileMaterial, LoadedMesh};
+use crate::scene::description::{ColorSource, Encoding, Material, MaterialKind, Scene};
+
+/// An image file, and how its numbers are read.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct TextureSource {
+    /// The file.
+    pub path: PathBuf,
+    /// How its numbers are read.
+    pub encoding: SourceEncoding,
+}
+
+/// How the numbers of an image file are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SourceEncoding {
+    /// Integer files are sRGB, float files linear.
+    Color,
+    /// Always sRGB.
+    Srgb,
+    /// Always linear.
+    Linear,
+}
+
+/// What a texture is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Colours.
+    Color,
+    /// Normals.
+    Normal,
+}
+
+/// An image file that is needed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NeededTexture {
+    /// File and encoding.
+    pub source: TextureSource,
+    /// Its name on progress bars.
+    pub name: String,
+    /// Index into [`Scene::textures`]; none: a mesh file's own texture.
+    pub declared: Option<usize>,
+    /// Index into [`Scene::mesh_files`] of the mesh whose material names it.
+    pub mesh_file: Option<usize>,
+}
+
+/// The image files that materials of objects look up, each once. Textures that no such material names are not among
+/// them.
+pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededTexture> {
+    let mut needed: Vec<NeededTexture> = Vec::new();
+    let mut add = |texture: NeededTexture| {
+        if !needed.iter().any(|known| known.source == texture.source) {
+            needed.push(texture);
+        }
+    };
+    for (index, material) in scene.materials.iter().enumerate() {
+        if scene.objects.iter().any(|object| object.material == Some(index)) {
+            for (texture, used) in material_textures(material) {
+                add(NeededTexture {
+                    source: declared_source(scene, texture, used),
+                    name: scene.textures[texture].name.clone(),
+                    declared: Some(texture),
+                    mesh_file: None,
+                });
+            }
+        }
+    }
+    for (file, mesh) in meshes.iter().enumerate() {
+        if uses_own_materials(scene, file) {
+            for (path, used) in mesh.materials.iter().flat_map(file_textures) {
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+                add(NeededTexture {
+                    source: file_source(path, used),
+                    name,
+                    declared: None,
+                    mesh_file: Some(file),
+                });
+            }
+        }
+    }
+    needed
+}
+
+/// Whether some instance of a mesh file takes the file's own materials.
+pub fn uses_own_materials(scene: &Scene, file: usize) -> bool {
+    scene.objects.iter().any(|object| {
+        object.material.is_none()
+            && matches!(object.shape, crate::scene::description::Shape::Mesh { file: own, .. } if own == file)
+    })
+}
+
+/// Where a texture of the scene file comes from when it is used for something.
+pub fn declared_source(scene: &Scene, texture: usize, used: Use) -> TextureSource {
+    let texture = &scene.textures[texture];
+    let encoding = match (texture.encoding, used) {
+        (Encoding::Srgb, _) => SourceEncoding::Srgb,
+        (Encoding::Linear, _) | (Encoding::Auto, Use::Normal) => SourceEncoding::Linear,
+        (Encoding::Auto, Use::Color) => SourceEncoding::Color,
+    };
+    TextureSource { path: texture.file.value.clone(), encoding }
+}
+
+/// Where a texture of a mesh file comes from.
+pub fn file_source(path: &Path, used: Use) -> TextureSource {
+    let encoding = match used {
+        Use::Color => SourceEncoding::Color,
+        Use::Normal => SourceEncoding::Linear,
+    };
+    TextureSource { path: path.to_owned(), encoding }
+}
+
+/// Indices of the textures that a material names.
+fn material_textures(material: &Material) -> Vec<(usize, Use)> {
+    let MaterialKind::Phong { diffuse, specular, ambient, normal_map, .. } = &material.kind else {
+        return Vec::new();
+    };
+    let color = |source: &ColorSource| match source {
+        ColorSource::Texture(index) => Some((*index, Use::Color)),
+        ColorSource::Constant(_) => None,
+    };
+    let normal = normal_map.map(|(index, _)| (index, Use::Normal));
+    [color(diffuse), color(specular), ambient.as_ref().and_then(color), normal]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+fn file_textures(material: &FileMaterial) -> impl Iterator<Item = (&Path, Use)> {
+    let color = [&material.diffuse_texture, &material.specular_texture];
+    let colors = color.into_iter().flatten().map(|path| (path.as_path(), Use::Color));
+    colors.chain(material.normal_texture.iter().map(|path| (path.as_path(), Use::Normal)))
+}
