@@ -10,6 +10,7 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::mirror::reflect;
 use crate::materials::{Material, Mirror, Phong};
 use crate::math::Vec3;
+use crate::scene::description::Shadows;
 use crate::world::Hit;
 
 /// Follow camera rays to the end and add what they see to their samples.
@@ -61,7 +62,9 @@ fn trace_shadows(
         if i % POLL_INTERVAL == 0 {
             tracer.token.check()?;
         }
-        if !tracer.world.geometry.occluded(&shadows.ray[i], shadows.source[i]) {
+        let visible = tracer.settings.shadows == Shadows::Off
+            || !tracer.world.geometry.occluded(&shadows.ray[i], shadows.source[i]);
+        if visible {
             radiance[shadows.slot[i] as usize] += shadows.contribution[i];
         }
     }
