@@ -70,8 +70,7 @@ fn has_no_colors(term: &str) -> bool {
 }
 
 fn is_true_color(term: &str, program: &str) -> bool {
-    const TERMS: [&str; 8] =
-        ["kitty", "alacritty", "foot", "wezterm", "ghostty", "contour", "iterm2", "rio"];
+    const TERMS: [&str; 8] = ["kitty", "alacritty", "foot", "wezterm", "ghostty", "contour", "iterm2", "rio"];
     const PROGRAMS: [&str; 4] = ["iTerm.app", "WezTerm", "ghostty", "vscode"];
     // Inside tmux TERM_PROGRAM is `tmux`, so that what the outer terminal can do does not leak in.
     term.ends_with("-direct") || TERMS.iter().any(|name| term.contains(name)) || PROGRAMS.contains(&program)

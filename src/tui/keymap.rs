@@ -39,7 +39,13 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "render"),
     binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the image as it is now", "write"),
     binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "back to the scene's own settings", "reset"),
-    binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", "errors"),
+    binding(
+        &[KeyPress::plain('e')],
+        "e",
+        Action::ToggleDiagnostics,
+        "show or hide errors and warnings",
+        "errors",
+    ),
     binding(
         &[KeyPress::special(KeyCode::PageUp), KeyPress::special(KeyCode::Up)],
         "PgUp, up",

@@ -196,7 +196,9 @@ impl Ui {
         match effect {
             Effect::Send(command) => (self.commands)(command),
             Effect::Quit(status) => return Some(End::Quit(status)),
-            Effect::GiveUp => return Some(End::Error(TuiError::WorkerGone { reason: terminal::last_panic() })),
+            Effect::GiveUp => {
+                return Some(End::Error(TuiError::WorkerGone { reason: terminal::last_panic() }));
+            }
             Effect::StopJob if !signals::has_shell() => return self.apply(Event::NoShell),
             Effect::StopJob => {
                 return signals::stop_job().err().map(failed("stop the job of")).map(End::Error);
@@ -220,7 +222,11 @@ impl Ui {
     }
 
     fn draw_if_due(&mut self) -> Option<End> {
-        if !self.state.dirty || !self.screen.is_taken() || Instant::now() < self.next_frame {
+        if !self.state.dirty || Instant::now() < self.next_frame {
+            return None;
+        }
+        self.next_frame = Instant::now() + FRAME;
+        if !self.screen.is_taken() {
             return None;
         }
         self.state.dirty = false;
@@ -257,9 +263,8 @@ mod tests {
 
     #[test]
     fn keys_act_on_press_only() {
-        let key = |kind| {
-            TerminalEvent::Key(KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, kind))
-        };
+        let key =
+            |kind| TerminalEvent::Key(KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, kind));
         assert!(translated(&key(KeyEventKind::Press), None).is_some());
         assert!(translated(&key(KeyEventKind::Release), None).is_none());
         assert!(translated(&key(KeyEventKind::Repeat), None).is_none());

@@ -226,7 +226,8 @@ mod tests {
 
     #[test]
     fn the_screen_is_left_in_a_vt100() {
-        let mut screen = vt100::Parser::new(5, 20, 0);
+        let side = |length| std::num::NonZero::new(length).expect("not zero");
+        let mut screen = vt100::Parser::new(side(5), side(20), 0);
         screen.process(b"shell$ ");
         screen.process(bytes(|out| enter(out)).as_bytes());
         screen.process(b"picture");

@@ -32,9 +32,9 @@ fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::ScrollUp => scroll(state, |line, page| line.saturating_sub(page)),
         Action::ScrollDown => scroll(state, |line, page| line.saturating_add(page)),
         Action::ToggleHelp => change(state, |state| state.help = !state.help),
-        Action::Close => change(state, |state| {
-            if state.help { state.help = false } else { state.pane.open = false }
-        }),
+        Action::Close => {
+            change(state, |state| if state.help { state.help = false } else { state.pane.open = false })
+        }
         Action::Suspend => vec![Effect::StopJob],
         Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],
         Action::Quit => vec![Effect::Quit(ExitStatus::QUIT)],
@@ -78,7 +78,10 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     match &state.effective {
         None => return told(state, "the scene has not been read yet"),
         Some(effective) if !effective.dof && !switched_off => {
-            return told(state, "no depth of field: the scene's camera has no aperture (set `aperture` and `focus`)");
+            return told(
+                state,
+                "no depth of field: the scene's camera has no aperture (set `aperture` and `focus`)",
+            );
         }
         Some(_) => {}
     }

@@ -72,7 +72,8 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
 }
 
 fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
-    if shown.generation == state.generation && is_whole(&shown.picture) && state.preview != PreviewKind::None {
+    if shown.generation == state.generation && is_whole(&shown.picture) && state.preview != PreviewKind::None
+    {
         state.picture = Some(shown);
         state.dirty = true;
     }

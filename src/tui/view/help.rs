@@ -26,7 +26,12 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     for (index, binding) in (0..inner.height).zip(KEYMAP) {
         let line = row(inner, index);
         if hidden > 0 && index + 1 == inner.height {
-            put(buffer, line, &[(&format!(" … {} more: enlarge the window", hidden + 1), Tone::Faint)], state.depth);
+            put(
+                buffer,
+                line,
+                &[(&format!(" … {} more: enlarge the window", hidden + 1), Tone::Faint)],
+                state.depth,
+            );
             break;
         }
         let label = format!(" {:<width$}  ", binding.label, width = usize::from(labels));
@@ -36,10 +41,5 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
 
 fn centred(area: Rect, width: u16, height: u16) -> Rect {
     let (width, height) = (width.min(area.width), height.min(area.height));
-    Rect {
-        x: area.x + (area.width - width) / 2,
-        y: area.y + (area.height - height) / 2,
-        width,
-        height,
-    }
+    Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height }
 }

@@ -139,7 +139,11 @@ mod tests {
                     for (i, area) in areas.iter().enumerate() {
                         assert_eq!(window.intersection(*area).area(), area.area(), "{area:?} in {window:?}");
                         for other in &areas[..i] {
-                            assert_eq!(area.intersection(*other).area(), 0, "{area:?} {other:?} in {window:?}");
+                            assert_eq!(
+                                area.intersection(*other).area(),
+                                0,
+                                "{area:?} {other:?} in {window:?}"
+                            );
                         }
                     }
                 }

@@ -67,10 +67,13 @@ impl Placed {
 
     fn draw(self, picture: &Picture, kind: PreviewKind, depth: ColorDepth, buffer: &mut Buffer) {
         let pixels = rescaled(picture, self.width, self.height);
-        let pixel = |x: u32, y: u32| (y < self.height).then(|| pixels.get((y * self.width + x) as usize)).flatten();
+        let pixel =
+            |x: u32, y: u32| (y < self.height).then(|| pixels.get((y * self.width + x) as usize)).flatten();
         for row in 0..self.cells.height {
             for column in 0..self.cells.width {
-                let Some(cell) = buffer.cell_mut((self.cells.x + column, self.cells.y + row)) else { continue };
+                let Some(cell) = buffer.cell_mut((self.cells.x + column, self.cells.y + row)) else {
+                    continue;
+                };
                 let (x, y) = (u32::from(column), u32::from(row));
                 match kind {
                     PreviewKind::HalfBlock => {
@@ -156,7 +159,8 @@ mod tests {
     use super::*;
 
     fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Picture {
-        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
+        let pixels =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
         Picture { width, height, pixels }
     }
 
@@ -218,8 +222,10 @@ mod tests {
         assert_eq!(glyph([0; 3]), ' ');
         assert_eq!(glyph([255; 3]), '@');
         assert_eq!(glyph([128; 3]), '+');
-        assert!(RAMP.iter().position(|c| char::from(*c) == glyph([0, 255, 0]))
-            > RAMP.iter().position(|c| char::from(*c) == glyph([0, 0, 255])));
+        assert!(
+            RAMP.iter().position(|c| char::from(*c) == glyph([0, 255, 0]))
+                > RAMP.iter().position(|c| char::from(*c) == glyph([0, 0, 255]))
+        );
     }
 
     #[test]

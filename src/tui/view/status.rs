@@ -16,7 +16,8 @@ pub(super) fn header(state: &State, area: Rect, buffer: &mut Buffer) {
     let (word, tone) = activity(state);
     let used = put_right(buffer, area, word, tone, state.depth);
     let name = state.scene.to_string_lossy();
-    let size = state.effective.as_ref().map_or(String::new(), |it| format!("  {}×{} px", it.width, it.height));
+    let size =
+        state.effective.as_ref().map_or(String::new(), |it| format!("  {}×{} px", it.width, it.height));
     let room = Rect { width: area.width.saturating_sub(used + 1), ..area };
     let pieces = [("glimt  ", Tone::Faint), (&*visible(&name), Tone::Strong), (&size, Tone::Faint)];
     put(buffer, room, &pieces, state.depth);
@@ -48,7 +49,12 @@ pub(super) fn bar(state: &State, area: Rect, buffer: &mut Buffer) {
     }
     let gauge = gauge(fraction, usize::from(room), state.preview == PreviewKind::Ascii);
     let tone = if state.activity == Activity::Broken { Tone::Faint } else { Tone::Good };
-    put(buffer, area, &[(label, Tone::Faint), (&gauge, tone), (" ", Tone::Plain), (&words, Tone::Plain)], state.depth);
+    put(
+        buffer,
+        area,
+        &[(label, Tone::Faint), (&gauge, tone), (" ", Tone::Plain), (&words, Tone::Plain)],
+        state.depth,
+    );
 }
 
 fn bar_words(state: &State) -> String {
