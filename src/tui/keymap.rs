@@ -30,22 +30,18 @@ const fn binding(
 
 /// Every key, in the order of the help.
 pub(super) const KEYMAP: &[Binding] = &[
+    binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, "show or hide this help", "help"),
+    binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
     binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", "shadows"),
     binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", "dof"),
-    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on or off", "photons"),
+    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on or off", ""),
     binding(&[KeyPress::plain('v')], "v", Action::NextView, "next view: normals, depth, …", "view"),
     binding(&[KeyPress::plain('V')], "V", Action::PreviousView, "previous view", ""),
     binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
-    binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "render"),
+    binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
     binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the image as it is now", "write"),
     binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "back to the scene's own settings", "reset"),
-    binding(
-        &[KeyPress::plain('e')],
-        "e",
-        Action::ToggleDiagnostics,
-        "show or hide errors and warnings",
-        "errors",
-    ),
+    binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", ""),
     binding(
         &[KeyPress::special(KeyCode::PageUp), KeyPress::special(KeyCode::Up)],
         "PgUp, up",
@@ -60,11 +56,9 @@ pub(super) const KEYMAP: &[Binding] = &[
         "scroll the errors down",
         "",
     ),
-    binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, "show or hide this help", "help"),
     binding(&[KeyPress::special(KeyCode::Esc)], "Esc", Action::Close, "close the help or the errors", ""),
     binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "stop and go back to the shell", ""),
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
-    binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
 ];
 
 /// What a key means, if anything. Terminals differ in whether they report shift beside a capital or `?`, so

@@ -18,6 +18,8 @@ mod update;
 mod view;
 
 #[cfg(test)]
+mod by_hand;
+#[cfg(test)]
 mod fixtures;
 #[cfg(test)]
 mod tests;

@@ -143,8 +143,11 @@ impl Ui {
         }
         (self.commands)(Command::Quit);
         match end {
+            // Whoever sends SIGHUP by hand still has the terminal and wants it back.
             Some(End::Quit(ExitStatus::HANGUP)) => {
-                self.screen.abandon();
+                if !terminal::is_there() {
+                    self.screen.abandon();
+                }
                 Ok(ExitStatus::HANGUP)
             }
             Some(End::Error(error)) => Err(error),
@@ -222,9 +225,10 @@ impl Ui {
     }
 
     fn draw_if_due(&mut self) -> Option<End> {
-        if !self.state.dirty || Instant::now() < self.next_frame {
+        if !self.state.dirty || (!self.state.urgent && Instant::now() < self.next_frame) {
             return None;
         }
+        self.state.urgent = false;
         self.next_frame = Instant::now() + FRAME;
         if !self.screen.is_taken() {
             return None;
@@ -250,7 +254,7 @@ fn unwritable(error: io::Error) -> End {
 
 /// When to look again if nothing happens; none: not before something does.
 fn next_wake(state: &State, next_frame: Instant) -> Option<Instant> {
-    let frame = state.dirty.then_some(next_frame);
+    let frame = state.dirty.then_some(if state.urgent { state.now } else { next_frame });
     [frame, state.next_tick()].into_iter().flatten().min()
 }
 

@@ -144,6 +144,8 @@ pub(super) struct State {
     pub now: Instant,
     /// Whether the screen is out of date.
     pub dirty: bool,
+    /// Whether the next frame is the first picture of a request, which does not wait for its turn.
+    pub urgent: bool,
 }
 
 impl State {
@@ -177,6 +179,7 @@ impl State {
             first_change: None,
             now,
             dirty: true,
+            urgent: false,
         }
     }
 

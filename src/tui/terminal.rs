@@ -214,8 +214,8 @@ mod tests {
 
     #[test]
     fn leaving_undoes_entering() {
-        let enter = bytes(|out| enter(out));
-        let leave = bytes(|out| leave(out));
+        let enter = bytes(enter);
+        let leave = bytes(leave);
         for mode in ["?1049", "?25"] {
             assert!(enter.contains(mode) && leave.contains(mode), "{mode}: {enter:?} {leave:?}");
         }
@@ -229,10 +229,10 @@ mod tests {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let mut screen = vt100::Parser::new(side(5), side(20), 0);
         screen.process(b"shell$ ");
-        screen.process(bytes(|out| enter(out)).as_bytes());
+        screen.process(bytes(enter).as_bytes());
         screen.process(b"picture");
         assert!(screen.screen().alternate_screen() && screen.screen().hide_cursor());
-        screen.process(bytes(|out| leave(out)).as_bytes());
+        screen.process(bytes(leave).as_bytes());
         assert!(!screen.screen().alternate_screen() && !screen.screen().hide_cursor());
         assert!(screen.screen().contents().starts_with("shell$ "));
     }

@@ -33,6 +33,7 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
         Event::Worker(event) => worker::update(state, event),
         Event::Picture { generation, picture } => show(state, Shown { generation, picture }),
         Event::Changed(Changed { noticed }) => {
+            state.message = None;
             let effects = render(state, false);
             state.change = Some(PendingChange { generation: state.generation, noticed });
             effects
@@ -74,6 +75,7 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
 fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
     if shown.generation == state.generation && is_whole(&shown.picture) && state.preview != PreviewKind::None
     {
+        state.urgent |= state.picture.as_ref().is_none_or(|last| last.generation != shown.generation);
         state.picture = Some(shown);
         state.dirty = true;
     }

@@ -79,7 +79,8 @@ fn title(state: &State) -> String {
     let Some(problems) = &state.problems else { return counted(state.warnings.len(), "warning") };
     let errors = problems.diagnostics.iter().filter(|it| it.severity == Severity::Error).count()
         + usize::from(problems.work.is_some());
-    format!("{}the last good picture stays ", counted(errors, "error"))
+    let errors = counted(errors, "error");
+    if state.picture.is_some() { format!("{errors}· the last good picture stays ") } else { errors }
 }
 
 fn counted(count: usize, what: &str) -> String {

@@ -1,5 +1,7 @@
 //! The lines around the picture: name, render bar, toggles, messages.
 
+use std::time::Duration;
+
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
@@ -73,7 +75,8 @@ fn bar_words(state: &State) -> String {
             words.push(format!("{}%", percent(progress.fraction)));
             words.push(format!("samples {}/{}", progress.samples, progress.total_samples));
             words.extend(state.running_for().map(duration_to_tenths));
-            let eta = progress.eta_seconds.map_or("…".to_owned(), seconds);
+            let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
+            let eta = eta.map_or("…".to_owned(), duration_to_tenths);
             words.push(if state.paused { "paused".to_owned() } else { format!("ETA {eta}") });
         }
         (Activity::Running { .. }, None) => {
@@ -85,7 +88,7 @@ fn bar_words(state: &State) -> String {
 }
 
 /// Elapsed time that does not flicker: tenths of seconds until a minute.
-fn duration_to_tenths(time: std::time::Duration) -> String {
+fn duration_to_tenths(time: Duration) -> String {
     if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { duration(time) }
 }
 
@@ -127,7 +130,9 @@ pub(super) fn bottom(state: &State, area: Rect, buffer: &mut Buffer) {
         return;
     }
     let mut rest = area;
-    for binding in KEYMAP.iter().filter(|binding| !binding.hint.is_empty()) {
+    // The key of the help stands in the line above.
+    let hinted = KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::ToggleHelp);
+    for binding in hinted {
         let hint = format!("{}  ", binding.hint);
         if columns(binding.label) + 1 + columns(binding.hint) > rest.width {
             return;
