@@ -1,6 +1,6 @@
 //! The front end in a real terminal with a worker that only pretends:
 //! `cargo test --release --lib by_hand -- --ignored --nocapture`. The file named by `GLIMT_BY_HAND` stands for the
-//! scene: the word `broken` in it fails, `panic` panics, anything else renders.
+//! scene: the word `broken` in it fails, `panic` panics, anything else renders. The key `w` panics in the front end.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -35,7 +35,10 @@ fn by_hand() {
         color: ColorChoice::Auto,
         preview: PreviewChoice::Auto,
         cell_aspect: None,
-        commands: Box::new(move |command| commands.send(command).unwrap_or_default()),
+        commands: Box::new(move |command| {
+            assert!(!matches!(command, Command::Write), "w panics in the thread of the front end");
+            commands.send(command).unwrap_or_default();
+        }),
         events,
         previews,
         changes,

@@ -1,8 +1,8 @@
 //! The terminal front end: messages and a picture in, requests and cells out.
 //!
-//! An [`event`](self) comes in, [`update`] turns state and event into effects, [`view`] draws the state; one
-//! loop in [`run`](fn@run) owns the terminal and is the only place with side effects. Nothing is drawn unless
-//! something changed. The help and the bottom line are made from the one table in [`keymap`].
+//! An event comes in, `update` turns state and event into effects, `view` draws the state; one loop in
+//! [`run`](fn@run) owns the terminal and is the only place with side effects. Nothing is drawn unless something
+//! changed. The help and the bottom line are made from the one table in `keymap`.
 
 mod action;
 mod color;
