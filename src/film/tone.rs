@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn exposure_is_in_stops() {
         let image = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::new(0.05, 0.1, 0.2)] };
-        let brighter = RadianceImage { pixels: vec![Vec3::new(0.2, 0.4, 0.8)], ..image.clone() };
+        let brighter = RadianceImage { pixels: vec![Vec3::new(0.2, 0.4, 0.8)], width: 1, height: 1 };
         for curve in CURVES {
             let exposed = ToneMapping { exposure_stops: 2.0, curve };
             assert_eq!(develop(&image, &exposed), develop(&brighter, &tone(curve)), "{curve:?}");
