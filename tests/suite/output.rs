@@ -291,9 +291,10 @@ fn killed_at_any_time_the_file_is_whole_and_the_next_write_clears_up() {
     let mut left_behind = 0;
     for round in 0..50_u64 {
         let mut writer = child(&this_binary(), test, &path).spawn().expect("a child");
-        // The first file to appear or vanish says that it is writing; then a time of its own for each round.
-        let before = fs::metadata(&path).expect("a file").ino();
-        while fs::metadata(&path).expect("a file").ino() == before {
+        // Another file in its place says that it is writing; then a time of its own for each round.
+        let state = || fs::metadata(&path).map(|file| (file.ino(), file.mtime(), file.mtime_nsec()));
+        let before = state().expect("a file");
+        while state().expect("a file") == before {
             assert!(writer.try_wait().expect("a child").is_none(), "the writer ended by itself");
             std::thread::sleep(Duration::from_millis(1));
         }
