@@ -94,7 +94,8 @@ fn one(
         let Some((source, lines)) = index else { return String::new() };
         let (line, column) = lines.locate(source, place.span.start);
         origin = origin.line(line).char_column(column);
-        let excerpt = Excerpt::new(source, lines.span(line - 1, source), &place.span);
+        let whole = lines.span(line - 1, source).unwrap_or_default();
+        let excerpt = Excerpt::new(source, whole, &place.span);
         let label = (!place.label.is_empty()).then(|| visible(&place.label).into_owned());
         let annotation = AnnotationKind::Primary.span(excerpt.span).label(label);
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
@@ -107,7 +108,20 @@ fn one(
     if let Some(help) = &diagnostic.help {
         group = group.element(Level::HELP.message(wrapped(help, width.saturating_sub(14))));
     }
-    renderer.render(&[group])
+    without_second_origin(&renderer.render(&[group]))
+}
+
+/// The renderer announces a snippet whose origin was already given by a line `:::` of its own.
+fn without_second_origin(rendered: &str) -> String {
+    let is_second = |line: &&str| {
+        let bare = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
+            Some((_, text)) if number > 0 => text,
+            _ => part,
+        });
+        bare.collect::<String>().trim() == ":::"
+    };
+    let Some(second) = rendered.lines().find(is_second) else { return rendered.to_owned() };
+    rendered.replacen(&format!("{second}\n"), "", 1)
 }
 
 /// One line of a source around a place, safe to show, and where the place is in it.
@@ -162,12 +176,12 @@ impl LineIndex {
     }
 
     /// Bytes of a line (from 0) without its end and without a byte order mark.
-    fn span(&self, line: usize, source: &str) -> Range<usize> {
-        let start = self.starts[line];
+    pub(super) fn span(&self, line: usize, source: &str) -> Option<Range<usize>> {
+        let start = *self.starts.get(line)?;
         let end = self.starts.get(line + 1).map_or(source.len(), |next| next - 1);
         let text = &source[start..end];
         let mark = if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
-        start + mark..start + text.strip_suffix('\r').unwrap_or(text).len().max(mark)
+        Some(start + mark..start + text.strip_suffix('\r').unwrap_or(text).len().max(mark))
     }
 }
 

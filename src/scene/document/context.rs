@@ -103,7 +103,17 @@ impl<'a> Context<'a> {
 
     /// The line of a byte of the text, from 1.
     pub(super) fn line(&self, offset: usize) -> usize {
-        self.lines.get_or_init(|| LineIndex::new(&self.source)).locate(&self.source, offset).0
+        self.lines().locate(&self.source, offset).0
+    }
+
+    /// The text of a line, counted from 1.
+    pub(super) fn line_text(&self, line: usize) -> Option<&str> {
+        let span = self.lines().span(line.checked_sub(1)?, &self.source)?;
+        self.source.get(span)
+    }
+
+    fn lines(&self) -> &LineIndex {
+        self.lines.get_or_init(|| LineIndex::new(&self.source))
     }
 
     /// A path in the scene, seen from the scene's folder.
@@ -113,13 +123,17 @@ impl<'a> Context<'a> {
 
     /// Everything reported, in the order of the file. Where TOML is broken, what may only follow from that is
     /// left out: the lines named, and what is said to be missing.
-    pub(super) fn finish(self, broken_lines: &[usize]) -> Vec<Diagnostic> {
+    pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
         let mut issues = self.issues.take();
         if !broken_lines.is_empty() {
             issues.retain(|issue| match issue.cause {
                 Cause::Syntax => true,
                 Cause::Absence => false,
-                Cause::Value => broken_lines.binary_search(&self.line(issue.span.start)).is_err(),
+                Cause::Value => {
+                    let line = self.line(issue.span.start);
+                    let before = broken_lines.partition_point(|lines| lines.start <= line);
+                    !before.checked_sub(1).is_some_and(|last| broken_lines[last].contains(&line))
+                }
             });
         }
         issues.sort_by_key(|issue| (issue.span.start, issue.severity == Severity::Warning));

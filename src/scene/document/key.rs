@@ -111,11 +111,11 @@ impl<'a> Key<'a> {
         let (span, shown) = (self.span()?, shortened(text, 32));
         let mut issue = if unavailable.contains(&text) {
             let instead = if words.len() == 1 { "use" } else { "use one of" };
-            Issue::error(span, format!("`{}` \"{shown}\" is not available in this version", self.name))
-                .help(format!("{instead} {list}"))
+            let message = format!("{} \"{shown}\" is not available in this version", self.name);
+            Issue::error(span, format!("{message}; {instead} {list}"))
         } else {
             let expected = if words.len() == 1 { "expected" } else { "expected one of" };
-            Issue::error(span, format!("unknown {} \"{shown}\"", self.name))
+            Issue::error(span, format!("`{}` cannot be \"{shown}\"", self.name))
                 .help(format!("{expected} {list}"))
         };
         if let Some(near) = nearest(text, words.iter().map(|(word, _)| *word)) {

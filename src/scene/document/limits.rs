@@ -30,11 +30,11 @@ impl Limits {
             return Some("must be a finite number".to_owned());
         }
         if number.abs() > LARGEST {
-            return Some("must be of a magnitude below 1e18".to_owned());
+            return Some("must be less than 1e18 in magnitude".to_owned());
         }
         let tiny = number != 0.0 && number.abs() < SMALLEST;
         match self {
-            Self::Length | Self::NotZero if tiny => Some("must be of a magnitude above 1e-18".to_owned()),
+            Self::Length | Self::NotZero if tiny => Some("must be more than 1e-18 in magnitude".to_owned()),
             _ if self.contains(number) => None,
             _ => Some(self.words()),
         }

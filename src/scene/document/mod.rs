@@ -53,8 +53,10 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     let lights = lights::read(root);
     root.unavailable("environment", "[environment] is not available in this version", Some(ENVIRONMENT));
     root.finish();
-    textures.names.warn_about_unused(root.context);
-    materials.names.warn_about_unused(root.context);
+    if !root.context.has_errors() {
+        textures.names.warn_about_unused(root.context);
+        materials.names.warn_about_unused(root.context);
+    }
 
     let scene = Scene {
         render: render?,

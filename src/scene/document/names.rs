@@ -57,7 +57,7 @@ impl Names {
         }
     }
 
-    /// A warning for each name that nothing referred to.
+    /// A warning for each name that nothing referred to. Only worth it where everything else is right.
     pub(super) fn warn_about_unused(&self, context: &Context<'_>) {
         for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
             let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));

@@ -21,12 +21,14 @@ pub(super) struct Table<'a> {
     pub(super) title: String,
     entries: &'a DeTable<'a>,
     known: RefCell<Vec<&'static str>>,
+    unavailable: RefCell<Vec<&'static str>>,
     missing: RefCell<Vec<(&'static str, &'static str)>>,
 }
 
 impl<'a> Table<'a> {
     fn new(context: &'a Context<'a>, entries: &'a DeTable<'a>, span: Range<usize>, title: String) -> Self {
-        Self { context, span, title, entries, known: RefCell::default(), missing: RefCell::default() }
+        let (known, unavailable, missing) = Default::default();
+        Self { context, span, title, entries, known, unavailable, missing }
     }
 
     /// The file itself.
@@ -77,6 +79,7 @@ impl<'a> Table<'a> {
     /// A key or table that other versions have: an error if it is used.
     pub(super) fn unavailable(&self, name: &'static str, message: &str, help: Option<&str>) {
         let key = self.optional(name);
+        self.unavailable.borrow_mut().push(name);
         if let Some(span) = key.key_span() {
             self.context.report(Issue::error(span, message).maybe_help(help.map(str::to_owned)));
         }
@@ -153,7 +156,9 @@ impl<'a> Table<'a> {
     }
 
     fn known_list(&self) -> String {
-        self.known.borrow().iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+        let (known, unavailable) = (self.known.borrow(), self.unavailable.borrow());
+        let names = known.iter().filter(|name| !unavailable.contains(name));
+        names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
     }
 }
 

@@ -28,12 +28,16 @@ pub(super) fn found(context: &Context<'_>, value: Value<'_>) -> String {
     }
 }
 
-/// An integer or a float; infinite where it is too large for a double. None: something else.
+/// An integer or a float; the largest double where it is larger. None: something else.
 pub(super) fn number(value: &DeValue<'_>) -> Option<f64> {
     match value {
         // Rounding to the nearest double is what writing the number as a float would do.
-        DeValue::Integer(integer) => Some(whole(integer).map_or(f64::INFINITY, |number| number as f64)),
-        DeValue::Float(float) => float.as_str().parse().ok(),
+        DeValue::Integer(integer) => Some(whole(integer).map_or(f64::MAX, |number| number as f64)),
+        DeValue::Float(float) => {
+            let number: f64 = float.as_str().parse().ok()?;
+            let is_digits = number.is_infinite() && !float.as_str().contains("inf");
+            Some(if is_digits { f64::MAX } else { number })
+        }
         _ => None,
     }
 }

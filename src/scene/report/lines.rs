@@ -27,11 +27,9 @@ pub enum Role {
     Error,
     /// The word `warning`, underlines and labels of warnings.
     Warning,
-    /// The word `help`.
-    Help,
     /// Line numbers and rules.
     Frame,
-    /// The message.
+    /// The message, and the word `help`.
     Message,
 }
 
@@ -40,7 +38,6 @@ pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
     let renderer = Renderer::plain()
         .error(AnsiColor::Red.on_default())
         .warning(AnsiColor::Yellow.on_default())
-        .help(AnsiColor::Cyan.on_default())
         .line_num(AnsiColor::Blue.on_default())
         .emphasis(Effects::BOLD.into());
     render_with(diagnostics, width, &renderer).lines().map(pieces).collect()
@@ -70,7 +67,6 @@ fn role_of(codes: &str) -> Role {
     match codes {
         "31" => Role::Error,
         "33" => Role::Warning,
-        "36" => Role::Help,
         "34" => Role::Frame,
         "1" => Role::Message,
         _ => Role::Text,

@@ -102,6 +102,7 @@ fn lines_have_the_text_of_the_plain_report_and_roles() {
     assert_eq!(role("error"), Some(Role::Error));
     assert_eq!(role("found"), Some(Role::Error));
     assert_eq!(role("greater"), Some(Role::Message));
-    assert_eq!(role("help"), Some(Role::Help));
+    assert_eq!(role("a.toml:1:10"), Some(Role::Text));
+    assert_eq!(role("-->"), Some(Role::Frame));
     assert!(render(&diagnostics, 80, Style::Ansi).contains("\u{1b}["));
 }
