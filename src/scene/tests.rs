@@ -144,7 +144,7 @@ fn a_mesh_file_is_listed_once_however_it_is_written() {
     let late =
         loaded.diagnostic_at(scene.mesh_files[1].span.clone(), Severity::Error, "no usable face", None);
     let shown = report::render(&[late], 300, report::Style::Plain);
-    assert!(shown.contains("scene.toml:15:6\n") && shown.contains("^^^^^^^"), "{shown}");
+    assert!(shown.contains("scene.toml:16:6\n") && shown.contains("^^^^^^^"), "{shown}");
 }
 
 #[test]

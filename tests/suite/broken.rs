@@ -27,24 +27,12 @@ const BROKEN: &[(&str, &[Said])] = &[
             (5, 1, "`look_at` and `orbiter` exclude each other"),
         ],
     ),
-    (
-        "camera_direction",
-        &[
-            (4, 11, "the camera has no direction; the same point as `position`"),
-        ],
-    ),
+    ("camera_direction", &[(4, 11, "the camera has no direction; the same point as `position`")]),
     (
         "camera_up",
-        &[
-            (4, 11, "`up` must not be parallel to the view; the view is parallel to the default [0, 1, 0]"),
-        ],
+        &[(4, 11, "`up` must not be parallel to the view; the view is parallel to the default [0, 1, 0]")],
     ),
-    (
-        "camera_up_zero",
-        &[
-            (5, 6, "`up` has no direction; its length is 0"),
-        ],
-    ),
+    ("camera_up_zero", &[(5, 6, "`up` has no direction; its length is 0")]),
     (
         "choices",
         &[
@@ -61,21 +49,20 @@ const BROKEN: &[(&str, &[Said])] = &[
         "colours",
         &[
             (3, 15, "`ambient` must be at least 0; found -0.1"),
-            (4, 14, r#"`background` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"#),
-            (11, 11, r#"`diffuse` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"#),
-            (12, 12, r#"`specular` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found an array of 2 values"#),
-            (13, 12, r#"`emission` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"#),
+            (4, 14, r##"`background` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
+            (11, 11, r##"`diffuse` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
+            (
+                12,
+                12,
+                r##"`specular` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found an array of 2 values"##,
+            ),
+            (13, 12, r##"`emission` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
             (17, 21, "`reflectance` must be between 0 and 1; found 1.1"),
             (21, 7, "`ior` must be between 1 and 10; found 0.9"),
             (22, 15, "`tint` must be between 0 and 1; found 2"),
         ],
     ),
-    (
-        "comment_only",
-        &[
-            (1, 1, "the scene has no [camera]"),
-        ],
-    ),
+    ("comment_only", &[(1, 1, "the scene has no [camera]")]),
     (
         "crlf_tabs",
         &[
@@ -90,18 +77,8 @@ const BROKEN: &[(&str, &[Said])] = &[
             (17, 12, "`red` is given twice; the second time"),
         ],
     ),
-    (
-        "emissive_plane",
-        &[
-            (10, 12, "an infinite plane cannot be a light; this material has `emission`"),
-        ],
-    ),
-    (
-        "empty_list",
-        &[
-            (10, 12, "`material` must be the name of a material; found 7"),
-        ],
-    ),
+    ("emissive_plane", &[(10, 12, "an infinite plane cannot be a light; this material has `emission`")]),
+    ("empty_list", &[(10, 12, "`material` must be the name of a material; found 7")]),
     (
         "endings",
         &[
@@ -123,7 +100,11 @@ const BROKEN: &[(&str, &[Said])] = &[
         "huge_numbers",
         &[
             (3, 9, "40000 × 40000 pixels are too many"),
-            (5, 11, "`samples` must be a whole number between 1 and 4294967295; found 99999999999999999999999"),
+            (
+                5,
+                11,
+                "`samples` must be a whole number between 1 and 4294967295; found 99999999999999999999999",
+            ),
             (12, 11, "`center` must be less than 1e18 in magnitude; found 1e19"),
             (12, 20, "`center` must be less than 1e18 in magnitude; found 1e999"),
             (13, 10, "`radius` must be less than 1e18 in magnitude; found 1701411834604692317316873037158…"),
@@ -138,7 +119,11 @@ const BROKEN: &[(&str, &[Said])] = &[
             (11, 12, r#"`encoding` cannot be "gamma""#),
             (14, 8, r#"`type` cannot be "fong""#),
             (18, 1, "unknown key `diffuse` in [materials.steel]"),
-            (21, 11, r#"`diffuse` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found the name of a texture"#),
+            (
+                21,
+                11,
+                r##"`diffuse` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found the name of a texture"##,
+            ),
             (22, 13, "`shininess` must be between 0 and 1000000; found -1"),
             (23, 14, "`normal_map` must be the name of a texture; found a table"),
             (24, 19, "`normal_strength` must be at least 0; found -2"),
@@ -167,12 +152,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (16, 1, "[[light]] needs `position`; `position` is missing"),
         ],
     ),
-    (
-        "nesting",
-        &[
-            (2, 85, "arrays or tables are nested too deeply"),
-        ],
-    ),
+    ("nesting", &[(2, 85, "arrays or tables are nested too deeply")]),
     (
         "no_area",
         &[
@@ -181,18 +161,8 @@ const BROKEN: &[(&str, &[Said])] = &[
             (22, 10, "the plane has no direction; a normal of length 0"),
         ],
     ),
-    (
-        "no_camera",
-        &[
-            (1, 1, "the scene has no [camera]"),
-        ],
-    ),
-    (
-        "no_shapes",
-        &[
-            (1, 1, "warning: the scene has no shapes"),
-        ],
-    ),
+    ("no_camera", &[(1, 1, "the scene has no [camera]")]),
+    ("no_shapes", &[(1, 1, "warning: the scene has no shapes")]),
     (
         "not_finite",
         &[
@@ -222,12 +192,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (11, 1, "a comma is missing"),
         ],
     ),
-    (
-        "output_ending",
-        &[
-            (3, 10, "`output`: unknown file ending .tiff"),
-        ],
-    ),
+    ("output_ending", &[(3, 10, "`output`: unknown file ending .tiff")]),
     (
         "photons",
         &[
@@ -316,7 +281,11 @@ const BROKEN: &[(&str, &[Said])] = &[
             (1, 1, "warning: nothing lights this scene"),
             (7, 11, "warning: this version does not render photons"),
             (9, 11, r#"warning: the texture "bricks" is not used"#),
-            (14, 12, "warning: this material reflects more light than falls on it; diffuse + specular is 1.100 in red"),
+            (
+                14,
+                12,
+                "warning: this material reflects more light than falls on it; diffuse + specular is 1.100 in red",
+            ),
             (16, 12, r#"warning: the material "blue" is not used"#),
         ],
     ),
@@ -325,7 +294,7 @@ const BROKEN: &[(&str, &[Said])] = &[
         &[
             (3, 9, r#"`width` must be a whole number; found the string "wide""#),
             (4, 11, "`samples` must be a whole number; found 1.5"),
-            (5, 11, r#"`ambient` must be a colour: [r, g, b] or "#rrggbb"; found 1"#),
+            (5, 11, r##"`ambient` must be a colour: [r, g, b] or "#rrggbb"; found 1"##),
             (6, 8, "`seed` must be a whole number; found true"),
             (9, 12, "`position` must be three numbers, [x, y, z]; found an array of 2 values"),
             (10, 15, r#"`look_at` must be three numbers, [x, y, z]; found the string "1""#),
@@ -351,14 +320,20 @@ fn said(diagnostic: &Diagnostic) -> (usize, usize, String) {
     let (line, column) = line_and_column(&place.source, place.span.start);
     let kind = if diagnostic.severity == Severity::Warning { "warning: " } else { "" };
     let label = if place.label.is_empty() { String::new() } else { format!("; {}", place.label) };
-    (line, column, format!("{kind}{}{label}", diagnostic.message).replace(folder().to_str().expect("UTF-8"), "…"))
+    (
+        line,
+        column,
+        format!("{kind}{}{label}", diagnostic.message).replace(folder().to_str().expect("UTF-8"), "…"),
+    )
 }
 
 #[test]
 fn every_broken_scene_is_told_all_of_it_and_nothing_else() {
     for (name, expected) in BROKEN {
-        let found: Vec<_> = diagnostics(&folder().join(name).with_extension("toml")).iter().map(said).collect();
-        let found: Vec<_> = found.iter().map(|(line, column, text)| (*line, *column, text.as_str())).collect();
+        let found: Vec<_> =
+            diagnostics(&folder().join(name).with_extension("toml")).iter().map(said).collect();
+        let found: Vec<_> =
+            found.iter().map(|(line, column, text)| (*line, *column, text.as_str())).collect();
         assert_eq!(&found, expected, "{name}");
     }
 }
@@ -413,9 +388,11 @@ fn what_is_no_text_is_refused_with_its_place() {
     assert_eq!((latin.0, latin.1), (2, 6));
     assert!(latin.2.starts_with("line 2 is not UTF-8 text: byte 0xe9 at offset 14"), "{}", latin.2);
     assert!(of_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message.contains("binary"));
-    assert!(of_bytes("[camera]".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>().as_slice())
-        .message
-        .contains("binary"));
+    assert!(
+        of_bytes("[camera]".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>().as_slice())
+            .message
+            .contains("binary")
+    );
     for nothing in ["", " \n\t\r\n", "\u{feff}\n"] {
         assert_eq!(said(&of_bytes(nothing.as_bytes())), (1, 1, "the scene file is empty".to_owned()));
     }
@@ -424,7 +401,7 @@ fn what_is_no_text_is_refused_with_its_place() {
 #[test]
 fn nesting_of_any_depth_is_an_error_and_no_overflow() {
     for (open, close) in [("[", "]"), ("{a=", "}"), ("a.", "a=1")] {
-        let text = format!("x = {}{}\n", open.repeat(200_000), close.repeat(1));
+        let text = format!("x = {}{close}\n", open.repeat(200_000));
         assert_eq!(said(&of_bytes(text.as_bytes())).0, 1);
         let header = format!("[{}a]\nb = 1\n", "a.".repeat(200_000));
         assert_eq!(said(&of_bytes(header.as_bytes())).0, 1);

@@ -104,19 +104,17 @@ impl<'a> Key<'a> {
         unavailable: &[&'static str],
     ) -> Option<T> {
         let list = words.iter().map(|(word, _)| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
-        let text = self.text(&if words.len() == 1 { list.clone() } else { format!("one of {list}") })?;
+        let list = if words.len() == 1 { list } else { format!("one of {list}") };
+        let text = self.text(&list)?;
         if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == text) {
             return Some(*meaning);
         }
-        let (span, shown) = (self.span()?, shortened(text, 32));
+        let (span, name, shown) = (self.span()?, self.name, shortened(text, 32));
         let mut issue = if unavailable.contains(&text) {
-            let instead = if words.len() == 1 { "use" } else { "use one of" };
-            let message = format!("{} \"{shown}\" is not available in this version", self.name);
-            Issue::error(span, format!("{message}; {instead} {list}"))
+            let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
+            Issue::error(span, message)
         } else {
-            let expected = if words.len() == 1 { "expected" } else { "expected one of" };
-            Issue::error(span, format!("`{}` cannot be \"{shown}\"", self.name))
-                .help(format!("{expected} {list}"))
+            Issue::error(span, format!("`{name}` cannot be \"{shown}\"")).help(format!("expected {list}"))
         };
         if let Some(near) = nearest(text, words.iter().map(|(word, _)| *word)) {
             issue = issue.label(format!("did you mean \"{near}\"?"));

@@ -53,10 +53,6 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     let lights = lights::read(root);
     root.unavailable("environment", "[environment] is not available in this version", Some(ENVIRONMENT));
     root.finish();
-    if !root.context.has_errors() {
-        textures.names.warn_about_unused(root.context);
-        materials.names.warn_about_unused(root.context);
-    }
 
     let scene = Scene {
         render: render?,
@@ -68,7 +64,11 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
         lights: lights?,
         materials: materials.list?,
     };
-    warn_about_darkness(root.context, &scene);
+    if !root.context.has_errors() {
+        textures.names.warn_about_unused(root.context);
+        materials.names.warn_about_unused(root.context);
+        warn_about_darkness(root.context, &scene);
+    }
     Some(scene)
 }
 
