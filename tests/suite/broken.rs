@@ -136,7 +136,7 @@ const BROKEN: &[(&str, &[Said])] = &[
         &[
             (3, 11, "there is no file …/files/orbiter.txt"),
             (6, 8, "there is no file …/files/brick.ppm"),
-            (9, 8, "…/files/folder.png is a folder, not a file"),
+            (9, 8, "…/files/folder.ppm is a folder, not a file"),
             (12, 8, "`file` is empty: it must be the path of a file"),
             (20, 8, "there is no file …/files/knots.obj"),
         ],

@@ -1,6 +1,6 @@
 //! What all readers of one file share: its text, its place, and the list of what is wrong.
 
-use std::cell::{OnceCell, RefCell};
+use std::cell::{Cell, OnceCell, RefCell};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,6 +14,7 @@ pub(super) struct Context<'a> {
     path: &'a Path,
     lines: OnceCell<LineIndex>,
     issues: RefCell<Vec<Issue>>,
+    uncollected: Cell<usize>,
 }
 
 /// A diagnostic before it has its file.
@@ -84,12 +85,22 @@ impl Issue {
 
 impl<'a> Context<'a> {
     pub(super) fn new(source: Arc<str>, path: &'a Path) -> Self {
-        Self { source, path, lines: OnceCell::new(), issues: RefCell::default() }
+        Self { source, path, lines: OnceCell::new(), issues: RefCell::default(), uncollected: Cell::new(0) }
     }
 
     /// Adds to the list.
     pub(super) fn report(&self, issue: Issue) {
-        self.issues.borrow_mut().push(issue);
+        self.report_with(|| issue);
+    }
+
+    /// Adds to the list; where it is too long already, the issue is counted and not made.
+    pub(super) fn report_with(&self, make: impl FnOnce() -> Issue) {
+        if self.issues.borrow().len() < MOST_COLLECTED {
+            let issue = make();
+            self.issues.borrow_mut().push(issue);
+        } else {
+            self.uncollected.set(self.uncollected.get() + 1);
+        }
     }
 
     pub(super) fn has_errors(&self) -> bool {
@@ -137,7 +148,7 @@ impl<'a> Context<'a> {
             });
         }
         issues.sort_by_key(|issue| (issue.span.start, issue.severity == Severity::Warning));
-        let unshown = issues.len().saturating_sub(MOST_ISSUES);
+        let unshown = issues.len().saturating_sub(MOST_ISSUES) + self.uncollected.get();
         issues.truncate(MOST_ISSUES);
         if unshown > 0 {
             let message = format!("and {unshown} more like these");
@@ -150,6 +161,9 @@ impl<'a> Context<'a> {
 
 /// Nobody reads on from here.
 const MOST_ISSUES: usize = 500;
+
+/// Enough to find the first of them in the order of the file, in all files but monstrous ones.
+const MOST_COLLECTED: usize = 10_000;
 
 impl Issue {
     fn into_diagnostic(self, path: &Path, source: &Arc<str>) -> Diagnostic {

@@ -128,9 +128,11 @@ impl<'a> Table<'a> {
         let unknown = self.entries.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
         let mut meant = Vec::new();
         for (key, value) in unknown {
-            let near = nearest(key.get_ref(), known.iter().copied());
-            meant.extend(near);
-            self.report_unknown(key.get_ref(), key.span(), value.get_ref(), near);
+            self.context.report_with(|| {
+                let near = nearest(key.get_ref(), known.iter().copied());
+                meant.extend(near);
+                self.unknown(key.get_ref(), key.span(), value.get_ref(), near)
+            });
         }
         for (name, example) in self.missing.borrow().iter().filter(|(name, _)| !meant.contains(name)) {
             let issue = Issue::error(self.span.clone(), format!("{} needs `{name}`", self.title))
@@ -140,7 +142,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn report_unknown(&self, key: &str, span: Range<usize>, value: &DeValue<'_>, near: Option<&str>) {
+    fn unknown(&self, key: &str, span: Range<usize>, value: &DeValue<'_>, near: Option<&str>) -> Issue {
         let shown = shortened(key, 40);
         let table = |value: &DeValue<'_>| matches!(value, DeValue::Table(_)) || is_array_of_tables(value);
         let message = match () {
@@ -152,7 +154,7 @@ impl<'a> Table<'a> {
         if let Some(near) = near {
             issue = issue.label(format!("did you mean `{near}`?"));
         }
-        self.context.report(issue.help(format!("expected one of {}", self.known_list())));
+        issue.help(format!("expected one of {}", self.known_list()))
     }
 
     fn known_list(&self) -> String {
