@@ -1,4 +1,5 @@
 //! The program as a whole: one crate, so that it links once.
 
+mod broken;
 mod house;
 mod output;
