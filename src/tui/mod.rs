@@ -11,7 +11,6 @@ mod keymap;
 mod options;
 mod run;
 mod signals;
-mod stand_in;
 mod state;
 mod terminal;
 mod update;

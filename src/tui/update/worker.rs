@@ -3,8 +3,8 @@
 use super::{resized_preview, say};
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport};
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Written};
-use crate::tui::stand_in::visible;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {

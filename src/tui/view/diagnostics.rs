@@ -6,8 +6,9 @@ use ratatui::widgets::{Block, Clear, Widget};
 
 use super::layout::Layout;
 use super::text::{Tone, put, row};
-use crate::scene::diagnostic::Severity;
-use crate::tui::stand_in::{lines, visible};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::report::{self, Role};
+use crate::scene::sanitize::visible;
 use crate::tui::state::State;
 
 /// Draws it, from the line that the person scrolled to.
@@ -28,12 +29,8 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         block.render(area, buffer);
     }
     for (index, line) in (0..).zip(text.iter().skip(first).take(page)) {
-        let tone = match line.split_once(':').map(|(word, _)| word) {
-            Some("error") => Tone::Error,
-            Some("warning") => Tone::Warning,
-            _ => Tone::Plain,
-        };
-        put(buffer, row(inner, index), &[(line, tone)], state.depth);
+        let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
+        put(buffer, row(inner, index), &pieces, state.depth);
     }
 }
 
@@ -44,7 +41,7 @@ pub(in crate::tui) fn extent(state: &State) -> (usize, usize) {
     span(&text, area)
 }
 
-fn span(text: &[String], area: Rect) -> (usize, usize) {
+fn span(text: &[Line], area: Rect) -> (usize, usize) {
     let page = usize::from(if bordered(area) { area.height - 2 } else { area.height });
     (page.max(1), text.len().saturating_sub(page.max(1)))
 }
@@ -53,26 +50,38 @@ fn bordered(area: Rect) -> bool {
     area.height >= 4 && area.width >= 10
 }
 
-fn text(state: &State, area: Rect) -> Vec<String> {
+/// Pieces of text with their tones.
+type Line = Vec<(String, Tone)>;
+
+fn text(state: &State, area: Rect) -> Vec<Line> {
     let width = usize::from(if bordered(area) { area.width - 2 } else { area.width });
-    match &state.problems {
-        None => lines(&state.warnings, width),
-        Some(problems) => {
-            let mut text = lines(&problems.diagnostics, width);
-            if let Some(work) = &problems.work {
-                text.extend(work.lines().enumerate().flat_map(|(index, line)| {
-                    let prefix = if index == 0 { "error: " } else { "" };
-                    textwrap(&format!("{prefix}{}", visible(line)), width)
-                }));
-            }
-            text
-        }
+    let Some(problems) = &state.problems else { return reported(&state.warnings, width) };
+    let mut text = reported(&problems.diagnostics, width);
+    if let Some(work) = &problems.work {
+        text.extend(wrapped(&format!("error: {}", visible(work)), width));
     }
+    text
 }
 
-fn textwrap(line: &str, width: usize) -> Vec<String> {
+fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
+    let tone = |role| match role {
+        Role::Text => Tone::Plain,
+        Role::Error => Tone::Error,
+        Role::Warning => Tone::Warning,
+        Role::Frame => Tone::Faint,
+        Role::Message => Tone::Strong,
+    };
+    let line = |line: report::Line| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
+    let mut lines = report::lines(diagnostics, width);
+    // The report ends with an empty line and a count, which stands in the title.
+    lines.truncate(lines.len().saturating_sub(2));
+    lines.into_iter().map(line).collect()
+}
+
+fn wrapped(line: &str, width: usize) -> Vec<Line> {
     let characters: Vec<char> = line.chars().collect();
-    characters.chunks(width.max(1)).map(|chunk| chunk.iter().collect()).collect()
+    let part = |part: &[char]| vec![(part.iter().collect(), Tone::Error)];
+    characters.chunks(width.max(1)).map(part).collect()
 }
 
 fn title(state: &State) -> String {

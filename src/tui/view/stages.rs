@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 
 use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, row, seconds};
 use crate::pipeline::protocol::{Stage, StageReport, Status};
-use crate::tui::stand_in::visible;
+use crate::scene::sanitize::visible;
 use crate::tui::state::{AssetBar, PreviewKind, State};
 
 /// From the top: stages, assets, results. What does not fit is cut at the bottom.

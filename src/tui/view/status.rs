@@ -7,9 +7,9 @@ use ratatui::layout::Rect;
 
 use super::layout::Layout;
 use super::text::{Tone, columns, duration, gauge, percent, put, put_right, seconds};
+use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, KEYMAP};
-use crate::tui::stand_in::visible;
 use crate::tui::state::{Activity, PreviewKind, State};
 use crate::tui::update::shadows;
 
