@@ -58,7 +58,8 @@ fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
             }
         }
     }
-    let missing = |letter| AssetError::malformed(path, None, format!("an orbiter file has a line `{letter}`"));
+    let missing =
+        |letter| AssetError::malformed(path, None, format!("an orbiter file has a line `{letter}`"));
     let [size, radius] = size.ok_or_else(|| missing("s size radius"))?;
     let [fov, width, height] = field.unwrap_or(DEFAULT_FIELD);
     Ok(OrbiterCamera {
@@ -77,7 +78,8 @@ fn numbers<'a, const N: usize>(
     letter: &str,
     words: impl Iterator<Item = &'a str>,
 ) -> Result<[f64; N], String> {
-    let found: Option<Vec<f64>> = words.map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
+    let found: Option<Vec<f64>> =
+        words.map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
     let exact = found.and_then(|found| found.try_into().ok());
     exact.ok_or_else(|| format!("`{letter}` is followed by {N} finite numbers"))
 }

@@ -70,7 +70,8 @@ pub fn load(
     let reader = BufReader::new(Counting::new(file, length, watch));
     let texels = contain(|| Ok(convert::texels(decode(path, reader, limits)?, encoding)));
     token.check()?;
-    let texels = texels.unwrap_or_else(|panic| Err(format!("the decoder gave up: {panic}"))).map_err(wrong)?;
+    let texels =
+        texels.unwrap_or_else(|panic| Err(format!("the decoder gave up: {panic}"))).map_err(wrong)?;
     watch.tick(length as usize, length as usize)?;
     Ok(texels)
 }
@@ -95,7 +96,8 @@ fn decode(
     check_size(&decoder, limits)?;
     let orientation = decoder.orientation().map_err(|error| reason(&error))?;
     let image = DynamicImage::from_decoder(decoder);
-    let mut image = image.map_err(|error| format!("it claims {width} × {height} pixels: {}", reason(&error)))?;
+    let mut image =
+        image.map_err(|error| format!("it claims {width} × {height} pixels: {}", reason(&error)))?;
     image.apply_orientation(orientation);
     Ok(image)
 }

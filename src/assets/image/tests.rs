@@ -120,7 +120,10 @@ fn lies_about_the_size_are_errors_that_name_the_file() {
     assert!(load_bytes("a.png", &lying_png(2, 2), ImageEncoding::Color).is_ok());
     assert!(says("a.png", &lying_png(16000, 16000)).contains("a.png: it claims 16000 × 16000 pixels"));
     assert!(says("a.png", &lying_png(20000, 2)).contains("a.png: "));
-    assert!(says("a.ppm", b"P6 9000 9000 255\n123").contains("a.ppm: it claims 9000 × 9000 pixels: the file ends"));
+    assert!(
+        says("a.ppm", b"P6 9000 9000 255\n123")
+            .contains("a.ppm: it claims 9000 × 9000 pixels: the file ends")
+    );
     assert!(says("a.ppm", b"P6 4000000000 4000000000 255\n123").contains("a.ppm: "));
     assert!(says("a.ppm", b"P6 0 0 255\n").contains("a.ppm: "));
     assert!(says("a.png", b"").contains("empty"));
@@ -132,7 +135,8 @@ fn the_memory_limit_holds() {
     let path = folder.path().join("a.png");
     fs::write(&path, png()).expect("written");
     let limits = ImageLimits { side: 16384, memory_bytes: 23 };
-    let error = load(&path, ImageEncoding::Color, limits, &unwatched, &CancelToken::new()).expect_err("24 bytes");
+    let error =
+        load(&path, ImageEncoding::Color, limits, &unwatched, &CancelToken::new()).expect_err("24 bytes");
     assert!(error.to_string().contains("a.png: "), "{error}");
 }
 
@@ -159,7 +163,11 @@ fn progress_moves_and_ends_at_the_length() {
     let seen = seen.into_inner().expect("no panic");
     assert!(seen.is_sorted() && seen.iter().any(|(done, total)| *done > total / 4 && *done < total * 3 / 4));
     assert_eq!(seen.last(), Some(&(file.len() as u64, file.len() as u64)));
-    let stop = |done, _| if done > 100_000 { token.cancel() };
+    let stop = |done, _| {
+        if done > 100_000 {
+            token.cancel()
+        }
+    };
     let result = load(&path, ImageEncoding::Color, ImageLimits::default(), &stop, &token);
     assert!(matches!(result, Err(AssetError::Cancelled(_))));
 }

@@ -266,7 +266,10 @@ mod tests {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::X, Vec3::splat(f32::INFINITY)];
         let parsed = Parsed { positions, faces: faces(&[&[0, 1, 2], &[0, 1, 3]]), ..Parsed::default() };
         let says = assembled(parsed).expect_err("nothing left").to_string();
-        assert_eq!(says, "a.off: no usable face: of 2, 1 have a corner that is not finite and 1 have no area");
+        assert_eq!(
+            says,
+            "a.off: no usable face: of 2, 1 have a corner that is not finite and 1 have no area"
+        );
         assert!(assembled(Parsed::default()).expect_err("empty").to_string().contains("no usable face"));
     }
 
@@ -287,8 +290,11 @@ mod tests {
 
     #[test]
     fn an_index_out_of_range_names_the_face() {
-        let parsed =
-            Parsed { positions: SQUARE.to_vec(), faces: faces(&[&[0, 1, 2], &[0, 1, 4]]), ..Parsed::default() };
+        let parsed = Parsed {
+            positions: SQUARE.to_vec(),
+            faces: faces(&[&[0, 1, 2], &[0, 1, 4]]),
+            ..Parsed::default()
+        };
         assert!(assembled(parsed).expect_err("refused").to_string().contains("face 2"));
     }
 }

@@ -45,7 +45,9 @@ fn check_words(keyword: &str, argument: Option<&str>) -> Result<(), String> {
         ("illum", argument) if argument.is_none_or(|word| word.parse::<u8>().is_err()) => {
             Err("`illum` is followed by a whole number".to_owned())
         }
-        (map, None) if map == "bump" || map.starts_with("map_") => Err(format!("`{map}` is followed by a file")),
+        (map, None) if map == "bump" || map.starts_with("map_") => {
+            Err(format!("`{map}` is followed by a file"))
+        }
         _ => Ok(()),
     }
 }

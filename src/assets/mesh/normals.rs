@@ -56,7 +56,10 @@ fn weighted_sums(mesh: &TriangleMesh) -> Vec<DVec3> {
     let mut weighted = Vec::with_capacity(BATCH.min(mesh.triangles.len()));
     for triangles in mesh.triangles.chunks(BATCH) {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
-        triangles.par_iter().map(|triangle| corner_weights(corners(triangle))).collect_into_vec(&mut weighted);
+        triangles
+            .par_iter()
+            .map(|triangle| corner_weights(corners(triangle)))
+            .collect_into_vec(&mut weighted);
         for (triangle, (normal, angles)) in triangles.iter().zip(&weighted) {
             for (vertex, angle) in triangle.iter().zip(angles) {
                 sums[*vertex as usize] += *normal * *angle;
@@ -122,7 +125,11 @@ fn take_face_normals(mesh: &TriangleMesh, normals: &mut [Vec3]) {
         if triangle.iter().any(|&vertex| normals[vertex as usize] == Vec3::ZERO) {
             let (normal, _) = corner_weights(triangle.map(|vertex| mesh.positions[vertex as usize]));
             let missing = triangle.iter().filter(|&&vertex| normals[vertex as usize] == Vec3::ZERO);
-            missing.copied().collect::<Vec<_>>().into_iter().for_each(|v| normals[v as usize] = normal.as_vec3());
+            missing
+                .copied()
+                .collect::<Vec<_>>()
+                .into_iter()
+                .for_each(|v| normals[v as usize] = normal.as_vec3());
         }
     }
     normals.iter_mut().filter(|normal| **normal == Vec3::ZERO).for_each(|normal| *normal = Vec3::Y);
@@ -154,7 +161,14 @@ mod tests {
         // Two quads folded by `height`, with separate vertices along the fold.
         let folded = |height: f32| {
             mesh(
-                &[[0., 0., 0.], [0., 1., 0.], [-1., 0., height], [0., 0., -0.], [0., 1., 0.], [1., 0., height]],
+                &[
+                    [0., 0., 0.],
+                    [0., 1., 0.],
+                    [-1., 0., height],
+                    [0., 0., -0.],
+                    [0., 1., 0.],
+                    [1., 0., height],
+                ],
                 &[[0, 1, 2], [3, 5, 4]],
             )
         };

@@ -10,20 +10,16 @@ use std::path::Path;
 use super::assemble::{Parsed, assemble};
 use super::text::{Cursor, shown};
 use super::{AssetError, LoadedMesh, Source, mtl};
-use crate::assets::contain::contain;
 use crate::assets::FileMaterial;
+use crate::assets::contain::contain;
 use crate::math::{Vec2, Vec3};
 
 /// Bytes that `tobj` gets at a time, between two polls of the token.
 const CHUNK: usize = 1 << 18;
 
 /// Faces stay as they are: polygons are cut by our own hands, and points and lines among them counted.
-const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
-    single_index: true,
-    triangulate: false,
-    ignore_points: false,
-    ignore_lines: false,
-};
+const OPTIONS: tobj::LoadOptions =
+    tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: false, ignore_lines: false };
 
 pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     let survey = Survey::of(source.bytes);
@@ -212,7 +208,9 @@ fn join(models: &[tobj::Model], parsed: &mut Parsed) {
 fn whole(found: usize, wanted: usize, model: &tobj::Model, what: &str, parsed: &mut Parsed) -> bool {
     if found != wanted && found > 0 {
         let name = &model.name;
-        parsed.warnings.push(format!("some corners of {name:?} have {what} and some have none: ignored there"));
+        parsed
+            .warnings
+            .push(format!("some corners of {name:?} have {what} and some have none: ignored there"));
     }
     found == wanted
 }
@@ -266,7 +264,9 @@ fn counted(cursor: &mut Cursor<'_>, count: &mut i64, wanted: usize, what: &str) 
     }
     match found {
         4 if wanted == 3 => None,
-        5 if what == "coordinates" => Some("coordinates are followed by one weight or three colours".to_owned()),
+        5 if what == "coordinates" => {
+            Some("coordinates are followed by one weight or three colours".to_owned())
+        }
         _ if found < wanted => Some(format!("expected {wanted} {what}, found {found}")),
         _ => None,
     }
@@ -283,7 +283,8 @@ fn face_fault(cursor: &mut Cursor<'_>, counts: [i64; 3]) -> Option<String> {
         if parts.len() > 3 {
             return Some(format!("expected a corner like 1/2/3, found {}", shown(word)));
         }
-        for (part, (count, what)) in parts.iter().zip(counts.iter().zip(["vertex", "texture coordinate", "normal"]))
+        for (part, (count, what)) in
+            parts.iter().zip(counts.iter().zip(["vertex", "texture coordinate", "normal"]))
         {
             if part.is_empty() && what != "vertex" {
                 continue;
@@ -339,8 +340,13 @@ mod tests {
 
     #[test]
     fn quads_relative_indices_and_long_lines_are_read() {
-        for faces in ["f 1 2 3 4", "f -4 -3 -2 -1", "f 1 2 \\\n 3 4", "f 1 2 3 4\nl 1 2 3\np 1\nl 2 4", "  f 1 2 3 4\r"]
-        {
+        for faces in [
+            "f 1 2 3 4",
+            "f -4 -3 -2 -1",
+            "f 1 2 \\\n 3 4",
+            "f 1 2 3 4\nl 1 2 3\np 1\nl 2 4",
+            "  f 1 2 3 4\r",
+        ] {
             let mesh = read(&format!("# \u{e9}\n{SQUARE}{faces}\n")).expect(faces).mesh;
             assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]], "{faces}");
             assert!(mesh.normals.is_empty() && mesh.uvs.is_empty() && mesh.materials.is_empty());
@@ -381,7 +387,8 @@ mod tests {
 
     #[test]
     fn what_tobj_accepts_is_dropped_and_counted() {
-        let text = format!("{SQUARE}v nan 0 0\nv 1e999 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 2\nf 1\nf 1 1 2\n");
+        let text =
+            format!("{SQUARE}v nan 0 0\nv 1e999 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 2\nf 1\nf 1 1 2\n");
         let loaded = read(&text).expect("one face is good");
         assert_eq!(loaded.dropped, Dropped { non_finite: 2, degenerate: 3 });
         assert_eq!(loaded.mesh.positions.len(), 3);
@@ -390,7 +397,10 @@ mod tests {
     #[test]
     fn errors_name_the_line() {
         assert_eq!(says("v 0 0 0\nv 1 0 0\nf 1 2 3\n"), ":3: vertex 3 is out of range: there are 2, from 1");
-        assert_eq!(says(&format!("{SQUARE}f 1 2 -9\n")), ":5: vertex -9 is out of range: there are 4, from 1");
+        assert_eq!(
+            says(&format!("{SQUARE}f 1 2 -9\n")),
+            ":5: vertex -9 is out of range: there are 4, from 1"
+        );
         assert_eq!(
             says(&format!("{SQUARE}vt 0 0\n\n# x\nf 1/1 2/2 3/1\n")),
             ":8: texture coordinate 2 is out of range: there are 1, from 1"

@@ -182,7 +182,8 @@ impl Reader<'_> {
             match self.cursor.integer() {
                 Some(vertex) if (0..vertices as i64).contains(&vertex) => faces.corner(vertex as u32),
                 Some(vertex) => {
-                    return self.wrong(format!("vertex {vertex} is out of range: there are {vertices}, from 0"));
+                    return self
+                        .wrong(format!("vertex {vertex} is out of range: there are {vertices}, from 0"));
                 }
                 None => return self.unexpected("a vertex"),
             }
@@ -258,8 +259,13 @@ mod tests {
         assert!(says(&format!("{start}3 0 -1 2\n")).starts_with("a.off:7: vertex -1 is out of range"));
         assert!(says(&format!("{start}3 0 1 x\n")).starts_with("a.off:7: expected a vertex, found \"x\""));
         assert!(says(&format!("{start}3 0 1  \n\n")).contains("a face of 3 corners ends after 2"));
-        assert!(says("OFF\n2 1 0\n0 0 0\n0 zero 0 0\n3 0 1 2\n").starts_with("a.off:4: expected a coordinate"));
-        assert!(says("OFF\n2 1 0\n0 0 0\n0 0\n30 0 1 2 3\n").starts_with("a.off:4: expected a coordinate, found the"));
+        assert!(
+            says("OFF\n2 1 0\n0 0 0\n0 zero 0 0\n3 0 1 2\n").starts_with("a.off:4: expected a coordinate")
+        );
+        assert!(
+            says("OFF\n2 1 0\n0 0 0\n0 0\n30 0 1 2 3\n")
+                .starts_with("a.off:4: expected a coordinate, found the")
+        );
         assert!(says("OFF\n1 2 0\n0 0 0\n3 0 0 0\n      \n").contains("after 1 of 2 faces"));
         assert!(says("").contains("empty"));
         assert!(says("solid\n").starts_with("a.off:1: expected OFF, found \"solid\""));

@@ -9,7 +9,8 @@ const CLIPPED_CORNERS: usize = 1024;
 pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) {
     let points: Vec<DVec3> = points.iter().map(|point| point.as_dvec3()).collect();
     let normal = newell_normal(&points);
-    let turns = |a: usize, b: usize, c: usize| (points[b] - points[a]).cross(points[c] - points[a]).dot(normal);
+    let turns =
+        |a: usize, b: usize, c: usize| (points[b] - points[a]).cross(points[c] - points[a]).dot(normal);
     let count = points.len();
     if count == 4 && turns(0, 1, 2).min(turns(0, 2, 3)) <= 0.0 && turns(0, 1, 3).min(turns(1, 2, 3)) > 0.0 {
         emit([0, 1, 3]);

@@ -74,7 +74,9 @@ impl<'a> Cursor<'a> {
         let digits = &rest[usize::from(negative)..];
         let mut value = 0_i64;
         let mut length = 0;
-        while let Some(digit) = digits.get(length).map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10) {
+        while let Some(digit) =
+            digits.get(length).map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10)
+        {
             value = value.checked_mul(10)?.checked_add(i64::from(digit))?;
             length += 1;
         }
@@ -84,7 +86,8 @@ impl<'a> Cursor<'a> {
 
     /// Past a number, if it ends there.
     fn past(&mut self, length: usize) -> bool {
-        let ends = self.bytes.get(self.at + length).is_none_or(|byte| byte.is_ascii_whitespace() || *byte == b'#');
+        let ends =
+            self.bytes.get(self.at + length).is_none_or(|byte| byte.is_ascii_whitespace() || *byte == b'#');
         self.at += if ends { length } else { 0 };
         ends
     }

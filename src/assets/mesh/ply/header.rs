@@ -123,12 +123,17 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
     Err(source.wrong("the header has no end_header"))
 }
 
-fn statement(words: &[&str], encoding: &mut Option<Encoding>, elements: &mut Vec<Element>) -> Result<(), String> {
+fn statement(
+    words: &[&str],
+    encoding: &mut Option<Encoding>,
+    elements: &mut Vec<Element>,
+) -> Result<(), String> {
     match *words {
         [] | ["comment" | "obj_info", ..] => {}
         ["format", name, ..] => *encoding = Some(named_encoding(name)?),
         ["element", name, count] => {
-            let count = count.parse().map_err(|_| format!("{} is no number of {name}", shown(count.as_bytes())))?;
+            let count =
+                count.parse().map_err(|_| format!("{} is no number of {name}", shown(count.as_bytes())))?;
             elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
         }
         ["property", ref words @ ..] => {
@@ -153,8 +158,9 @@ fn named_encoding(name: &str) -> Result<Encoding, String> {
 }
 
 fn property(words: &[&str]) -> Result<Property, String> {
-    let scalar =
-        |name: &str| Scalar::named(name).ok_or_else(|| format!("{} is no type of PLY", shown(name.as_bytes())));
+    let scalar = |name: &str| {
+        Scalar::named(name).ok_or_else(|| format!("{} is no type of PLY", shown(name.as_bytes())))
+    };
     let (kind, name) = match *words {
         ["list", count, item, name] => {
             let count = scalar(count)?;

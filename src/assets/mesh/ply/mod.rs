@@ -45,7 +45,8 @@ impl Place<'_> {
 
 fn read(source: &Source<'_>, header: &Header, mut numbers: impl Numbers) -> Result<Parsed, AssetError> {
     let place = Place { source, encoding: header.encoding };
-    let count_of = |name: &str| header.elements.iter().filter(|e| e.name == name).map(|e| e.count).sum::<u64>();
+    let count_of =
+        |name: &str| header.elements.iter().filter(|e| e.name == name).map(|e| e.count).sum::<u64>();
     let vertices = count_of("vertex");
     if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
         return Err(source.wrong(format!("{vertices} vertices are too many, or in more than one element")));
@@ -69,12 +70,19 @@ fn read(source: &Source<'_>, header: &Header, mut numbers: impl Numbers) -> Resu
 }
 
 /// A header that claims more than the file can hold is refused before anything is allocated.
-fn plausible(source: &Source<'_>, element: &Element, encoding: Encoding, at: usize) -> Result<(), AssetError> {
+fn plausible(
+    source: &Source<'_>,
+    element: &Element,
+    encoding: Encoding,
+    at: usize,
+) -> Result<(), AssetError> {
     let needed = element.count.saturating_mul(element.least_bytes(encoding));
     let remaining = (source.bytes.len() - at) as u64;
     if needed > remaining + 1 {
         let Element { name, count, .. } = element;
-        return Err(source.wrong(format!("the header claims {count} of {name}, and only {remaining} bytes follow")));
+        return Err(
+            source.wrong(format!("the header claims {count} of {name}, and only {remaining} bytes follow"))
+        );
     }
     Ok(())
 }
@@ -135,8 +143,11 @@ fn read_vertices(
     parsed: &mut Parsed,
 ) -> Result<(), AssetError> {
     let target = |kind: Kind, name: &str| if matches!(kind, Kind::One(_)) { slot(name) } else { None };
-    let layout: Vec<(Kind, Option<usize>)> =
-        element.properties.iter().map(|property| (property.kind, target(property.kind, &property.name))).collect();
+    let layout: Vec<(Kind, Option<usize>)> = element
+        .properties
+        .iter()
+        .map(|property| (property.kind, target(property.kind, &property.name)))
+        .collect();
     let has = |slots: &[usize]| slots.iter().all(|slot| layout.iter().any(|(_, to)| *to == Some(*slot)));
     if !has(&[0, 1, 2]) {
         return Err(place.source.wrong("the vertices have no x, y and z"));
@@ -177,7 +188,9 @@ fn read_faces(
         .properties
         .iter()
         .position(|property| ["vertex_indices", "vertex_index"].contains(&property.name.as_str()))
-        .filter(|&place| matches!(element.properties[place].kind, Kind::List { item, .. } if item.is_whole()));
+        .filter(
+            |&place| matches!(element.properties[place].kind, Kind::List { item, .. } if item.is_whole()),
+        );
     let Some(corners) = corners else {
         return Err(place.source.wrong("the faces have no list of whole numbers `vertex_indices`"));
     };

@@ -76,7 +76,10 @@ fn wild(big_endian: bool) -> Vec<u8> {
 #[test]
 fn binary_of_both_orders_and_all_types() {
     let mesh = read_bytes(&wild(false)).expect("little").mesh;
-    assert_eq!(mesh.positions, [Vec3::new(0., 0., 0.25), Vec3::new(2.5, 0., 0.25), Vec3::new(0., -300., 0.25)]);
+    assert_eq!(
+        mesh.positions,
+        [Vec3::new(0., 0., 0.25), Vec3::new(2.5, 0., 0.25), Vec3::new(0., -300., 0.25)]
+    );
     assert_eq!(mesh.triangles, [[0, 2, 1]]);
     assert_eq!(mesh.normals, [Vec3::NEG_Z; 3]);
     assert_eq!(mesh.uvs, [Vec2::new(0.75, 1.0); 3]);
@@ -102,15 +105,22 @@ fn faces_may_come_before_vertices() {
 
 #[test]
 fn errors_name_line_or_face() {
-    assert!(says(&ascii(&format!("{SQUARE}3 0 1 4\n"))).starts_with("a.ply:15: face 1: vertex 4 is out of range"));
-    assert!(says(&ascii("0 0 0\n1 x 0\n0 0 0\n0 0 0\n3 0 1 2\n")).contains("a.ply:12: vertex 2: expected a number"));
+    assert!(
+        says(&ascii(&format!("{SQUARE}3 0 1 4\n"))).starts_with("a.ply:15: face 1: vertex 4 is out of range")
+    );
+    assert!(
+        says(&ascii("0 0 0\n1 x 0\n0 0 0\n0 0 0\n3 0 1 2\n"))
+            .contains("a.ply:12: vertex 2: expected a number")
+    );
     assert!(says(&ascii(&format!("{SQUARE}-3 0 1 2\n"))).contains("it claims -3 corners"));
     let mut binary = wild(false);
     let last = binary.len() - 2;
     binary[last] = 9;
     assert_eq!(says(&binary), "a.ply: face 1: vertex 9 is out of range: there are 3, from 0");
     assert!(says(b"plx\n").starts_with("a.ply:1: expected ply, found \"plx\""));
-    assert!(says(b"ply\nformat ascii 1.0\nelement vertex many\n").starts_with("a.ply:3: \"many\" is no number"));
+    assert!(
+        says(b"ply\nformat ascii 1.0\nelement vertex many\n").starts_with("a.ply:3: \"many\" is no number")
+    );
     assert!(says(b"ply\nproperty float x\n").contains("a.ply:2: a property before"));
     assert!(says(b"ply\nformat utf8 1.0\n").contains("a.ply:2: the format is ascii"));
     assert!(says(b"ply\nelement v 1\nproperty half x\n").contains("a.ply:3: \"half\" is no type"));
