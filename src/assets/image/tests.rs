@@ -165,7 +165,7 @@ fn progress_moves_and_ends_at_the_length() {
     assert_eq!(seen.last(), Some(&(file.len() as u64, file.len() as u64)));
     let stop = |done, _| {
         if done > 100_000 {
-            token.cancel()
+            token.cancel();
         }
     };
     let result = load(&path, ImageEncoding::Color, ImageLimits::default(), &stop, &token);

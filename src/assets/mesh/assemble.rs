@@ -178,10 +178,8 @@ fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     if !new_index.contains(&u32::MAX) {
         return;
     }
-    let mut kept = 0;
-    for index in new_index.iter_mut().filter(|index| **index == 0) {
+    for (kept, index) in (0_u32..).zip(new_index.iter_mut().filter(|index| **index == 0)) {
         *index = kept;
-        kept += 1;
     }
     retain_used(&mut mesh.positions, &new_index);
     retain_used(&mut mesh.normals, &new_index);

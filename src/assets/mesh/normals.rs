@@ -1,8 +1,6 @@
 //! Vertex normals where a file has none: each face counts by its angle at the vertex (Thürmer and Wüthrich,
 //! *Computing Vertex Normals from Polygonal Facets*, JGT 1998), so that how a surface is cut does not show.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
 use crate::geometry::mesh::TriangleMesh;
@@ -29,7 +27,8 @@ pub fn smooth_normals(mesh: &mut TriangleMesh) {
 pub fn vertex_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
     let sums = weighted_sums(mesh);
     let mut joined = sums.clone();
-    for group in shared_places(mesh) {
+    for group in by_place(mesh).chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1) {
+        let group: Vec<u32> = group.iter().map(|(_, vertex)| *vertex).collect();
         join(&group, &sums, &mut joined);
     }
     let mut normals: Vec<Vec3> =
@@ -82,26 +81,15 @@ fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     (cross / doubled_area, [angle(a, b, c), angle(b, c, a), angle(c, a, b)])
 }
 
-/// The vertices at each place that has more than one.
-fn shared_places(mesh: &TriangleMesh) -> Vec<Vec<u32>> {
+/// Every vertex behind the bits of its place, so that those at one place follow each other.
+fn by_place(mesh: &TriangleMesh) -> Vec<([u32; 3], u32)> {
     // Adding 0 makes −0 and 0 one place.
-    let key = |position: &Vec3| (*position + Vec3::ZERO).to_array().map(f32::to_bits);
-    let mut first = HashMap::with_capacity(mesh.positions.len());
-    let mut groups: Vec<Vec<u32>> = Vec::new();
-    let mut group_of = HashMap::new();
-    for (vertex, position) in (0_u32..).zip(&mesh.positions) {
-        let key = key(position);
-        let Some(&other) = first.get(&key) else {
-            first.insert(key, vertex);
-            continue;
-        };
-        let group = *group_of.entry(other).or_insert_with(|| {
-            groups.push(vec![other]);
-            groups.len() - 1
-        });
-        groups[group].push(vertex);
-    }
-    groups
+    let place = |position: Vec3| (position + Vec3::ZERO).to_array().map(f32::to_bits);
+    let mut order: Vec<_> = (0..mesh.positions.len() as u32)
+        .map(|vertex| (place(mesh.positions[vertex as usize]), vertex))
+        .collect();
+    order.par_sort_unstable();
+    order
 }
 
 fn join(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
@@ -124,12 +112,10 @@ fn take_face_normals(mesh: &TriangleMesh, normals: &mut [Vec3]) {
     for triangle in &mesh.triangles {
         if triangle.iter().any(|&vertex| normals[vertex as usize] == Vec3::ZERO) {
             let (normal, _) = corner_weights(triangle.map(|vertex| mesh.positions[vertex as usize]));
-            let missing = triangle.iter().filter(|&&vertex| normals[vertex as usize] == Vec3::ZERO);
-            missing
-                .copied()
-                .collect::<Vec<_>>()
-                .into_iter()
-                .for_each(|v| normals[v as usize] = normal.as_vec3());
+            for &vertex in triangle {
+                let own = &mut normals[vertex as usize];
+                *own = if *own == Vec3::ZERO { normal.as_vec3() } else { *own };
+            }
         }
     }
     normals.iter_mut().filter(|normal| **normal == Vec3::ZERO).for_each(|normal| *normal = Vec3::Y);

@@ -105,7 +105,7 @@ impl Read for Chunks<'_> {
 impl BufRead for Chunks<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         let end = (self.at / CHUNK + 1) * CHUNK;
-        if self.at % CHUNK == 0 {
+        if self.at.is_multiple_of(CHUNK) {
             let at = self.at.min(self.source.bytes.len());
             self.stopped.set(self.stopped.get() || self.source.tick(at).is_err());
         }

@@ -20,25 +20,25 @@ pub(super) trait Numbers {
 pub(super) struct Ascii<'a>(pub(super) Cursor<'a>);
 
 impl Ascii<'_> {
-    fn to_word(&mut self) -> Result<(), String> {
+    fn seek_word(&mut self) -> Result<(), String> {
         if self.0.skip_blank() { Ok(()) } else { Err("the file ends here".to_owned()) }
     }
 }
 
 impl Numbers for Ascii<'_> {
     fn float(&mut self, _: Scalar) -> Result<f32, String> {
-        self.to_word()?;
+        self.seek_word()?;
         self.0.float().ok_or_else(|| format!("expected a number, found {}", shown(self.0.word())))
     }
 
     fn integer(&mut self, _: Scalar) -> Result<i64, String> {
-        self.to_word()?;
+        self.seek_word()?;
         self.0.integer().ok_or_else(|| format!("expected a whole number, found {}", shown(self.0.word())))
     }
 
     fn skip(&mut self, _: Scalar, count: usize) -> Result<(), String> {
         for _ in 0..count {
-            self.to_word()?;
+            self.seek_word()?;
             self.0.word();
         }
         Ok(())
