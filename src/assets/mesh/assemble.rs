@@ -1,5 +1,7 @@
 //! What a parser found → a mesh that keeps the invariants.
 
+use rayon::prelude::*;
+
 use super::Source;
 use super::normals::fill_missing_normals;
 use super::polygon::triangulate;
@@ -102,6 +104,9 @@ struct Cutter<'a> {
 
 impl Cutter<'_> {
     fn cut_all(&mut self, source: &Source<'_>, faces: &Faces) -> Result<(), AssetError> {
+        if self.take_as_they_are(faces) {
+            return Ok(());
+        }
         self.triangles.reserve(faces.len());
         let mut from = 0;
         for face in 0..faces.len() {
@@ -123,6 +128,25 @@ impl Cutter<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The common case, in parallel: triangles only, and all of them good.
+    fn take_as_they_are(&mut self, faces: &Faces) -> bool {
+        let (triangles, _) = faces.corners.as_chunks();
+        let in_range = |corner: &u32| (*corner as usize) < self.positions.len();
+        let good = |triangle: &[u32; 3]| {
+            let points = || triangle.map(|corner| self.positions[corner as usize]);
+            triangle.iter().all(in_range)
+                && points().iter().all(|point| point.is_finite())
+                && has_area(points())
+        };
+        let all =
+            faces.arities.is_empty() && triangles.len() <= MOST_TRIANGLES && triangles.par_iter().all(good);
+        if all {
+            self.triangles = triangles.to_vec();
+            self.triangle_materials = self.materials.to_vec();
+        }
+        all
     }
 
     /// Add a face's triangles, or count why it has none.
