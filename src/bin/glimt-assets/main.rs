@@ -140,6 +140,23 @@ mod tests {
     }
 
     #[test]
+    fn the_scenes_name_files_that_are_made_here() {
+        let scenes = folder().with_file_name("scenes");
+        let mut named = 0;
+        for entry in fs::read_dir(&scenes).expect("the scenes") {
+            let text = fs::read_to_string(entry.expect("an entry").path()).expect("a scene");
+            let files = text
+                .lines()
+                .filter_map(|line| line.strip_prefix("file = ").or(line.strip_prefix("orbiter = ")));
+            for file in files.map(|file| file.trim_matches('"')) {
+                assert!(file == "../assets/million.ply" || scenes.join(file).is_file(), "{file}");
+                named += 1;
+            }
+        }
+        assert!(named >= 10, "{named}");
+    }
+
+    #[test]
     fn a_million_is_more_than_a_million() {
         assert!(shapes::million().triangle_count() >= 1_000_000);
     }
