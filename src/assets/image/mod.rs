@@ -2,6 +2,7 @@
 
 mod convert;
 mod counting;
+mod jpeg;
 
 use std::io::BufReader;
 use std::path::Path;
@@ -48,7 +49,7 @@ impl Default for ImageLimits {
 /// Read an image: PNG, JPEG, PNM, TGA, BMP, HDR, EXR, WebP, told by its first bytes, else by its ending.
 ///
 /// Grey becomes RGB, alpha is left out, a camera's note on orientation is followed; texels that are negative or
-/// not finite become 0. 16-bit and float files give linear floats. Progress is in bytes of the file.
+/// not finite become 0. A JPEG that is cut short is an error. 16-bit and float files give linear floats. Progress is in bytes of the file.
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], [`AssetError::Malformed`] where the content is not what it says or beyond the
@@ -68,7 +69,7 @@ pub fn load(
     }
     watch.tick(0, length as usize)?;
     let reader = BufReader::new(Counting::new(file, length, watch));
-    let texels = contain(|| Ok(convert::texels(decode(path, reader, limits)?, encoding)));
+    let texels = contain(|| Ok(convert::texels(decode(path, reader, length, limits)?, encoding)));
     token.check()?;
     let texels =
         texels.unwrap_or_else(|panic| Err(format!("the decoder gave up: {panic}"))).map_err(wrong)?;
@@ -79,12 +80,17 @@ pub fn load(
 fn decode(
     path: &Path,
     reader: BufReader<Counting<'_, std::fs::File>>,
+    length: u64,
     limits: ImageLimits,
 ) -> Result<DynamicImage, String> {
     let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
     if reader.format().is_none() {
         let format = ImageFormat::from_path(path).map_err(|_| unknown_format())?;
         reader.set_format(format);
+    }
+    let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
+    if is_jpeg {
+        jpeg::check_whole(path, FILE_LIMIT)?;
     }
     let mut decoder_limits = Limits::default();
     decoder_limits.max_image_width = Some(limits.side);
@@ -94,6 +100,9 @@ fn decode(
     let mut decoder = reader.into_decoder().map_err(|error| reason(&error))?;
     let (width, height) = decoder.dimensions();
     check_size(&decoder, limits)?;
+    if is_jpeg {
+        jpeg::check_plausible(width, height, length)?;
+    }
     let orientation = decoder.orientation().map_err(|error| reason(&error))?;
     let image = DynamicImage::from_decoder(decoder);
     let mut image =

@@ -130,6 +130,22 @@ fn lies_about_the_size_are_errors_that_name_the_file() {
 }
 
 #[test]
+fn a_jpeg_that_is_cut_or_lies_is_an_error() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jpg");
+    save_buffer(&path, &[90; 32 * 32 * 3], 32, 32, ExtendedColorType::Rgb8).expect("written");
+    let whole = fs::read(&path).expect("read");
+    let texels = load_with(&path, ImageEncoding::Color).expect("whole");
+    assert_eq!((texels.width, texels.height), (32, 32));
+    assert!(says("a.jpg", &whole[..whole.len() - 2]).contains("a.jpg: the file ends before the image does"));
+    // Height and width follow the start of the frame by 5 bytes.
+    let frame = whole.windows(2).position(|pair| pair == [0xff, 0xc0]).expect("a baseline JPEG");
+    let mut lying = whole;
+    lying[frame + 5..frame + 9].copy_from_slice(&[0x3e, 0x80, 0x3e, 0x80]);
+    assert!(says("a.jpg", &lying).contains("a.jpg: it claims 16000 × 16000 pixels, which"));
+}
+
+#[test]
 fn the_memory_limit_holds() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
