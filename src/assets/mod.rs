@@ -1,8 +1,12 @@
 //! Bytes → meshes, textures and cameras. Every error names the file and, where it has lines, the line.
 
-pub mod normals;
+pub mod contain;
+pub mod image;
+pub mod mesh;
+pub mod orbiter;
+mod read;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
@@ -31,6 +35,16 @@ pub enum AssetError {
     /// The work was told to stop.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
+}
+
+impl AssetError {
+    pub(crate) fn unreadable(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Unreadable { path: path.to_owned(), reason: reason.into() }
+    }
+
+    pub(crate) fn malformed(path: &Path, line: Option<usize>, reason: impl Into<String>) -> Self {
+        Self::Malformed { path: path.to_owned(), line, reason: reason.into() }
+    }
 }
 
 /// A mesh file's content.
