@@ -63,6 +63,11 @@ fn add_declared(parsed: &Parsed, wanted: &mut Vec<NeededTexture>) {
             Encoding::Linear => SourceEncoding::Linear,
         };
         let source = TextureSource { path: texture.file.value.clone(), encoding };
-        wanted.push(NeededTexture { source, name: texture.name.clone(), declared: Some(index), mesh_file: None });
+        wanted.push(NeededTexture {
+            source,
+            name: texture.name.clone(),
+            declared: Some(index),
+            mesh_file: None,
+        });
     }
 }

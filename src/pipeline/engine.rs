@@ -83,6 +83,9 @@ impl Engine {
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
         let outcome = self.run(request, sink, meanwhile, &mut findings);
+        if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
+            self.find_named(diagnostics, &request.scene, &mut findings, meanwhile.token);
+        }
         self.say_files(&findings, sink);
         self.sweep(outcome.is_ok());
         sink.send(match outcome {
@@ -134,9 +137,8 @@ impl Engine {
         token: &CancelToken,
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
-        let parsed = table.run(Stage::Parse, || {
-            parse(&request.scene, &self.contents, &mut self.parsed, findings, token)
-        })?;
+        let parsed = table
+            .run(Stage::Parse, || parse(&request.scene, &self.contents, &mut self.parsed, findings, token))?;
         let plan = plan(parsed.loaded.scene.clone(), &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![error])))?;
         let settings = Box::new(plan.effective.clone());
@@ -169,14 +171,13 @@ impl Engine {
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, &reading))?;
         let needed = needed(loaded, &found);
-        let texels =
-            table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, &reading))?;
+        let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, &reading))?;
         self.assets = findings.files.clone();
         if findings.errors.is_empty() {
             self.say_files(findings, table.sink);
             Ok((found, texels))
         } else {
-            Err(Stop::Failed(std::mem::take(findings).into_failure()))
+            Err(Stop::Failed(findings.take_failure()))
         }
     }
 
@@ -247,7 +248,7 @@ impl Engine {
     ) -> Result<Report, Stop> {
         let Some(canvas) = &self.canvas else { return Err(Stop::work("the film is gone")) };
         let (plan, world) = (&ready.plan, &ready.world.1);
-        let (min, mean, max) = canvas.film.samples();
+        let samples = canvas.film.samples();
         let outputs: &[PathBuf] = if request.write { &plan.outputs } else { &[] };
         let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         Ok(Report {
@@ -258,7 +259,7 @@ impl Engine {
                 paths,
                 width: plan.settings.width,
                 height: plan.settings.height,
-                samples: SampleCounts { min, mean, max },
+                samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
                 complete: canvas.is_complete(plan.samples),
             },
             settings: plan.effective.clone(),
@@ -292,6 +293,28 @@ impl Engine {
         sink.files(files);
     }
 
+    /// A scene may be broken because it names a file that is not there: what the errors underline is watched as
+    /// if it were a file's name, so that its coming is noticed.
+    fn find_named(
+        &self,
+        diagnostics: &[Diagnostic],
+        scene: &Path,
+        findings: &mut Findings,
+        token: &CancelToken,
+    ) {
+        let folder = scene.parent().unwrap_or(Path::new(""));
+        for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
+            let text = place.source.get(place.span.clone()).unwrap_or("").trim_matches(['"', '\'']);
+            if text.is_empty() || text.len() > 255 || text.contains(['\n', '\0']) {
+                continue;
+            }
+            let path = folder.join(text);
+            if let Ok(content) = self.contents.read(&path, token) {
+                findings.read(FileRead { path, content });
+            }
+        }
+    }
+
     fn sweep(&mut self, success: bool) {
         self.meshes.sweep(success);
         self.textures.sweep(success);
@@ -322,7 +345,7 @@ impl Engine {
             Ok((parsed, found, texels)) if findings.errors.is_empty() => {
                 Ok((parsed, found, texels, findings.warnings))
             }
-            Ok(_) => Err(findings.into_failure()),
+            Ok(_) => Err(findings.take_failure()),
             Err(Stop::Failed(failure)) => Err(failure),
             Err(Stop::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }

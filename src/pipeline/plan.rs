@@ -170,8 +170,13 @@ mod tests {
         let text = "[render]\nwidth = 32\nheight = 24\nsamples = 4\n";
         let given = planned(text, &Overrides::default());
         assert_eq!((given.settings.width, given.settings.height, given.samples), (32, 24, 4));
-        let overrides =
-            Overrides { width: Some(8), samples: Some(2), threads: Some(3), seed: Some(9), ..Default::default() };
+        let overrides = Overrides {
+            width: Some(8),
+            samples: Some(2),
+            threads: Some(3),
+            seed: Some(9),
+            ..Default::default()
+        };
         let changed = planned(text, &overrides);
         assert_eq!((changed.settings.width, changed.settings.height, changed.samples), (8, 24, 2));
         assert_eq!((changed.threads, changed.settings.seed, changed.scene.render.width), (3, 9, 8));

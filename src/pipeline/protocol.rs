@@ -8,7 +8,6 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-
 use super::settings::Overrides;
 use super::watch::content::FileRead;
 use crate::film::Picture;

@@ -28,9 +28,10 @@ pub mod scene {
             &self,
             span: Range<usize>,
             severity: Severity,
-            message: String,
+            message: impl Into<String>,
             help: Option<String>,
         ) -> Diagnostic {
+            let message = message.into();
             let place = Some(Place { source: self.source.clone(), span, label: String::new() });
             Diagnostic { severity, message, path: self.path.clone(), place, help }
         }
@@ -43,17 +44,17 @@ pub mod scene {
 
     pub mod sanitize {
         pub fn visible(text: &str) -> std::borrow::Cow<'_, str> {
-            text.chars().map(|c| if c.is_control() && c != '\n' { '\u{fffd}' } else { c }).collect::<String>().into()
+            text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect::<String>().into()
         }
     }
 
-    pub mod diagnostic {
+    pub mod report {
         use crate::scene::diagnostic::{Diagnostic, Severity};
 
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Style {
             Plain,
-            Colored,
+            Ansi,
         }
 
         pub fn render(diagnostics: &[Diagnostic], _width: usize, _style: Style) -> String {
@@ -83,7 +84,10 @@ pub mod scene {
         let source: Arc<str> = text.as_str().into();
         let table = DeTable::parse(&text).map_err(|error| {
             let span = error.span().unwrap_or(0..0);
-            fail(error.message().to_owned(), Some(Place { source: source.clone(), span, label: String::new() }))
+            fail(
+                error.message().to_owned(),
+                Some(Place { source: source.clone(), span, label: String::new() }),
+            )
         })?;
         let scene = lower(table.get_ref(), path).map_err(|(message, span)| {
             fail(message, Some(Place { source: source.clone(), span, label: String::new() }))
@@ -139,8 +143,18 @@ pub mod scene {
     }
 
     fn lower(root: &DeTable<'_>, path: &Path) -> Result<Scene, Wrong> {
-        let known =
-            ["render", "camera", "photons", "textures", "materials", "sphere", "mesh", "light", "quad", "plane"];
+        let known = [
+            "render",
+            "camera",
+            "photons",
+            "textures",
+            "materials",
+            "sphere",
+            "mesh",
+            "light",
+            "quad",
+            "plane",
+        ];
         for (key, _) in root.iter() {
             if !known.contains(&key.get_ref().as_ref()) {
                 return Err((format!("unknown key `{}`", key.get_ref()), key.span()));
@@ -269,7 +283,11 @@ pub mod assets {
         use crate::geometry::mesh::TriangleMesh;
         use crate::math::Vec3;
 
-        pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
+        pub fn load(
+            path: &Path,
+            progress: Progress<'_>,
+            token: &CancelToken,
+        ) -> Result<LoadedMesh, AssetError> {
             token.check()?;
             let text = std::fs::read_to_string(path)
                 .map_err(|e| AssetError::Unreadable { path: path.to_owned(), reason: e.to_string() })?;
@@ -352,8 +370,7 @@ pub mod world {
                 continue;
             };
             let texture = &scene.textures[*index];
-            let source =
-                TextureSource { path: texture.file.value.clone(), encoding: SourceEncoding::Color };
+            let source = TextureSource { path: texture.file.value.clone(), encoding: SourceEncoding::Color };
             if needed.iter().all(|other| other.source != source) {
                 let name = texture.name.clone();
                 needed.push(NeededTexture { source, name, declared: Some(*index), mesh_file: None });
@@ -400,6 +417,8 @@ pub mod integrators {
 
 pub mod film {
     use crate::film::{RadianceImage, Rect, TileSamples};
+    use std::sync::{Mutex, MutexGuard, PoisonError};
+
     use crate::math::{DVec3, Vec3};
 
     pub mod tone {
@@ -427,16 +446,23 @@ pub mod film {
         }
     }
 
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SampleStats {
+        pub min: u32,
+        pub mean: f64,
+        pub max: u32,
+    }
+
     #[derive(Debug, thiserror::Error)]
     #[error("no memory for a picture of {0}×{1} pixels")]
     pub struct FilmError(u32, u32);
 
-    #[derive(Clone, Debug)]
+    #[derive(Debug)]
     pub struct Film {
         width: u32,
         height: u32,
         area: Rect,
-        sums: Vec<(DVec3, u32)>,
+        sums: Mutex<Vec<(DVec3, u32)>>,
     }
 
     const TILE: u32 = 16;
@@ -447,38 +473,52 @@ pub mod film {
             let pixels = width as usize * height as usize;
             sums.try_reserve_exact(pixels).map_err(|_| FilmError(width, height))?;
             sums.resize(pixels, (DVec3::ZERO, 0));
-            Ok(Self { width, height, area: crop.unwrap_or(Rect { x: 0, y: 0, width, height }), sums })
+            Ok(Self {
+                width,
+                height,
+                area: crop.unwrap_or(Rect { x: 0, y: 0, width, height }),
+                sums: Mutex::new(sums),
+            })
+        }
+
+        fn sums(&self) -> MutexGuard<'_, Vec<(DVec3, u32)>> {
+            self.sums.lock().unwrap_or_else(PoisonError::into_inner)
         }
 
         pub fn tile_count(&self) -> usize {
             self.area.width.div_ceil(TILE) as usize * self.area.height.div_ceil(TILE) as usize
         }
 
-        pub fn tile_rect(&self, i: usize) -> Rect {
+        pub fn tile_order(&self) -> Vec<usize> {
+            (0..self.tile_count()).rev().collect()
+        }
+
+        pub fn tile_rect(&self, i: usize) -> Option<Rect> {
             let across = self.area.width.div_ceil(TILE);
             let (x, y) = (i as u32 % across * TILE, i as u32 / across * TILE);
-            Rect {
+            (i < self.tile_count()).then(|| Rect {
                 x: self.area.x + x,
                 y: self.area.y + y,
                 width: TILE.min(self.area.width - x),
                 height: TILE.min(self.area.height - y),
-            }
+            })
         }
 
-        pub fn add(&mut self, _tile: usize, samples: &TileSamples) {
+        pub fn add(&self, _tile: usize, samples: &TileSamples) {
+            let mut sums = self.sums();
             for (i, values) in samples.radiance.chunks(samples.samples as usize).enumerate() {
                 let (x, y) = (i as u32 % samples.rect.width, i as u32 / samples.rect.width);
                 let at = (samples.rect.y + y) as usize * self.width as usize + (samples.rect.x + x) as usize;
                 for value in values {
-                    self.sums[at].0 += value.as_dvec3();
-                    self.sums[at].1 += 1;
+                    sums[at].0 += value.as_dvec3();
+                    sums[at].1 += 1;
                 }
             }
         }
 
         pub fn radiance(&self) -> RadianceImage {
             let mean = |(sum, count): &(DVec3, u32)| (*sum / f64::from((*count).max(1))).as_vec3();
-            let pixels = self.sums.iter().map(mean).collect();
+            let pixels = self.sums().iter().map(mean).collect();
             RadianceImage { width: self.width, height: self.height, pixels }
         }
 
@@ -487,7 +527,7 @@ pub mod film {
             for y in 0..height {
                 for x in 0..width {
                     let at = (y * self.height / height * self.width + x * self.width / width) as usize;
-                    let (sum, count) = self.sums[at];
+                    let (sum, count) = self.sums()[at];
                     let fallback = base.map_or(Vec3::ZERO, |b| b.pixels[(y * width + x) as usize]);
                     pixels.push(if count == 0 { fallback } else { (sum / f64::from(count)).as_vec3() });
                 }
@@ -495,7 +535,8 @@ pub mod film {
             RadianceImage { width, height, pixels }
         }
 
-        pub fn samples(&self) -> (u32, f64, u32) {
+        pub fn samples(&self) -> SampleStats {
+            let sums = self.sums();
             let inside = |i: &usize| {
                 let (x, y) = (*i as u32 % self.width, *i as u32 / self.width);
                 x >= self.area.x
@@ -503,10 +544,10 @@ pub mod film {
                     && x < self.area.x + self.area.width
                     && y < self.area.y + self.area.height
             };
-            let counts: Vec<u32> = (0..self.sums.len()).filter(inside).map(|i| self.sums[i].1).collect();
+            let counts: Vec<u32> = (0..sums.len()).filter(inside).map(|i| sums[i].1).collect();
             let sum: f64 = counts.iter().map(|c| f64::from(*c)).sum();
             let (min, max) = (counts.iter().min().copied(), counts.iter().max().copied());
-            (min.unwrap_or(0), sum / counts.len() as f64, max.unwrap_or(0))
+            SampleStats { min: min.unwrap_or(0), mean: sum / counts.len() as f64, max: max.unwrap_or(0) }
         }
 
         pub fn non_finite_samples(&self) -> u64 {
@@ -526,9 +567,23 @@ pub mod output {
         Png,
         Exr,
         Hdr,
-        Jpg,
+        Jpeg,
         Ppm,
-        Webp,
+    }
+
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    pub enum BitDepth {
+        #[default]
+        Eight,
+        Sixteen,
+    }
+
+    impl TryFrom<u8> for BitDepth {
+        type Error = OutputError;
+
+        fn try_from(bits: u8) -> Result<Self, OutputError> {
+            Ok(if bits == 16 { Self::Sixteen } else { Self::Eight })
+        }
     }
 
     #[derive(Debug, thiserror::Error)]
@@ -539,16 +594,19 @@ pub mod output {
     }
 
     impl Format {
-        pub fn from_path(path: &Path) -> Result<Self, OutputError> {
+        pub fn check_picture(self, _width: u32, _height: u32, _depth: BitDepth) -> Result<(), OutputError> {
+            Ok(())
+        }
+
+        pub fn of(path: &Path) -> Result<Self, OutputError> {
             match path.extension().and_then(|e| e.to_str()).unwrap_or("") {
                 "png" => Ok(Self::Png),
                 "exr" => Ok(Self::Exr),
                 "hdr" => Ok(Self::Hdr),
-                "jpg" => Ok(Self::Jpg),
+                "jpg" => Ok(Self::Jpeg),
                 "ppm" => Ok(Self::Ppm),
-                "webp" => Ok(Self::Webp),
                 _ => {
-                    let reason = "unknown ending; known are png, exr, hdr, jpg, ppm, webp".to_owned();
+                    let reason = "unknown ending; known are png, exr, hdr, jpg, ppm".to_owned();
                     Err(OutputError { path: path.to_owned(), reason })
                 }
             }
@@ -557,26 +615,30 @@ pub mod output {
 
     #[derive(Clone, Debug)]
     pub struct EncodeOptions {
-        pub format: Format,
         pub tone: ToneMapping,
-        pub bit_depth: u8,
+        pub bit_depth: BitDepth,
         pub metadata: Vec<(String, String)>,
     }
 
-    pub fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, OutputError> {
+    pub fn encode(
+        image: &RadianceImage,
+        options: &EncodeOptions,
+        _format: Format,
+    ) -> Result<Vec<u8>, OutputError> {
         let picture = develop(image, &options.tone);
         let mut bytes = format!("P6 {} {} 255\n", picture.width, picture.height).into_bytes();
         bytes.extend(picture.pixels.iter().flatten());
         Ok(bytes)
     }
 
-    pub fn check_target(path: &Path) -> Result<(), OutputError> {
+    pub fn check_target(path: &Path) -> Result<Format, OutputError> {
+        let format = Format::of(path)?;
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if path.is_dir() || !folder.is_dir() {
             let reason = "the folder does not exist, or the name is a folder".to_owned();
             return Err(OutputError { path: path.to_owned(), reason });
         }
-        Ok(())
+        Ok(format)
     }
 
     pub mod write {
@@ -592,5 +654,56 @@ pub mod output {
             std::fs::write(&temporary, bytes).map_err(failed)?;
             std::fs::rename(&temporary, path).map_err(failed)
         }
+    }
+}
+
+pub mod tui {
+    use std::path::PathBuf;
+    use std::sync::mpsc::Receiver;
+    use std::time::Instant;
+
+    use crate::pipeline::protocol::{Command, Event, PreviewSlot};
+    use crate::pipeline::settings::Overrides;
+
+    pub enum ColorChoice {
+        Auto,
+        TrueColor,
+        Indexed256,
+        Ansi16,
+        None,
+    }
+
+    pub enum PreviewChoice {
+        Auto,
+        HalfBlock,
+        Ascii,
+        None,
+    }
+
+    pub struct Changed {
+        pub noticed: Instant,
+    }
+
+    pub struct Options {
+        pub scene: PathBuf,
+        pub overrides: Overrides,
+        pub color: ColorChoice,
+        pub preview: PreviewChoice,
+        pub cell_aspect: Option<f32>,
+        pub commands: Box<dyn FnMut(Command)>,
+        pub events: Receiver<Event>,
+        pub previews: PreviewSlot,
+        pub changes: Receiver<Changed>,
+    }
+
+    pub struct ExitStatus(pub u8);
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("standard output is not a terminal: use `--once` to render without one")]
+    pub struct TuiError;
+
+    #[allow(clippy::needless_pass_by_value)]
+    pub fn run(_options: Options) -> Result<ExitStatus, TuiError> {
+        Err(TuiError)
     }
 }

@@ -64,8 +64,13 @@ impl Tracer<'_> {
                 scope.spawn(move |_| {
                     while !stopped.load(Ordering::Relaxed)
                         && let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed))
-                        && let Ok((samples, rays)) =
-                            (self.kernel)(self.world, self.settings, job.rect, job.samples.clone(), self.token)
+                        && let Ok((samples, rays)) = (self.kernel)(
+                            self.world,
+                            self.settings,
+                            job.rect,
+                            job.samples.clone(),
+                            self.token,
+                        )
                         && sender.send((job, samples, rays)).is_ok()
                     {}
                 });

@@ -65,8 +65,7 @@ pub(in crate::pipeline) fn accel(
     }
     let (trees, kept) = trees(from.meshes, cache, reading)?;
     let built = trees.len() - kept;
-    let parts =
-        Parts { meshes: trees, textures: from.textures.texels.clone(), orbiter: from.parsed.orbiter };
+    let parts = Parts { meshes: trees, textures: from.textures.texels.clone(), orbiter: from.parsed.orbiter };
     let last = cache.world.latest().cloned();
     let world =
         reading.pool.install(|| World::assemble(from.scene, &parts, last.as_deref(), reading.token))?;

@@ -37,7 +37,12 @@ pub(in crate::pipeline) fn lights(scene: &Scene, meshes: &[Key]) -> Key {
 }
 
 /// Everything that a world is made of.
-pub(in crate::pipeline) fn world(scene: &Scene, meshes: &[Key], textures: &[Key], orbiter: Option<&str>) -> Key {
+pub(in crate::pipeline) fn world(
+    scene: &Scene,
+    meshes: &[Key],
+    textures: &[Key],
+    orbiter: Option<&str>,
+) -> Key {
     let mut key = Fingerprint::new("world");
     key.key(&geometry(scene, meshes)).key(&lights(scene, meshes));
     for object in &scene.objects {
@@ -139,8 +144,9 @@ fn camera(key: &mut Fingerprint, camera: &Camera, orbiter: Option<&str>) {
         Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
             key.index(0).dvec3(*position).dvec3(*look_at).dvec3(*up).f64(*fov).f64(*aperture).f64(*focus);
         }
-        Camera::Orbiter { aperture, focus, .. } => {
-            key.index(1).f64(*aperture).index(focus.is_some().into()).f64(focus.unwrap_or(0.0));
+        Camera::Orbiter { file: _, fov, aperture, focus } => {
+            // 0 is no valid angle and no valid distance.
+            key.index(1).f64(*aperture).f64(fov.unwrap_or(0.0)).f64(focus.unwrap_or(0.0));
             key.text(orbiter.unwrap_or(""));
         }
     }

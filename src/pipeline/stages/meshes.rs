@@ -48,7 +48,11 @@ pub(in crate::pipeline) fn meshes(
         })
         .collect::<Result<_, Cancelled>>()?;
     let assets: Vec<Asset<KeptMesh>> = reading.pool.install(|| {
-        files.par_iter().zip(before).map(|(file, kept)| one(&file.value, kept, reading)).collect::<Result<_, _>>()
+        files
+            .par_iter()
+            .zip(before)
+            .map(|(file, kept)| one(&file.value, kept, reading))
+            .collect::<Result<_, _>>()
     })?;
     let mut meshes = Vec::new();
     let mut kept = 0;
@@ -147,13 +151,11 @@ fn dropped(faces: &Dropped) -> Option<String> {
     let count = |number: u64, what: &str| {
         (number > 0).then(|| format!("{number} face{} {what}", if number == 1 { "" } else { "s" }))
     };
-    let parts: Vec<String> = [
-        count(faces.non_finite, "with non-finite coordinates"),
-        count(faces.degenerate, "without area"),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    let parts: Vec<String> =
+        [count(faces.non_finite, "with non-finite coordinates"), count(faces.degenerate, "without area")]
+            .into_iter()
+            .flatten()
+            .collect();
     (!parts.is_empty()).then(|| format!("left out {}", parts.join(" and ")))
 }
 

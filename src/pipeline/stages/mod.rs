@@ -98,9 +98,10 @@ impl Findings {
     }
 
     /// All errors and warnings, errors first.
-    pub(super) fn into_failure(mut self) -> Failure {
-        self.errors.append(&mut self.warnings);
-        Failure::Scene(self.errors)
+    pub(super) fn take_failure(&mut self) -> Failure {
+        let mut all = std::mem::take(&mut self.errors);
+        all.append(&mut self.warnings);
+        Failure::Scene(all)
     }
 }
 

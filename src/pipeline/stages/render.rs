@@ -55,16 +55,13 @@ impl Canvas {
     }
 
     fn jobs(&self, target: u32) -> Vec<Job> {
-        let rect = |tile| self.film.tile_rect(tile);
-        (0..self.done.len())
-            .filter(|tile| self.done[*tile] < target)
-            .map(|tile| Job { tile, rect: rect(tile), samples: self.done[tile]..target })
-            .collect()
+        jobs(&self.film, |tile| self.done[tile]..target)
     }
 
     /// Pixels times samples.
     fn units(&self, samples_of: impl Fn(usize) -> u32) -> u64 {
-        (0..self.done.len()).map(|i| self.film.tile_rect(i).area() as u64 * u64::from(samples_of(i))).sum()
+        let area = |tile| self.film.tile_rect(tile).map_or(0, |rect| rect.area() as u64);
+        (0..self.done.len()).map(|tile| area(tile) * u64::from(samples_of(tile))).sum()
     }
 }
 
@@ -90,7 +87,8 @@ pub(in crate::pipeline) fn render(
     order: &Order<'_>,
 ) -> Result<Staged<RayCounters>, Stop> {
     let wanted = order.plan.samples;
-    let usable = |kept: &Canvas| !order.force && kept.key == key && kept.done.iter().all(|done| *done <= wanted);
+    let usable =
+        |kept: &Canvas| !order.force && kept.key == key && kept.done.iter().all(|done| *done <= wanted);
     if !canvas.as_ref().is_some_and(usable) {
         // The old film goes first: there may not be memory for two.
         *canvas = None;
@@ -247,10 +245,8 @@ impl<'a> Painter<'a> {
         }
         let settings = RenderSettings { width, height, ..plan.settings };
         let crop = plan.crop.map(|rect| scale(rect, (full_width, full_height), (width, height)));
-        let mut film = Film::new(width, height, crop).map_err(Stop::work)?;
-        let jobs: Vec<Job> = (0..film.tile_count())
-            .map(|tile| Job { tile, rect: film.tile_rect(tile), samples: 0..1 })
-            .collect();
+        let film = Film::new(width, height, crop).map_err(Stop::work)?;
+        let jobs = jobs(&film, |_| 0..1);
         let tracer = Tracer { settings: &settings, ..self.order.tracer };
         tracer.run(&jobs, |result| {
             if let Some((job, samples, _)) = result {
@@ -262,6 +258,12 @@ impl<'a> Painter<'a> {
         self.show();
         Ok(())
     }
+}
+
+/// The tiles that lack samples, in the film's order.
+fn jobs(film: &Film, samples_of: impl Fn(usize) -> std::ops::Range<u32>) -> Vec<Job> {
+    let job = |tile| Some(Job { tile, rect: film.tile_rect(tile)?, samples: samples_of(tile) });
+    film.tile_order().into_iter().filter_map(job).filter(|job| !job.samples.is_empty()).collect()
 }
 
 /// The largest picture of this aspect ratio inside the bounds.

@@ -55,7 +55,11 @@ pub(in crate::pipeline) fn textures(
         })
         .collect::<Result<_, Cancelled>>()?;
     let assets: Vec<Asset<Texels>> = reading.pool.install(|| {
-        needed.par_iter().zip(before).map(|(one, (content, kept))| load_one(one, content, kept, reading)).collect()
+        needed
+            .par_iter()
+            .zip(before)
+            .map(|(one, (content, kept))| load_one(one, content, kept, reading))
+            .collect()
     });
     let mut kept = 0;
     for (one, asset) in needed.iter().zip(assets) {

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use super::super::fingerprint::{Fingerprint, Key};
 use super::super::plan::Plan;
 use super::super::sink::Sink;
-use super::super::standins::output::{self, EncodeOptions, Format, OutputError};
+use super::super::standins::film::SampleStats;
+use super::super::standins::output::{self, BitDepth, EncodeOptions, Format, OutputError};
 use super::super::watch::content::{Content, Contents};
 use super::render::Canvas;
 use super::{Staged, Stop};
@@ -22,9 +23,11 @@ pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
 /// # Errors
 /// The first that cannot be written.
 pub(in crate::pipeline) fn check_targets(plan: &Plan) -> Result<(), Stop> {
-    plan.outputs.iter().try_for_each(|path| {
-        Format::from_path(path).map(drop).and_then(|()| output::check_target(path)).map_err(Stop::work)
-    })
+    let check = |path: &PathBuf| {
+        let format = output::check_target(path)?;
+        format.check_picture(plan.settings.width, plan.settings.height, BitDepth::try_from(plan.bit_depth)?)
+    };
+    plan.outputs.iter().try_for_each(check).map_err(|error: OutputError| Stop::work(error))
 }
 
 /// Write the film as it is to every output that does not hold it already. All outputs are tried.
@@ -69,12 +72,11 @@ pub(in crate::pipeline) fn write(
 
 fn write_one(image: &RadianceImage, canvas: &Canvas, plan: &Plan, path: &Path) -> Result<u64, OutputError> {
     let options = EncodeOptions {
-        format: Format::from_path(path)?,
         tone: plan.tone,
-        bit_depth: plan.bit_depth,
+        bit_depth: BitDepth::try_from(plan.bit_depth)?,
         metadata: metadata(canvas, plan),
     };
-    let bytes = output::encode(image, &options)?;
+    let bytes = output::encode(image, &options, Format::of(path)?)?;
     output::write::atomic(path, &bytes)?;
     Ok(bytes.len() as u64)
 }
@@ -82,10 +84,9 @@ fn write_one(image: &RadianceImage, canvas: &Canvas, plan: &Plan, path: &Path) -
 /// What a picture says of itself: enough to make it again.
 fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
     let settings = &plan.effective;
-    let (min, mean, max) = canvas.film.samples();
+    let SampleStats { min, mean, max } = canvas.film.samples();
     let samples = if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
     let pairs = [
-        ("Software", format!("glimt {}", env!("CARGO_PKG_VERSION"))),
         ("glimt:samples", samples),
         ("glimt:integrator", settings.integrator.to_owned()),
         ("glimt:shadows", settings.shadows.to_owned()),
@@ -99,7 +100,7 @@ fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
 }
 
 fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
-    let (min, mean, max) = canvas.film.samples();
+    let SampleStats { min, mean, max } = canvas.film.samples();
     let mut key = Fingerprint::new("write");
     key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());
     key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize).u64(plan.bit_depth.into());
