@@ -1,6 +1,6 @@
 //! The terminal UI: worker, watcher and front end wired together.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
@@ -36,7 +36,7 @@ fn live(order: Order) -> Result<Exit, String> {
     let (forward, events) = channel();
     let from_worker = std::mem::replace(&mut worker.events, channel().1);
     let report = order.report.clone();
-    let tap = move || tap(&from_worker, report, &watcher, |event| forward.send(event).is_ok());
+    let tap = move || tap(&from_worker, report.as_deref(), &watcher, |event| forward.send(event).is_ok());
     std::thread::Builder::new().name("glimt-events".to_owned()).spawn(tap).map_err(no_thread)?;
     let remote = worker.remote();
     let outcome = tui::run(Options {
@@ -55,17 +55,12 @@ fn live(order: Order) -> Result<Exit, String> {
 }
 
 /// Hand events on, and see to files and reports on the way.
-fn tap(
-    events: &Receiver<Event>,
-    report: Option<PathBuf>,
-    watcher: &Watcher,
-    forward: impl Fn(Event) -> bool,
-) {
+fn tap(events: &Receiver<Event>, report: Option<&Path>, watcher: &Watcher, forward: impl Fn(Event) -> bool) {
     for event in events {
         match &event {
             Event::Files { files, .. } => watcher.set_files(files.clone()),
             Event::Done { report: made, generation, .. } => {
-                if let Some(Err(message)) = report.as_deref().map(|path| report::write(path, made)) {
+                if let Some(Err(message)) = report.map(|path| report::write(path, made)) {
                     forward(Event::WriteFailed { generation: *generation, message });
                 }
             }

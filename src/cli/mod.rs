@@ -1,6 +1,6 @@
 //! The command line: arguments, the headless front end, and the wiring of the terminal's.
 //!
-//! What was typed ([`args`]) is turned into what it means ([`lower`]) before anything is done.
+//! What was typed ([`args`]) is turned into what it means (`lower`) before anything is done.
 
 pub mod args;
 mod check;

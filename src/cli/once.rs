@@ -39,8 +39,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     let mut reporter = progress::reporter(order.progress, console);
     let exit = follow(&worker, order, console, &mut *reporter, &ended);
     reporter.end();
-    let patience = if ended.by().is_some() { PATIENCE } else { Duration::MAX / 4 };
-    worker.finish(patience);
+    worker.finish(PATIENCE);
     ended.by().map_or(exit, Exit::signal)
 }
 

@@ -9,9 +9,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::cache::{Memo, Pool};
 use super::plan::{Plan, plan};
-use super::protocol::{
-    Counters, Event, Failure, ImageReport, Report, Request, SampleCounts, Stage, StageReport, Status,
-};
+use super::protocol::{Event, Failure, Report, Request, Stage, Status};
+use super::report::{Outcome, report};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, Ingredients, Keyed, accel, needed};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
@@ -20,6 +19,7 @@ use super::stages::render::{Canvas, Order, render};
 use super::stages::textures::{TextureCache, Textures, textures};
 use super::stages::write::{Written, check_targets, write};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
+use super::table::Table;
 use super::trace::{Kernel, Tracer};
 use super::watch::content::{Contents, FileRead};
 use crate::control::CancelToken;
@@ -125,8 +125,17 @@ impl Engine {
         self.plan = Some(ready.plan.clone());
         let rays = table.run(Stage::Render, || self.render(request, &ready, sink, meanwhile))?;
         table.run(Stage::Write, || self.write(request, &ready.plan, sink))?;
-        let parts = (ready, rays, table.stages);
-        self.report(request, parts, begin.elapsed().as_secs_f64())
+        let Some(canvas) = &self.canvas else { return Err(Stop::work("the film is gone")) };
+        let outcome = Outcome {
+            scene: &ready.parsed.loaded.path,
+            plan: &ready.plan,
+            world: &ready.world.1,
+            canvas,
+            rays,
+            texels_loaded: ready.texels_loaded,
+            is_written: request.write,
+        };
+        Ok(report(&outcome, table.stages, begin.elapsed().as_secs_f64()))
     }
 
     /// All stages before photons and light.
@@ -140,7 +149,7 @@ impl Engine {
         let parsed = table
             .run(Stage::Parse, || parse(&request.scene, &self.contents, &mut self.parsed, findings, token))?;
         let plan = plan(parsed.loaded.scene.clone(), &request.scene, &request.overrides)
-            .map_err(|error| Stop::Failed(Failure::Scene(vec![error])))?;
+            .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         let settings = Box::new(plan.effective.clone());
         table.sink.send(Event::Settings { generation: request.generation, settings });
         if request.write {
@@ -240,49 +249,6 @@ impl Engine {
         Ok(self.pool.insert(Arc::new(pool)).clone())
     }
 
-    fn report(
-        &self,
-        request: &Request,
-        (ready, rays, stages): (Ready, RayCounters, Vec<StageReport>),
-        seconds: f64,
-    ) -> Result<Report, Stop> {
-        let Some(canvas) = &self.canvas else { return Err(Stop::work("the film is gone")) };
-        let (plan, world) = (&ready.plan, &ready.world.1);
-        let samples = canvas.film.samples();
-        let outputs: &[PathBuf] = if request.write { &plan.outputs } else { &[] };
-        let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
-        Ok(Report {
-            glimt: env!("CARGO_PKG_VERSION"),
-            scene: ready.parsed.loaded.path.to_string_lossy().into_owned(),
-            image: ImageReport {
-                path: paths.first().cloned(),
-                paths,
-                width: plan.settings.width,
-                height: plan.settings.height,
-                samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
-                complete: canvas.is_complete(plan.samples),
-            },
-            settings: plan.effective.clone(),
-            stages,
-            counters: Counters {
-                triangles: world.triangle_count(),
-                objects: world.object_count(),
-                camera_rays: rays.camera_rays,
-                shadow_rays: rays.shadow_rays,
-                reflected_rays: rays.reflected_rays,
-                refracted_rays: rays.refracted_rays,
-                photons_emitted: 0,
-                photons_stored: 0,
-                texels_loaded: ready.texels_loaded,
-                texture_lookups: rays.texture_lookups,
-                non_finite_samples: canvas.film.non_finite_samples(),
-                accel_memory_bytes: world.accel_memory_bytes() as u64,
-            },
-            seconds,
-            peak_memory_bytes: peak_memory_bytes(),
-        })
-    }
-
     fn say_files(&self, findings: &Findings, sink: &Sink) {
         let mut files = findings.files.clone();
         for asset in &self.assets {
@@ -354,32 +320,4 @@ impl Engine {
 
 fn say_write_failed(sink: &Sink, message: String) {
     sink.send(Event::WriteFailed { generation: sink.generation, message });
-}
-
-/// The table of stages as it fills.
-struct Table<'a> {
-    sink: &'a Sink,
-    stages: Vec<StageReport>,
-}
-
-impl Table<'_> {
-    fn run<T>(&mut self, name: Stage, work: impl FnOnce() -> Result<Staged<T>, Stop>) -> Result<T, Stop> {
-        let begin = Instant::now();
-        let report = |status, why| StageReport { name, status, seconds: begin.elapsed().as_secs_f64(), why };
-        self.sink.stage(report(Status::Running, String::new()));
-        let staged = work()?;
-        let report = report(staged.status, staged.why);
-        self.sink.stage(report.clone());
-        self.stages.push(report);
-        Ok(staged.value)
-    }
-}
-
-/// Highest resident memory of the process so far; 0 where it cannot be told.
-fn peak_memory_bytes() -> u64 {
-    use nix::sys::resource::{UsageWho, getrusage};
-    // Bytes on macOS, kibibytes elsewhere (getrusage(2)).
-    let unit = if cfg!(target_os = "macos") { 1 } else { 1024 };
-    let highest = getrusage(UsageWho::RUSAGE_SELF).map_or(0, |usage| usage.max_rss());
-    u64::try_from(highest).unwrap_or(0) * unit
 }

@@ -13,6 +13,8 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 /// Everything that a request's later stages go by.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
+    /// The scene's file name, for pictures to carry.
+    pub(super) name: String,
     /// The scene with the overrides in its `[render]` table.
     pub(super) scene: Scene,
     pub(super) settings: RenderSettings,
@@ -30,7 +32,7 @@ pub(super) struct Plan {
 ///
 /// # Errors
 /// A crop outside the picture.
-pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Result<Plan, Diagnostic> {
+pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
     override_render(&mut scene, overrides);
     let render = &scene.render;
     check_crop(overrides.crop, render.width, render.height, path)?;
@@ -51,6 +53,7 @@ pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Resu
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let outputs = outputs(render.output.as_ref(), path, overrides);
     Ok(Plan {
+        name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         settings,
         samples: render.samples,
         threads,
@@ -89,14 +92,14 @@ fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> Ve
     vec![of_scene.cloned().unwrap_or_else(default)]
 }
 
-fn check_crop(crop: Option<Rect>, width: u32, height: u32, path: &Path) -> Result<(), Diagnostic> {
+fn check_crop(crop: Option<Rect>, width: u32, height: u32, path: &Path) -> Result<(), Box<Diagnostic>> {
     let inside = |rect: Rect| {
         rect.area() > 0
             && rect.x.checked_add(rect.width).is_some_and(|right| right <= width)
             && rect.y.checked_add(rect.height).is_some_and(|bottom| bottom <= height)
     };
     match crop {
-        Some(rect) if !inside(rect) => Err(Diagnostic {
+        Some(rect) if !inside(rect) => Err(Box::new(Diagnostic {
             severity: Severity::Error,
             message: format!(
                 "--crop {},{},{},{} does not lie inside the picture of {width}×{height} pixels",
@@ -105,7 +108,7 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32, path: &Path) -> Resul
             path: path.to_owned(),
             place: None,
             help: Some("X,Y,W,H are the left and top pixel, the width and the height".to_owned()),
-        }),
+        })),
         _ => Ok(()),
     }
 }

@@ -54,7 +54,7 @@ impl Sink {
         };
         say(0, PARTS);
         let result = load(&|done: u64, total: u64| {
-            let part = done.min(total) as u128 * u128::from(PARTS) / u128::from(total.max(1));
+            let part = u128::from(done.min(total)) * u128::from(PARTS) / u128::from(total.max(1));
             let part = part as u64;
             if part < PARTS && shown.fetch_max(part, Ordering::Relaxed) < part {
                 say(part, PARTS);

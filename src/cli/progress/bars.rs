@@ -57,10 +57,8 @@ impl Reporter for Bars {
                 self.stage.set_message(stage.name.name());
                 self.stage.tick();
             }
-            Event::Stage { stage, .. } => {
-                if stage.name == Stage::Accel {
-                    self.assets.drain().for_each(|(_, bar)| bar.finish_and_clear());
-                }
+            Event::Stage { stage, .. } if stage.name == Stage::Accel => {
+                self.assets.drain().for_each(|(_, bar)| bar.finish_and_clear());
             }
             Event::Asset { progress, .. } => self.asset(progress),
             Event::Progress { progress, .. } => self.progress(progress),

@@ -37,6 +37,7 @@ impl From<Cancelled> for Stop {
 }
 
 impl Stop {
+    #[allow(clippy::needless_pass_by_value, reason = "it is handed to `map_err`")]
     pub(super) fn work(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
     }

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::super::cache::Memo;
 use super::super::fingerprint::Fingerprint;
 use super::super::protocol::Failure;
-use super::super::standins::{assets, scene};
+use super::super::standins::assets::orbiter::load as load_orbiter;
+use super::super::standins::scene;
 use super::super::watch::content::{Content, Contents, FileRead};
 use super::{Findings, Staged, Stop};
 use crate::assets::OrbiterCamera;
@@ -70,7 +71,7 @@ fn orbiter(
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
         return Ok((parsed.orbiter, Some(content)));
     }
-    match assets::orbiter::load(&file.value) {
+    match load_orbiter(&file.value) {
         Ok(camera) => Ok((Some(camera), Some(content))),
         Err(error) => {
             findings.asset_error(loaded, file.span.clone(), &error);

@@ -106,9 +106,12 @@ pub(in crate::pipeline) fn render(
         return Ok(Staged::reused(RayCounters::default(), "nothing that it shows changed"));
     }
     painter.canvas.ended_by = None;
+    painter.canvas.film.set_complete(false);
     painter.paint()?;
     let rays = painter.rays;
-    Ok(match (painter.is_over_time, had) {
+    let complete = painter.canvas.is_complete(wanted);
+    painter.canvas.film.set_complete(complete);
+    Ok(match (!complete, had) {
         (true, _) => {
             canvas.ended_by = budget;
             Staged::done(rays, "the time was up")

@@ -87,6 +87,7 @@ fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
     let SampleStats { min, mean, max } = canvas.film.samples();
     let samples = if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
     let pairs = [
+        ("glimt:scene", plan.name.clone()),
         ("glimt:samples", samples),
         ("glimt:integrator", settings.integrator.to_owned()),
         ("glimt:shadows", settings.shadows.to_owned()),
