@@ -67,12 +67,15 @@ fn follow(
             Event::Written { path, .. } => written.push(path),
             Event::Done { report, warnings, .. } => {
                 reporter.end();
-                console.diagnostics(&warnings);
+                if !reporter.says_diagnostics() {
+                    console.diagnostics(&warnings);
+                }
                 return done(order, &report, &written, console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
-                return failed(&failure, console);
+                let is_said = reporter.says_diagnostics();
+                return if is_said { exit_of(&failure) } else { failed(&failure, console) };
             }
             Event::Cancelled { .. } => return Exit::FAILED,
             _ => {}
@@ -96,13 +99,18 @@ fn done(
     }
 }
 
-pub(super) fn failed(failure: &Failure, console: &Console) -> Exit {
+fn failed(failure: &Failure, console: &Console) -> Exit {
     match failure {
-        Failure::Scene(diagnostics) => {
-            console.diagnostics(diagnostics);
-            Exit::WRONG
-        }
-        Failure::Work(message) => console.fail(Exit::FAILED, message),
+        Failure::Scene(diagnostics) => console.diagnostics(diagnostics),
+        Failure::Work(message) => console.say(&format!("error: {message}")),
+    }
+    exit_of(failure)
+}
+
+fn exit_of(failure: &Failure) -> Exit {
+    match failure {
+        Failure::Scene(_) => Exit::WRONG,
+        Failure::Work(_) => Exit::FAILED,
     }
 }
 

@@ -20,6 +20,11 @@ pub(super) trait Reporter {
     fn says_results(&self) -> bool {
         true
     }
+
+    /// Whether it says errors and warnings itself, so that nothing may be mixed with its lines.
+    fn says_diagnostics(&self) -> bool {
+        false
+    }
 }
 
 /// The reporter that was asked for.

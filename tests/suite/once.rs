@@ -112,6 +112,21 @@ fn json_lines_have_the_keys_that_are_documented() {
 }
 
 #[test]
+fn json_lines_hold_the_errors_and_nothing_is_mixed_with_them() {
+    let desk = Desk::new();
+    desk.write("ball.toml", &SCENE.replace("\"ball\"", "\"bal\""));
+    let stderr = desk.expect("ball.toml --once --progress json", 2);
+    let lines: Vec<serde_json::Value> =
+        stderr.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let last = lines.last().expect("a line");
+    assert_eq!((&last["event"], &last["kind"]), (&"failed".into(), &"scene".into()));
+    let errors = last["diagnostics"].as_array().expect("diagnostics");
+    let error = errors.iter().find(|one| one["severity"] == "error").expect("an error");
+    assert_eq!((&error["line"], &error["path"]), (&17.into(), &"ball.toml".into()));
+    assert!(error["message"].as_str().expect("text").contains("bal"));
+}
+
+#[test]
 fn the_report_has_its_keys() {
     let desk = Desk::new();
     desk.expect("ball.toml --once --report r.json --seed 5 --threads 2 --samples 3", 0);

@@ -6,9 +6,11 @@
 //! | `asset` | `name`, `fraction` |
 //! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples` |
 //! | `written` | `path`, `bytes` |
-//! | `done` | `unchanged`, `warnings`, `seconds`, `complete` |
-//! | `failed` | `kind` (`scene`, `work`), `errors`, `warnings`, `messages` |
+//! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
+//! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
 //! | `cancelled` | |
+//!
+//! A diagnostic has `severity` (`error`, `warning`), `message`, `path`, `line` and `column` (from 1, or null), `help`.
 
 use std::io::Write;
 
@@ -16,7 +18,7 @@ use serde_json::{Value, json};
 
 use super::Reporter;
 use crate::pipeline::protocol::{Event, Failure};
-use crate::scene::diagnostic::Severity;
+use crate::scene::diagnostic::{Diagnostic, Place, Severity};
 
 pub(super) struct Json;
 
@@ -30,6 +32,10 @@ impl Reporter for Json {
 
     fn says_results(&self) -> bool {
         false
+    }
+
+    fn says_diagnostics(&self) -> bool {
+        true
     }
 }
 
@@ -52,8 +58,8 @@ fn value(event: &Event) -> Option<Value> {
             json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes })
         }
         Event::Done { report, warnings, unchanged, .. } => json!({
-            "event": "done", "unchanged": unchanged, "warnings": warnings.len(), "seconds": report.seconds,
-            "complete": report.image.complete,
+            "event": "done", "unchanged": unchanged, "seconds": report.seconds,
+            "complete": report.image.complete, "diagnostics": diagnostics(warnings),
         }),
         Event::Failed { failure, .. } => failed(failure),
         Event::Cancelled { .. } => json!({ "event": "cancelled" }),
@@ -63,16 +69,31 @@ fn value(event: &Event) -> Option<Value> {
 
 fn failed(failure: &Failure) -> Value {
     match failure {
-        Failure::Work(message) => json!({
-            "event": "failed", "kind": "work", "errors": 1, "warnings": 0, "messages": [message],
-        }),
-        Failure::Scene(all) => {
-            let errors = all.iter().filter(|one| one.severity == Severity::Error).count();
-            let messages: Vec<&str> = all.iter().map(|one| one.message.as_str()).collect();
-            json!({
-                "event": "failed", "kind": "scene", "errors": errors, "warnings": all.len() - errors,
-                "messages": messages,
-            })
+        Failure::Work(message) => {
+            json!({ "event": "failed", "kind": "work", "message": message, "diagnostics": [] })
         }
+        Failure::Scene(all) => json!({
+            "event": "failed", "kind": "scene", "message": "the scene is wrong", "diagnostics": diagnostics(all),
+        }),
     }
+}
+
+fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
+    all.iter()
+        .map(|one| {
+            let place = one.place.as_ref().map(line_and_column);
+            json!({
+                "severity": if one.severity == Severity::Error { "error" } else { "warning" },
+                "message": one.message, "path": one.path.to_string_lossy(),
+                "line": place.map(|(line, _)| line), "column": place.map(|(_, column)| column),
+                "help": one.help,
+            })
+        })
+        .collect()
+}
+
+fn line_and_column(place: &Place) -> (usize, usize) {
+    let before = place.source.get(..place.span.start).unwrap_or("");
+    let line = before.matches('\n').count() + 1;
+    (line, before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1)
 }
