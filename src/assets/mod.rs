@@ -58,6 +58,9 @@ pub struct LoadedMesh {
     pub dropped: Dropped,
     /// Anything else worth saying, a line each.
     pub warnings: Vec<String>,
+    /// Files that were read besides the mesh file, or should have been: material libraries. When one of them
+    /// changes, so does this value.
+    pub companions: Vec<PathBuf>,
 }
 
 /// Faces that could not be used.

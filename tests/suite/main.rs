@@ -2,4 +2,5 @@
 
 mod broken;
 mod house;
+mod once;
 mod output;

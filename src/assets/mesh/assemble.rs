@@ -1,5 +1,7 @@
 //! What a parser found → a mesh that keeps the invariants.
 
+use std::path::PathBuf;
+
 use rayon::prelude::*;
 
 use super::Source;
@@ -62,11 +64,12 @@ pub(super) struct Parsed {
     pub(super) face_materials: Vec<u32>,
     pub(super) materials: Vec<FileMaterial>,
     pub(super) warnings: Vec<String>,
+    pub(super) companions: Vec<PathBuf>,
 }
 
 /// Cut, drop, compact, complete.
 pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
-    let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings } = parsed;
+    let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings, companions } = parsed;
     let mut cutter = Cutter { positions: &positions, materials: &face_materials, ..Cutter::default() };
     cutter.cut_all(source, &faces)?;
     let Cutter { triangles, triangle_materials, dropped, .. } = cutter;
@@ -80,7 +83,7 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
         *uv = Vec2::ZERO;
     }
     complete_normals(&mut mesh);
-    Ok(LoadedMesh { mesh, materials, dropped, warnings })
+    Ok(LoadedMesh { mesh, materials, dropped, warnings, companions })
 }
 
 fn no_usable_face(faces: usize, dropped: Dropped) -> String {

@@ -11,7 +11,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     if generation(&event) != state.generation {
         return Vec::new();
     }
-    state.dirty = true;
+    // The picture itself is taken from its slot; what is watched is the wiring's.
+    let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
+    state.dirty |= !shows_nothing;
     match event {
         Event::Started { .. } => started(state),
         Event::Stage { stage, .. } => record(state, stage),
@@ -25,8 +27,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             }
         }
         Event::Progress { progress, .. } => state.progress = Some(progress),
-        Event::Preview { .. } => state.dirty = false,
+        Event::Preview { .. } | Event::Files { .. } => {}
         Event::Written { path, bytes, .. } => wrote(state, Written { path, bytes }),
+        Event::WriteFailed { message, .. } => say(state, format!("error: {}", visible(&message))),
         Event::Done { report, warnings, unchanged, .. } => {
             return done(state, report, warnings, unchanged);
         }
@@ -48,6 +51,8 @@ fn generation(event: &Event) -> u64 {
         | Event::Progress { generation, .. }
         | Event::Preview { generation }
         | Event::Written { generation, .. }
+        | Event::WriteFailed { generation, .. }
+        | Event::Files { generation, .. }
         | Event::Done { generation, .. }
         | Event::Failed { generation, .. }
         | Event::Cancelled { generation } => *generation,

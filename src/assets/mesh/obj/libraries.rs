@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::super::{AssetError, Source, mtl};
 use crate::assets::FileMaterial;
@@ -19,6 +19,8 @@ pub(super) struct Found {
     pub(super) materials: HashMap<String, FileMaterial>,
     pub(super) warnings: Vec<String>,
     pub(super) missing: bool,
+    /// Files that were read or looked for.
+    pub(super) files: Vec<PathBuf>,
 }
 
 impl Libraries<'_> {
@@ -43,6 +45,7 @@ impl Libraries<'_> {
     }
 
     fn load_file(&self, path: &Path) -> Result<Vec<tobj::Material>, tobj::LoadError> {
+        self.found.borrow_mut().files.push(path.to_owned());
         match mtl::load(path, self.source.watch) {
             Ok(materials) => {
                 let folder = path.parent().unwrap_or(Path::new(""));
