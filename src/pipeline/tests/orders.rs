@@ -93,15 +93,15 @@ fn the_worker_survives_a_panic() {
 #[test]
 fn a_film_that_does_not_fit_is_an_error() {
     let mut bench =
-        Bench::new(&SCENE.replace("width = 40", "width = 65536").replace("height = 30", "height = 65536"));
-    // 2³² pixels need 100 GiB; a machine that has them is let off.
+        Bench::new(&SCENE.replace("width = 40", "width = 32768").replace("height = 30", "height = 32768"));
+    // 2³⁰ pixels need 28 GiB; a machine that may have them is let off.
     bench.overrides.time_seconds = Some(0.01);
     bench.overrides.outputs = vec![bench.path("out.png")];
     if let Some(available) = available_memory_bytes()
-        && available < 60 << 30
+        && available < 26 << 30
     {
         assert!(matches!(bench.failed(), Failure::Work(_)));
-        bench.edit("65536", "16");
+        bench.edit("32768", "16");
         bench.overrides = Overrides { outputs: vec![bench.path("out.ppm")], ..Default::default() };
         bench.done();
     }
