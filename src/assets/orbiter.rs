@@ -35,7 +35,7 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// numbers, a number that is not finite or out of range.
 pub fn load(path: &Path) -> Result<OrbiterCamera, AssetError> {
     let token = CancelToken::new();
-    let bytes = read::bytes(path, LIMIT, read::Watch { progress: &unwatched, token: &token })?;
+    let bytes = read::text(path, LIMIT, read::Watch { progress: &unwatched, token: &token })?;
     parse(path, &String::from_utf8_lossy(&bytes))
 }
 

@@ -1,7 +1,7 @@
 //! Reading files without surprises: only regular files, never more than a limit, watched and stoppable.
 
 use std::fs::{self, File};
-use std::io::Read;
+use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::AssetError;
@@ -37,15 +37,46 @@ pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
         return Err(AssetError::unreadable(path, "it is a pipe or a device, not a regular file"));
     }
     if found.len() > limit {
-        let reason = format!("it has {} bytes, more than the {limit} that are read", found.len());
+        let reason = format!("it has {} bytes, more than the {} MiB that are read", found.len(), limit >> 20);
         return Err(AssetError::unreadable(path, reason));
     }
     Ok((File::open(path).map_err(unreadable)?, found.len()))
 }
 
-/// All bytes of a regular file. Progress counts bytes out of `2·length`: the second half is the parser's.
+/// Bytes at the start of a file that tell text from other things.
+const START: usize = 1 << 12;
+
+/// All bytes of a text file; one that is binary by its start is refused before the rest is read.
+pub(crate) fn text(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
+    bytes_if(path, limit, watch, |start| !start.contains(&0))
+}
+
+/// All bytes of a file whose first three are no zeros: letters, in every format that this is asked of.
+pub(crate) fn lettered(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
+    bytes_if(path, limit, watch, |start| !start[..start.len().min(3)].contains(&0))
+}
+
+/// All bytes of a regular file.
 pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    let (file, length) = open(path, limit)?;
+    bytes_if(path, limit, watch, |_| true)
+}
+
+/// All bytes of a regular file, if its first [`START`] are accepted. Progress counts bytes out of `2·length`: the
+/// second half is the parser's.
+fn bytes_if(
+    path: &Path,
+    limit: u64,
+    watch: Watch<'_>,
+    accept: impl Fn(&[u8]) -> bool,
+) -> Result<Vec<u8>, AssetError> {
+    let (mut file, length) = open(path, limit)?;
+    let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
+    let mut start = Vec::new();
+    (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
+    if !accept(&start) {
+        return Err(AssetError::malformed(path, Some(1), "this is a binary file of another kind"));
+    }
+    file.rewind().map_err(unreadable)?;
     let mut file = file.take(limit);
     let length = length as usize;
     let mut bytes = Vec::new();
@@ -55,7 +86,7 @@ pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>
         let got = (&mut file)
             .take(CHUNK as u64)
             .read_to_end(&mut bytes)
-            .map_err(|error| AssetError::unreadable(path, in_words(&error)))?;
+            .map_err(unreadable)?;
         if got == 0 {
             return Ok(bytes);
         }
@@ -67,6 +98,9 @@ pub(crate) fn in_words(error: &std::io::Error) -> String {
     use std::io::ErrorKind;
     match error.kind() {
         ErrorKind::NotFound => "no such file".to_owned(),
+        _ if error.raw_os_error() == Some(nix::libc::ELOOP) => {
+            "its symbolic links lead in a circle".to_owned()
+        }
         ErrorKind::PermissionDenied => "permission denied".to_owned(),
         _ => {
             let text = error.to_string();
@@ -99,6 +133,24 @@ mod tests {
         assert!(says(&long).contains("101 bytes"));
     }
 
+    #[test]
+    fn what_is_binary_is_told_by_its_start() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let token = CancelToken::new();
+        let path = folder.path().join("zeros");
+        // 3 TiB without content: reading them would take an hour.
+        File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
+        for read in [text, lettered] {
+            let error = read(&path, u64::MAX, watch(&token)).expect_err("refused").to_string();
+            assert!(error.ends_with("zeros:1: this is a binary file of another kind"), "{error}");
+        }
+        fs::write(&path, b"ply\n\0").expect("written");
+        assert!(text(&path, 100, watch(&token)).is_err());
+        assert_eq!(lettered(&path, 100, watch(&token)).expect("read"), b"ply\n\0");
+        fs::write(&path, b"").expect("written");
+        assert_eq!(text(&path, 100, watch(&token)).expect("read"), b"");
+    }
+
     #[cfg(unix)]
     #[test]
     fn pipes_and_loops_do_not_block() {
@@ -111,7 +163,7 @@ mod tests {
         assert!(says(Path::new("/dev/zero")).contains("device"));
         let turn = folder.path().join("turn");
         std::os::unix::fs::symlink(&turn, &turn).expect("a link");
-        assert!(says(&turn).contains("symbolic link"), "{}", says(&turn));
+        assert!(says(&turn).contains("symbolic links lead in a circle"), "{}", says(&turn));
     }
 
     #[test]

@@ -94,6 +94,9 @@ fn too_large() -> Refusal {
 }
 
 fn unreadable(path: &Path, error: &io::Error) -> Refusal {
+    if error.kind() == io::ErrorKind::NotFound && is_link(path) {
+        return ("this is a symbolic link to a file that does not exist".to_owned(), None);
+    }
     if error.kind() == io::ErrorKind::NotFound {
         let help = neighbour(path).map(|near| format!("did you mean {}?", visible(&near.to_string_lossy())));
         let start = || "`glimt new FILE` writes a scene to start from".to_owned();
@@ -126,9 +129,22 @@ pub(super) fn neighbour(path: &Path) -> Option<PathBuf> {
         .ok()?
         .take(MOST_FILES)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| is_alike(Path::new(name), path))
         .collect();
     let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
     Some(folder.join(near))
+}
+
+/// Whether a file may be meant by another name: of the same kind, or of the same name but for the kind. A link to
+/// nowhere is not meant by its own name.
+fn is_alike(found: &Path, meant: &Path) -> bool {
+    found.file_name() != meant.file_name()
+        && (found.extension() == meant.extension() || found.file_stem() == meant.file_stem())
+}
+
+/// Whether a name that leads to no file is a link all the same.
+pub(super) fn is_link(path: &Path) -> bool {
+    std::fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink())
 }
 
 #[cfg(test)]
@@ -160,6 +176,11 @@ mod tests {
         let missing = message(&folder.path().join("cornel.toml"));
         assert!(missing.message.contains("no such scene file"));
         assert!(missing.help.expect("a way out").contains("cornell.toml"));
+        let other_kind = message(&folder.path().join("cornels.tom"));
+        assert!(other_kind.help.expect("a way out").contains("glimt new"));
+        let dangling = folder.path().join("link.toml");
+        std::os::unix::fs::symlink(folder.path().join("gone"), &dangling).expect("a link");
+        assert!(message(&dangling).message.contains("symbolic link to a file that does not exist"));
         let lonely = message(&folder.path().join("zebra"));
         assert!(lonely.help.expect("a way out").contains("glimt new"));
     }

@@ -1,6 +1,10 @@
 //! The program as a whole: one crate, so that it links once.
 
 mod broken;
+mod desk;
+mod extremes;
+mod hostile;
 mod house;
 mod once;
+mod options;
 mod output;

@@ -1,75 +1,10 @@
 //! The program as scripts use it: exit codes, streams, files.
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command as Process, Output, Stdio};
+use std::process::{Command as Process, Stdio};
 use std::time::Duration;
 
-use assert_cmd::cargo::CommandCargoExt;
-
-const SCENE: &str = r#"[render]
-width = 32
-height = 24
-samples = 2
-
-[camera]
-position = [0, 1, 4]
-look_at = [0, 1, 0]
-
-[materials.ball]
-type = "phong"
-diffuse = [0.8, 0.2, 0.1]
-
-[[sphere]]
-center = [0, 1, 0]
-radius = 0.5
-material = "ball"
-
-[[light]]
-type = "point"
-position = [1, 3, 2]
-intensity = [10, 10, 10]
-"#;
-
-struct Desk(tempfile::TempDir);
-
-impl Desk {
-    fn new() -> Self {
-        let desk = Self(tempfile::tempdir().expect("a scratch folder"));
-        desk.write("ball.toml", SCENE);
-        desk
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        fs::write(self.path(name), text).expect("written");
-    }
-
-    fn glimt(&self, line: &str) -> Process {
-        let mut process = Process::cargo_bin("glimt").expect("the program");
-        process.current_dir(self.0.path()).args(line.split_whitespace()).stdin(Stdio::null());
-        process.env_remove("NO_COLOR").env("TERM", "xterm");
-        process
-    }
-
-    fn run(&self, line: &str) -> Output {
-        self.glimt(line).output().expect("it runs")
-    }
-
-    /// Runs it; gives stderr after checking the exit code and that stdout is empty.
-    #[track_caller]
-    fn expect(&self, line: &str, code: i32) -> String {
-        let output = self.run(line);
-        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
-        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
-        assert!(output.stdout.is_empty(), "{line}: nothing belongs on stdout");
-        assert!(!stderr.contains('\u{1b}'), "{line}: no escape sequence without a terminal");
-        stderr
-    }
-}
+use super::desk::{Desk, SCENE};
 
 #[test]
 fn a_scene_is_rendered_and_named_at_the_end() {

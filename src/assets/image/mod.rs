@@ -85,8 +85,9 @@ fn decode(
 ) -> Result<DynamicImage, String> {
     let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
     if reader.format().is_none() {
-        let format = ImageFormat::from_path(path).map_err(|_| unknown_format())?;
-        reader.set_format(format);
+        // Only TGA has nothing to be told by.
+        let format = ImageFormat::from_path(path).ok().filter(|format| *format == ImageFormat::Tga);
+        reader.set_format(format.ok_or_else(unknown_format)?);
     }
     let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
     if is_jpeg {
@@ -133,7 +134,7 @@ fn check_size(decoder: &impl ImageDecoder, limits: ImageLimits) -> Result<(), St
 }
 
 fn unknown_format() -> String {
-    "no image that can be read: png, jpg, ppm, tga, bmp, hdr, exr or webp".to_owned()
+    "its content is no image that can be read: png, jpg, ppm, tga, bmp, hdr, exr or webp".to_owned()
 }
 
 fn reason(error: &ImageError) -> String {

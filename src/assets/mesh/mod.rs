@@ -37,19 +37,25 @@ pub const ENDINGS: [&str; 3] = ["obj", "off", "ply"];
 /// face, [`AssetError::Cancelled`].
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let parse = match ending.as_str() {
-        "obj" => obj::parse,
-        "off" => off::parse,
-        "ply" => ply::parse,
+    let (parse, read): (Parser, Reader) = match ending.as_str() {
+        "obj" => (obj::parse, read::text),
+        "off" => (off::parse, read::lettered),
+        "ply" => (ply::parse, read::lettered),
         _ => return Err(AssetError::unreadable(path, "meshes end in .obj, .off or .ply")),
     };
     let watch = Watch { progress, token };
-    let bytes = read::bytes(path, FILE_LIMIT, watch)?;
+    let bytes = read(path, FILE_LIMIT, watch)?;
     let source = Source { path, bytes: &bytes, watch };
+    if bytes.is_empty() {
+        return Err(source.wrong("the file is empty"));
+    }
     let loaded = parse(&source)?;
     watch.tick(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
 }
+
+type Parser = fn(&Source<'_>) -> Result<LoadedMesh, AssetError>;
+type Reader = fn(&Path, u64, Watch<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A file in memory, and those who watch its parsing.
 #[derive(Clone, Copy)]

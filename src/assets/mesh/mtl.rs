@@ -15,7 +15,7 @@ const FILE_LIMIT: u64 = 64 << 20;
 /// Those of reading, and [`AssetError::Malformed`] with the line.
 pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>, AssetError> {
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
-    let bytes = read::bytes(path, FILE_LIMIT, quiet)?;
+    let bytes = read::text(path, FILE_LIMIT, quiet)?;
     let text = String::from_utf8_lossy(&bytes);
     for (index, line) in text.lines().enumerate() {
         check(line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;

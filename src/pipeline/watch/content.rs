@@ -26,12 +26,14 @@ pub enum Content {
     Missing,
     /// It is no regular file, or may not be read.
     Unusable,
-    /// A regular file with this hash.
+    /// A regular file with this hash, of its bytes or, if it is a very long one, of its time stamps.
     Hash([u8; 32]),
 }
 
 /// Younger changes than this are not told apart by every file system's time stamps.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
+/// Of longer files the stamp counts instead of what they hold: a sparse one of terabytes is not read through.
+const MOST_HASHED: u64 = 256 << 20;
 /// Bytes between two looks at the token.
 const CHUNK: usize = 1 << 20;
 
@@ -60,6 +62,11 @@ impl Stamp {
             modified: (metadata.mtime(), metadata.mtime_nsec()),
             changed: (metadata.ctime(), metadata.ctime_nsec()),
         }
+    }
+
+    /// What stands for the content of a file that is too long to be hashed.
+    fn content(&self) -> Content {
+        Content::Hash(*blake3::hash(format!("{self:?}").as_bytes()).as_bytes())
     }
 
     /// Whether a change after `now` is sure to show in the stamp.
@@ -91,7 +98,7 @@ impl Contents {
         if let Some(content) = known {
             return Ok(content);
         }
-        let content = hash(path, token)?;
+        let content = if stamp.len > MOST_HASHED { stamp.content() } else { hash(path, token)? };
         if stamp.is_settled(now) {
             self.known().insert(path.to_owned(), (stamp, content));
         } else {
@@ -144,6 +151,22 @@ mod tests {
         fs::write(&path, "a").expect("written");
         assert_eq!(contents.read(&path, &token), Ok(first));
         assert_eq!(contents.read(folder.path(), &token), Ok(Content::Unusable));
+    }
+
+    #[test]
+    fn a_file_of_terabytes_is_not_read() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("file");
+        let file = File::create(&path).expect("a file");
+        let token = CancelToken::new();
+        let contents = Contents::default();
+        let read = |len| {
+            file.set_len(len).expect("a sparse file");
+            contents.read(&path, &token).expect("not cancelled")
+        };
+        let first = read(3 << 40);
+        assert!(matches!(first, Content::Hash(_)));
+        assert_ne!(first, read((3 << 40) + 1));
     }
 
     #[test]

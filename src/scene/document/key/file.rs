@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::super::description::Located;
 use super::super::super::nearest::nearest;
-use super::super::super::read::{neighbour, reason};
+use super::super::super::read::{is_link, neighbour, reason};
 use super::super::super::sanitize::{shortened, visible};
 use super::super::context::Issue;
 use super::Key;
@@ -72,6 +72,9 @@ fn regular_file(path: &Path) -> Result<(), (String, Option<String>)> {
         Ok(metadata) if metadata.is_dir() => other("a folder"),
         Ok(metadata) if !metadata.is_file() => other("a pipe, a socket or a device"),
         Ok(_) => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound && is_link(path) => {
+            Err((format!("{shown} is a symbolic link to a file that does not exist"), None))
+        }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Err((
             format!("there is no file {shown}"),
             Some(match neighbour(path) {

@@ -1,0 +1,86 @@
+//! What the tests of the program as a process share.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command as Process, Output, Stdio};
+
+use assert_cmd::cargo::CommandCargoExt;
+
+/// A sphere under a point light.
+pub(crate) const SCENE: &str = r#"[render]
+width = 32
+height = 24
+samples = 2
+
+[camera]
+position = [0, 1, 4]
+look_at = [0, 1, 0]
+
+[materials.ball]
+type = "phong"
+diffuse = [0.8, 0.2, 0.1]
+
+[[sphere]]
+center = [0, 1, 0]
+radius = 0.5
+material = "ball"
+
+[[light]]
+type = "point"
+position = [1, 3, 2]
+intensity = [10, 10, 10]
+"#;
+
+/// A folder with a scene, where the program is called.
+pub(crate) struct Desk(pub(crate) tempfile::TempDir);
+
+impl Desk {
+    pub(crate) fn new() -> Self {
+        let desk = Self(tempfile::tempdir().expect("a scratch folder"));
+        desk.write("ball.toml", SCENE);
+        desk
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).expect("written");
+    }
+
+    pub(crate) fn glimt(&self, line: &str) -> Process {
+        let mut process = Process::cargo_bin("glimt").expect("the program");
+        process.current_dir(self.0.path()).args(line.split_whitespace()).stdin(Stdio::null());
+        process.env_remove("NO_COLOR").env("TERM", "xterm");
+        process
+    }
+
+    pub(crate) fn run(&self, line: &str) -> Output {
+        self.glimt(line).output().expect("it runs")
+    }
+
+    /// Runs it; gives stderr after checking the exit code and that stdout is empty.
+    #[track_caller]
+    pub(crate) fn expect(&self, line: &str, code: i32) -> String {
+        let output = self.run(line);
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
+        assert!(output.stdout.is_empty(), "{line}: nothing belongs on stdout");
+        assert!(!stderr.contains('\u{1b}'), "{line}: no escape sequence without a terminal");
+        stderr
+    }
+
+    /// As [`Self::expect`] with 0; gives the report.
+    #[track_caller]
+    pub(crate) fn report(&self, line: &str) -> serde_json::Value {
+        self.expect(&format!("{line} --once --report report.json"), 0);
+        let text = fs::read_to_string(self.path("report.json")).expect("a report");
+        serde_json::from_str(&text).expect("JSON")
+    }
+
+    #[track_caller]
+    pub(crate) fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).expect("a file")
+    }
+}

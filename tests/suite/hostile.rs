@@ -1,0 +1,351 @@
+//! Files that are not what they should be: a clear error, exit code 2, nothing on stdout, the old picture left as it
+//! was, at once and in little memory.
+
+use std::fs::{self, File};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use super::desk::{Desk, SCENE};
+
+/// What a refusal may take; it takes milliseconds, and a program that reads on takes minutes.
+const AT_ONCE: Duration = Duration::from_secs(10);
+
+const MESH: &str = "\n[[mesh]]\nfile = \"FILE\"\nmaterial = \"ball\"\n";
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// A scene that names `file` in one of the ways, and the line and column where it does.
+fn scene(file: &str) -> (String, &'static str) {
+    let ending = Path::new(file).extension().and_then(|ending| ending.to_str());
+    let (text, place) = match ending {
+        Some("png" | "jpg" | "hdr" | "exr") => {
+            let scene = SCENE.replace("[0.8, 0.2, 0.1]", "{ texture = \"t\" }");
+            (format!("{scene}\n[textures.t]\nfile = \"FILE\"\n"), "25:8")
+        }
+        Some("txt") => {
+            let camera = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
+            (SCENE.replace(camera, "orbiter = \"FILE\""), "7:11")
+        }
+        _ => (format!("{SCENE}{MESH}"), "25:8"),
+    };
+    (text.replace("FILE", file), place)
+}
+
+/// Render a scene that must be refused with all of these words.
+#[track_caller]
+fn refused(desk: &Desk, scene: &str, words: &[&str]) -> String {
+    desk.write("ball.png", "the old one");
+    let start = Instant::now();
+    let stderr = desk.expect(&format!("{scene} --once"), 2);
+    assert!(start.elapsed() < AT_ONCE, "{scene}: {:?}", start.elapsed());
+    for word in words {
+        assert!(stderr.contains(word), "{scene}: {word:?} is missing in\n{stderr}");
+    }
+    assert_eq!(desk.bytes("ball.png"), b"the old one", "{scene}");
+    stderr
+}
+
+/// Make something that is no proper file; gives what is said of it. None: it cannot be made here.
+fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
+    Some(match what {
+        "missing" => &["there is no", "file"],
+        "folder" => {
+            fs::create_dir(path).expect("a folder");
+            &["is a folder, not a"]
+        }
+        "pipe" => {
+            nix::unistd::mkfifo(path, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+            &["is a pipe, a socket or a device, not a"]
+        }
+        "device" => {
+            symlink("/dev/zero", path).expect("a link");
+            &["is a pipe, a socket or a device, not a"]
+        }
+        "circle" => {
+            symlink(path, path).expect("a link");
+            &["its symbolic links lead in a circle"]
+        }
+        "dangling" => {
+            symlink(path.with_file_name("nowhere"), path).expect("a link");
+            &["is a symbolic link to a file that does not exist"]
+        }
+        "terabytes" => {
+            // Some file systems have no such files.
+            File::create(path).and_then(|file| file.set_len(5 << 40)).ok()?;
+            &[]
+        }
+        "locked" => {
+            fs::write(path, TRIANGLE).expect("written");
+            fs::set_permissions(path, fs::Permissions::from_mode(0)).expect("locked");
+            if File::open(path).is_ok() {
+                return None; // who runs this test may read everything
+            }
+            &["permission denied"]
+        }
+        _ => unreachable!("{what}"),
+    })
+}
+
+const KINDS: [&str; 8] =
+    ["missing", "folder", "pipe", "device", "circle", "dangling", "terabytes", "locked"];
+
+#[test]
+fn a_scene_that_is_no_file() {
+    for what in KINDS {
+        let desk = Desk::new();
+        if let Some(words) = make(&desk.path("bad.toml"), what) {
+            let stderr = refused(&desk, "bad.toml", words);
+            assert!(stderr.contains("bad.toml"), "{what}: {stderr}");
+        }
+    }
+}
+
+#[test]
+fn an_asset_that_is_no_file() {
+    for what in KINDS {
+        for ending in ["obj", "off", "ply", "png", "jpg", "hdr", "exr", "txt"] {
+            let desk = Desk::new();
+            let file = format!("bad.{ending}");
+            if let Some(words) = make(&desk.path(&file), what) {
+                let (text, place) = scene(&file);
+                desk.write("scene.toml", text);
+                let stderr = refused(&desk, "scene.toml", words);
+                assert!(stderr.contains(&file), "{what}: {stderr}");
+                assert!(stderr.contains(&format!("scene.toml:{place}")), "{what} {ending}: {stderr}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_asset_with_the_wrong_content() {
+    let noise: Vec<u8> = (0..5000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    let zeros = vec![0; 5000];
+    for (ending, empty, wrong) in [
+        ("obj", "the file is empty", "bad.obj:1: this is a binary file of another kind"),
+        ("off", "the file is empty", "bad.off:1: "),
+        ("ply", "the file is empty", "bad.ply:1: "),
+        ("png", "the file is empty", "no image that can be read"),
+        ("jpg", "the file is empty", "no image that can be read"),
+        ("hdr", "the file is empty", "no image that can be read"),
+        ("exr", "the file is empty", "no image that can be read"),
+        ("txt", "has a line `s size radius`", "bad.txt:1: this is a binary file of another kind"),
+    ] {
+        let desk = Desk::new();
+        let file = format!("bad.{ending}");
+        let (text, place) = scene(&file);
+        desk.write("scene.toml", text);
+        let place = format!("scene.toml:{place}");
+        desk.write(&file, "");
+        refused(&desk, "scene.toml", &[&file, empty, &place]);
+        for bytes in [&noise, &zeros] {
+            desk.write(&file, bytes);
+            refused(&desk, "scene.toml", &[wrong, &place]);
+        }
+        // A gigabyte of nothing is told from its start.
+        let huge = File::create(desk.path(&file)).and_then(|file| file.set_len(1 << 30));
+        huge.expect("a sparse file");
+        refused(&desk, "scene.toml", &[&file, &place]);
+    }
+}
+
+#[test]
+fn a_gigabyte_and_bytes_that_are_no_text_as_a_scene() {
+    let desk = Desk::new();
+    File::create(desk.path("huge.toml")).and_then(|file| file.set_len(1 << 30)).expect("a sparse file");
+    refused(&desk, "huge.toml", &["huge.toml", "larger than", "[[mesh]]"]);
+    desk.write("latin.toml", SCENE.replace("[0.8, 0.2, 0.1]", "0.8 # caf\u{e9}").replace('\u{e9}', "@"));
+    let latin: Vec<u8> =
+        desk.bytes("latin.toml").iter().map(|&byte| if byte == b'@' { 0xe9 } else { byte }).collect();
+    desk.write("latin.toml", latin);
+    refused(&desk, "latin.toml", &["latin.toml:12:20", "0xe9", "UTF-8"]);
+    desk.write("deep.toml", format!("x = {}\n", "[".repeat(500_000)));
+    refused(&desk, "deep.toml", &["deep.toml:1:", "nested too deeply"]);
+    desk.write("zeros.toml", [0; 999]);
+    refused(&desk, "zeros.toml", &["zeros.toml", "binary file"]);
+}
+
+/// A mesh that must be refused with these words, at its place in the scene.
+#[track_caller]
+fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
+    let desk = Desk::new();
+    desk.write(name, content);
+    desk.write("scene.toml", scene(name).0);
+    let stderr = refused(&desk, "scene.toml", words);
+    assert!(stderr.contains("scene.toml:25:8") && stderr.contains(name), "{stderr}");
+}
+
+#[test]
+fn meshes_that_cannot_be_used() {
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    mesh_refused("a.obj", format!("{vertices}f 1 2 4\n").as_bytes(), &["a.obj:4: "]);
+    mesh_refused("a.obj", format!("{vertices}f 1 2 -4\n").as_bytes(), &["a.obj:4: "]);
+    mesh_refused("a.obj", format!("{vertices}f 1 2 99999999999999999999\n").as_bytes(), &["a.obj:4: "]);
+    mesh_refused("a.obj", format!("{vertices}f 1 2\n").as_bytes(), &["a.obj", "usable face"]);
+    mesh_refused("a.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", &["no usable face", "finite"]);
+    mesh_refused("a.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", &["a.off:6: "]);
+    mesh_refused("a.off", b"OFF\n4000000000 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", &["a.off:", "4000000000"]);
+    mesh_refused("a.off", b"OFF\n3 4000000000 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", &["4000000000"]);
+    for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let header = |vertices: u64, faces: u64| {
+            format!(
+                "ply\nformat {format} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
+                 property float z\nelement face {faces}\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n"
+            )
+        };
+        mesh_refused("a.ply", header(4_000_000_000, 1).as_bytes(), &["4000000000"]);
+        mesh_refused("a.ply", header(1, 4_000_000_000).as_bytes(), &["4000000000"]);
+        mesh_refused("a.ply", header(u64::MAX, u64::MAX).as_bytes(), &["a.ply"]);
+        mesh_refused("a.ply", header(1, 1).as_bytes(), &["a.ply"]);
+    }
+}
+
+#[test]
+fn faces_that_cannot_be_used_are_counted_and_the_rest_is_rendered() {
+    let desk = Desk::new();
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 1e999 1 1\n";
+    desk.write("a.obj", format!("{vertices}f 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
+    desk.write("scene.toml", scene("a.obj").0);
+    let stderr = desk.expect("scene.toml --once -o a.png", 0);
+    let warning = "warning: a.obj: left out 2 faces with non-finite coordinates and 1 face without area";
+    assert!(stderr.contains(warning) && stderr.contains("scene.toml:25:8"), "{stderr}");
+    assert_eq!(desk.report("scene.toml -o a.png")["counters"]["triangles"], 1);
+}
+
+#[test]
+fn material_files() {
+    for what in KINDS {
+        let desk = Desk::new();
+        let Some(_) = make(&desk.path("bad.mtl"), what) else { continue };
+        desk.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
+        let (text, place) = scene("a.obj");
+        // The scene has a material for it: nothing is lost.
+        desk.write("scene.toml", &text);
+        let stderr = desk.expect("scene.toml --once -o a.png", 0);
+        assert!(stderr.contains("warning: a.obj: cannot read bad.mtl"), "{what}: {stderr}");
+        assert!(stderr.contains(&format!("scene.toml:{place}")), "{what}: {stderr}");
+        // It has none.
+        desk.write("scene.toml", text.replace(MESH.lines().last().expect("a line"), ""));
+        refused(&desk, "scene.toml", &["a.obj", "bad.mtl", "material", "scene.toml:25:8"]);
+    }
+    for (content, words) in
+        [("\0\0\0", "bad.mtl:1: "), ("newmtl a\nKd 1\n", "bad.mtl:2: "), ("newmtl a\nNs nan\n", "bad.mtl:2: ")]
+    {
+        let desk = Desk::new();
+        desk.write("bad.mtl", content);
+        desk.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
+        desk.write("scene.toml", scene("a.obj").0);
+        refused(&desk, "scene.toml", &[words, "scene.toml:25:8"]);
+    }
+}
+
+#[test]
+fn pictures_that_lie_about_their_size() {
+    let png = {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 60_000, 60_000);
+        encoder.set_color(png::ColorType::Rgb);
+        let _ = encoder.write_header().expect("a header").finish();
+        bytes
+    };
+    for (name, content) in [
+        ("a.png", png.as_slice()),
+        ("a.ppm", b"P6\n16000 16000\n255\nabc".as_slice()),
+        ("a.ppm", b"P6\n4000000000 4000000000\n255\nabc"),
+        ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16000 +X 16000\nabc"),
+        ("a.bmp", b"BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\xff\xff\xff\x7f\xff\xff\xff\x7f\x01\0\x18\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"),
+    ] {
+        let desk = Desk::new();
+        desk.write(name, content);
+        desk.write("scene.toml", scene("a.png").0.replace("a.png", name));
+        refused(&desk, "scene.toml", &[name, "scene.toml:25:8"]);
+    }
+}
+
+/// What a terminal would act on, or not show.
+const EVIL: &str = "\u{1b}]52;c;ZXZpbA==\u{7}\u{1b}[2J\u{9b}31m\r\u{202e}gnp\u{8}";
+
+#[track_caller]
+fn assert_harmless(output: &std::process::Output, code: i32) {
+    let text = String::from_utf8(output.stderr.clone()).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    let harmful = |c: char| (c.is_control() && c != '\n') || ('\u{202a}'..='\u{202e}').contains(&c);
+    assert!(!text.chars().any(harmful), "{text:?}");
+    assert!(output.stdout.iter().all(|byte| *byte == b'\n' || !byte.is_ascii_control()));
+    assert!(text.contains("52;c;") || !output.stdout.is_empty(), "the name is not there: {text}");
+}
+
+#[test]
+fn names_reach_the_terminal_without_teeth() {
+    let desk = Desk::new();
+    let toml: String = EVIL.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
+    let run = |arguments: &[&str]| {
+        let mut process = desk.glimt("");
+        process.args(arguments).output().expect("it runs")
+    };
+    let name = format!("{EVIL}.toml");
+    // The scene's own path: missing, wrong, right.
+    assert_harmless(&run(&[&name, "--once"]), 2);
+    desk.write(&name, "[render]\nwidth = 0\n");
+    assert_harmless(&run(&[&name, "--once"]), 2);
+    assert_harmless(&run(&["check", &name]), 2);
+    assert_harmless(&run(&["new", &name]), 2);
+    desk.write(&name, SCENE);
+    assert_harmless(&run(&[&name, "--once"]), 0);
+    assert_harmless(&run(&[&name, "--once", "--progress", "plain"]), 0);
+    assert_harmless(&run(&["check", &name]), 0);
+    assert_harmless(&run(&["ball.toml", "--once", "-o", &format!("{EVIL}.xyz")]), 2);
+    assert_harmless(&run(&["ball.toml", "--once", "-o", &format!("{EVIL}/a.png")]), 1);
+    assert_harmless(&run(&["ball.toml", "--once", "--report", &format!("{EVIL}/a.json")]), 1);
+    assert_harmless(&run(&["ball.toml", "--once", &format!("--{EVIL}")]), 2);
+    assert_harmless(&run(&["ball.toml", "--once", "--view", EVIL]), 2);
+    // Names in the scene.
+    for (from, to) in [
+        ("material = \"ball\"", format!("material = \"{toml}\"")),
+        ("type = \"phong\"", format!("type = \"{toml}\"")),
+        ("[0.8, 0.2, 0.1]", format!("{{ texture = \"{toml}\" }}")),
+        ("[0.8, 0.2, 0.1]", format!("\"{toml}\"")),
+        ("radius = 0.5", format!("\"{toml}\" = 0.5")),
+        ("[[sphere]]", format!("[[\"{toml}\"]]")),
+        ("[materials.ball]", format!("[materials.\"{toml}\"]")),
+        ("position = [0, 1, 4]", format!("orbiter = \"{toml}.txt\"")),
+        ("samples = 2", format!("output = \"{toml}.png\"\nwidth = 3 {EVIL}")),
+    ] {
+        desk.write("ball.toml", SCENE.replace(from, &to));
+        assert_harmless(&run(&["ball.toml", "--once"]), 2);
+    }
+    // Names in meshes.
+    for (obj, mtl) in [
+        (format!("usemtl {EVIL}\n{TRIANGLE}"), String::new()),
+        (format!("mtllib {EVIL}.mtl\n{TRIANGLE}"), String::new()),
+        (format!("g {EVIL}\no {EVIL}\n{}f 1/1 2/1 3\n", TRIANGLE.replace("f ", "vt 0 0\nf ")), String::new()),
+        (format!("mtllib a.mtl\nusemtl {EVIL}\n{TRIANGLE}"), format!("newmtl {EVIL}\nmap_Kd {EVIL}.png\n")),
+        (format!("mtllib a.mtl\nusemtl a\n{TRIANGLE}"), format!("newmtl a\nKd {EVIL}\n")),
+        (format!("v {EVIL} 0 0\n"), String::new()),
+    ] {
+        desk.write("a.obj", obj);
+        desk.write("a.mtl", mtl);
+        for material in ["", "material = \"ball\"\n"] {
+            desk.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"a.obj\"\n{material}"));
+            let output = run(&["ball.toml", "--once"]);
+            let text = String::from_utf8_lossy(&output.stderr).into_owned();
+            let harmful = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+            assert!(!text.chars().any(harmful), "{text:?}");
+            assert!(output.stdout.is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_path_that_is_no_text() {
+    let desk = Desk::new();
+    let name = std::ffi::OsStr::from_bytes(b"b\xff\x1b[2J.toml");
+    fs::write(desk.0.path().join(name), SCENE).expect("written");
+    let output = desk.glimt("--once").arg(name).output().expect("it runs");
+    let text = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(!text.contains('\u{1b}'), "{text:?}");
+    let written = std::ffi::OsStr::from_bytes(b"b\xff\x1b[2J.png");
+    assert!(desk.0.path().join(written).is_file());
+}
