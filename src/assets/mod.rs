@@ -63,6 +63,13 @@ pub struct LoadedMesh {
     pub companions: Vec<PathBuf>,
 }
 
+impl LoadedMesh {
+    /// Whether there are triangles and no material for any of them.
+    pub fn lacks_materials(&self) -> bool {
+        self.materials.is_empty() && !self.mesh.triangles.is_empty()
+    }
+}
+
 /// Faces that could not be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {

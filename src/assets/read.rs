@@ -83,10 +83,7 @@ fn bytes_if(
     bytes.try_reserve_exact(length + 1).map_err(|error| AssetError::unreadable(path, error.to_string()))?;
     loop {
         watch.tick(bytes.len().min(length), 2 * length)?;
-        let got = (&mut file)
-            .take(CHUNK as u64)
-            .read_to_end(&mut bytes)
-            .map_err(unreadable)?;
+        let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;
         if got == 0 {
             return Ok(bytes);
         }

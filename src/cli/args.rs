@@ -1,5 +1,6 @@
 //! What can be typed.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::builder::styling::{AnsiColor, Styles};
@@ -82,39 +83,39 @@ pub struct RenderArgs {
     #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Bits per channel of PNG files: 8 or 16
-    #[arg(long, value_name = "BITS", value_parser = bit_depth, help_heading = "Output")]
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = bit_depth, help_heading = "Output")]
     pub bit_depth: Option<u8>,
     /// Write settings, timings and counters of the render as JSON
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub report: Option<PathBuf>,
 
     /// Pixels across
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Picture")]
     pub width: Option<u32>,
     /// Pixels down
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Picture")]
     pub height: Option<u32>,
     /// Samples per pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = samples, help_heading = "Picture")]
     pub samples: Option<u32>,
     /// Stop after this long, with the samples that there are
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, help_heading = "Picture")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Picture")]
     pub time: Option<f64>,
     /// Render these pixels only (left, top, width, height); the rest stays black
-    #[arg(long, value_name = "X,Y,W,H", value_parser = crop, help_heading = "Picture")]
+    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
     pub crop: Option<Rect>,
     /// What the picture shows
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Picture")]
     pub view: Option<View>,
     /// Seed of all random numbers
-    #[arg(long, value_name = "N", help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, help_heading = "Picture")]
     pub seed: Option<u32>,
 
     /// How light is followed
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Method")]
     pub integrator: Option<Integrator>,
     /// Scatterings along one path; 0: emitted light only, 1: direct light
-    #[arg(long, value_name = "N", help_heading = "Method")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, help_heading = "Method")]
     pub max_depth: Option<u32>,
     /// Shadows; hard: one ray to the middle of an area light
     #[arg(long, value_enum, value_name = "HOW", help_heading = "Method")]
@@ -129,7 +130,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Method")]
     pub accel: Option<Accel>,
     /// Threads that render; 0: one per core
-    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Method")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Method")]
     pub threads: Option<usize>,
 
     /// How progress is said on stderr with --once
@@ -260,6 +261,23 @@ fn bit_depth(text: &str) -> Result<u8, String> {
         "16" => Ok(16),
         _ => Err("expected 8 or 16".to_owned()),
     }
+}
+
+fn side(text: &str) -> Result<u32, String> {
+    whole(text, 1..=65536)
+}
+
+fn samples(text: &str) -> Result<u32, String> {
+    whole(text, 1..=u32::MAX)
+}
+
+fn any_whole(text: &str) -> Result<u32, String> {
+    whole(text, 0..=u32::MAX)
+}
+
+fn whole(text: &str, range: RangeInclusive<u32>) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| format!("expected a whole number from {} to {}", range.start(), range.end()))
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

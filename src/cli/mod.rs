@@ -21,17 +21,15 @@ use clap::Parser;
 use self::args::{Args, Subcommand};
 use self::console::Console;
 pub use self::exit::Exit;
+use crate::scene::sanitize::visible;
 
 /// Do what the command line says; gives the exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     crate::output::write::prepare_process();
-    let args = match Args::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let args = match Args::try_parse_from(&arguments) {
         Ok(args) => args,
-        Err(error) => {
-            // A closed pipe: nobody reads the help.
-            let _ = error.print();
-            return if error.use_stderr() { Exit::WRONG } else { Exit::DONE };
-        }
+        Err(error) => return misunderstood(&error, &arguments),
     };
     let console = Console::new(args.color());
     match args.command {
@@ -43,4 +41,39 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
             Err(message) => console.fail(Exit::WRONG, &message),
         },
     }
+}
+
+/// Help and the version are answers; everything else is a wrong call.
+fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
+    let console = Console::new(args::Color::Auto);
+    if !error.use_stderr() {
+        // A closed pipe: nobody reads the help.
+        let _ = error.print();
+        return Exit::DONE;
+    }
+    if let Some(second) = second_scene(error) {
+        let message = format!("{second:?} is one scene too many: glimt renders one at a time");
+        return console.fail(Exit::WRONG, &message);
+    }
+    let is_plain = |argument: &OsString| {
+        let text = argument.to_string_lossy();
+        visible(&text) == text
+    };
+    if arguments.iter().all(is_plain) {
+        let _ = error.print();
+    } else {
+        console.say(&error.render().to_string());
+    }
+    Exit::WRONG
+}
+
+/// The word behind the scene, where a command could stand, that is no command.
+fn second_scene(error: &clap::Error) -> Option<&str> {
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+    let word = match error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg)) {
+        Some(ContextValue::String(word)) if error.kind() == ErrorKind::ArgumentConflict => word,
+        _ => return None,
+    };
+    let is_command = <Args as clap::CommandFactory>::command().find_subcommand(word).is_some();
+    (!is_command && !word.starts_with(['-', '<'])).then_some(word)
 }

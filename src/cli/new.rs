@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::console::Console;
 use super::exit::Exit;
+use crate::output::OutputError;
 use crate::scene::starter;
 
 pub(super) fn run(file: &Path, console: &Console) -> Exit {
@@ -20,7 +21,10 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
             console.fail(Exit::WRONG, &format!("{name} exists already, and is left as it is"))
         }
-        Err(error) => console.fail(Exit::FAILED, &format!("cannot write {name}: {error}")),
+        Err(source) => {
+            let error = OutputError::File { path: file.to_owned(), source };
+            console.fail(Exit::FAILED, &error.to_string())
+        }
     }
 }
 

@@ -10,6 +10,7 @@ use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::report;
 use super::signals::{self, Ended};
+use crate::output::check_place;
 use crate::pipeline::protocol::{Command, Event, Failure, Report, Request};
 use crate::pipeline::{Handle, start};
 
@@ -19,6 +20,9 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(50);
 
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
+    if let Some(Err(error)) = order.report.as_deref().map(check_place) {
+        return console.fail(Exit::FAILED, &error.to_string());
+    }
     let worker = match start() {
         Ok(worker) => worker,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")),

@@ -80,10 +80,11 @@ impl OutputError {
     }
 }
 
-/// The system's words without its number.
+/// The system's words without its number, as they stand within a sentence.
 fn words(error: &io::Error) -> String {
     let text = error.to_string();
-    text.split(" (os error").next().unwrap_or(&text).to_owned()
+    let mut letters = text.split(" (os error").next().unwrap_or(&text).chars();
+    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
 }
 
 fn way_out(error: &io::Error) -> &'static str {

@@ -70,6 +70,14 @@ pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     Ok(format)
 }
 
+/// Whether any file can be written here, as far as can be told without writing.
+///
+/// # Errors
+/// As [`check_target`], but for the ending.
+pub fn check_place(path: &Path) -> Result<(), OutputError> {
+    place::find(path).map(|_| ())
+}
+
 /// A component as float files hold it: the light of a picture is neither negative nor infinite.
 fn as_light(component: f32) -> f32 {
     if component.is_nan() || component < 0.0 { 0.0 } else { component.min(f32::MAX) }

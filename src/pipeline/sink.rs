@@ -44,9 +44,13 @@ impl Sink {
         self.send(Event::Preview { generation: self.generation });
     }
 
-    /// Watch the loading of one asset: `load` gets the progress sink to report to; its end is said whatever
-    /// `load` reports.
-    pub(super) fn asset<T>(&self, name: &str, load: impl FnOnce(&(dyn Fn(u64, u64) + Sync)) -> T) -> T {
+    /// Watch the loading of one asset: `load` gets the progress sink to report to; its end is said
+    /// where it succeeds, whatever `load` reports.
+    pub(super) fn asset<T, E>(
+        &self,
+        name: &str,
+        load: impl FnOnce(&(dyn Fn(u64, u64) + Sync)) -> Result<T, E>,
+    ) -> Result<T, E> {
         let shown = AtomicU64::new(0);
         let say = |done, total| {
             let progress = AssetProgress { name: name.to_owned(), done, total };
@@ -60,7 +64,9 @@ impl Sink {
                 say(part, PARTS);
             }
         });
-        say(PARTS, PARTS);
+        if result.is_ok() {
+            say(PARTS, PARTS);
+        }
         result
     }
 }
@@ -77,11 +83,13 @@ mod tests {
     fn an_asset_is_said_at_most_a_hundred_times_and_ends() {
         let (events, received) = mpsc::channel();
         let sink = Sink { generation: 3, events, previews: PreviewSlot::default() };
-        sink.asset("bricks", |progress| {
+        let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
             for done in 0..10_000 {
                 progress(done, 10_000);
             }
-        });
+            Ok(())
+        };
+        sink.asset("bricks", load).expect("loaded");
         drop(sink);
         let seen: Vec<(u64, u64)> = received
             .into_iter()
@@ -95,5 +103,17 @@ mod tests {
         assert_eq!(seen.len(), 101);
         assert!(seen.windows(2).all(|pair| pair[0].0 < pair[1].0));
         assert_eq!(seen.last(), Some(&(100, 100)));
+    }
+
+    #[test]
+    fn what_failed_does_not_end() {
+        let (events, received) = mpsc::channel();
+        let sink = Sink { generation: 3, events, previews: PreviewSlot::default() };
+        sink.asset("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
+        drop(sink);
+        let ends = received.into_iter().filter(
+            |event| matches!(event, Event::Asset { progress, .. } if progress.done == progress.total),
+        );
+        assert_eq!(ends.count(), 0);
     }
 }

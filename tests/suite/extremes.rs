@@ -34,8 +34,14 @@ fn lamp(position: &str, intensity: &str) -> String {
 #[track_caller]
 fn renders(name: &str, render: &str, camera: &str, material: &str, rest: &str) -> serde_json::Value {
     let desk = Desk::new();
-    desk.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 2 0 0\nv 0 1e-30 0\nf 1 2 3\nf 1 2 4\nf 1 2 6\n");
-    desk.write("a.toml", format!("[render]\n{render}\n[camera]\n{camera}\n[materials.m]\n{material}\n{rest}"));
+    desk.write(
+        "a.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 2 0 0\nv 0 1e-30 0\nf 1 2 3\nf 1 2 4\nf 1 2 6\n",
+    );
+    desk.write(
+        "a.toml",
+        format!("[render]\n{render}\n[camera]\n{camera}\n[materials.m]\n{material}\n{rest}"),
+    );
     let report = desk.report("a.toml -o a.png -o a.exr");
     assert_eq!(report["counters"]["non_finite_samples"], 0, "{name}");
     assert_eq!(report["image"]["complete"], true, "{name}");
@@ -113,7 +119,8 @@ fn lights_at_the_limits() {
     ] {
         renders(&lamp[..lamp.len().min(99)], SMALL, CAMERA, PHONG, &format!("{ball}{lamp}"));
     }
-    let glowing = |radiance: &str| format!("type = \"phong\"\ndiffuse = [0.5, 0.5, 0.5]\nemission = [{radiance}]");
+    let glowing =
+        |radiance: &str| format!("type = \"phong\"\ndiffuse = [0.5, 0.5, 0.5]\nemission = [{radiance}]");
     for rest in [
         quad("-1e17, 5, -1e17", "2e17, 0, 0", "0, 0, 2e17"),
         quad("0, 1, 0", "1e-17, 0, 0", "0, 1e-17, 0"),

@@ -1,1 +1,316 @@
-//! x
+//! Each option changes what it says, and nothing else; the report tells.
+
+use std::fs;
+use std::io::Read;
+use std::process::Stdio;
+
+use super::desk::{Desk, SCENE};
+
+/// A lamp with an extent, a mirror, a lens: something for every option.
+const ROOM: &str = r#"[render]
+width = 24
+height = 18
+samples = 2
+seed = 3
+
+[camera]
+position = [0, 1, 4]
+look_at = [0, 0.8, 0]
+aperture = 0.3
+focus = 5
+
+[materials.ball]
+type = "phong"
+diffuse = [0.8, 0.2, 0.1]
+specular = [0.1, 0.1, 0.1]
+
+[materials.mirror]
+type = "mirror"
+reflectance = [0.9, 0.9, 0.9]
+
+[materials.lamp]
+type = "phong"
+diffuse = [0, 0, 0]
+emission = [8, 8, 8]
+
+[[sphere]]
+center = [0.5, 0.5, 0]
+radius = 0.5
+material = "ball"
+
+[[sphere]]
+center = [-0.6, 0.5, 0]
+radius = 0.5
+material = "mirror"
+
+[[quad]]
+corner = [-3, 0, 3]
+u = [6, 0, 0]
+v = [0, 0, -6]
+material = "ball"
+
+[[quad]]
+corner = [-0.5, 3, -0.5]
+u = [1, 0, 0]
+v = [0, 0, 1]
+material = "lamp"
+"#;
+
+fn room() -> Desk {
+    let desk = Desk::new();
+    desk.write("room.toml", ROOM);
+    desk
+}
+
+/// The bytes of the picture with these options.
+#[track_caller]
+fn picture(desk: &Desk, options: &str) -> Vec<u8> {
+    desk.expect(&format!("room.toml --once -o picture.ppm --progress none {options}"), 0);
+    desk.bytes("picture.ppm")
+}
+
+/// The pixels of a PPM of 8 bits.
+fn pixels(ppm: &[u8], count: usize) -> &[u8] {
+    &ppm[ppm.len() - 3 * count..]
+}
+
+#[test]
+fn each_option_changes_the_picture_and_is_told_by_the_report() {
+    let desk = room();
+    let plain = picture(&desk, "");
+    assert_eq!(plain, picture(&desk, ""), "twice the same");
+    let cases: [(&str, &str, serde_json::Value); 8] = [
+        ("--shadows hard", "shadows", "hard".into()),
+        ("--shadows off", "shadows", "off".into()),
+        ("--dof off", "dof", false.into()),
+        ("--seed 4", "seed", 4.into()),
+        ("--view normal", "view", "normal".into()),
+        ("--view depth", "view", "depth".into()),
+        ("--view albedo", "view", "albedo".into()),
+        ("--view shadow", "view", "shadow".into()),
+    ];
+    for (option, key, value) in cases {
+        assert_ne!(picture(&desk, option), plain, "{option}");
+        let report = desk.report(&format!("room.toml {option}"));
+        assert_eq!(report["settings"][key], value, "{option}");
+    }
+    for option in ["--max-depth 0", "--max-depth 1", "--samples 3"] {
+        assert_ne!(picture(&desk, option), plain, "{option}");
+    }
+    for same in [
+        "--seed 3",
+        "--dof on",
+        "--shadows soft",
+        "--view beauty",
+        "--samples 2",
+        "--integrator whitted",
+        "--accel bvh",
+        "--threads 1",
+        "--threads 0",
+        "--color none",
+        "--preview none",
+        "--photons off",
+    ] {
+        assert_eq!(picture(&desk, same), plain, "{same}");
+    }
+}
+
+#[test]
+fn depth_decides_which_rays_there_are() {
+    let desk = room();
+    let counters = |depth: u32| desk.report(&format!("room.toml --max-depth {depth}"))["counters"].clone();
+    let (none, direct, deep) = (counters(0), counters(1), counters(8));
+    assert_eq!((&none["shadow_rays"], &none["reflected_rays"]), (&0.into(), &0.into()));
+    assert!(
+        direct["shadow_rays"].as_u64() > Some(0)
+            && direct["reflected_rays"].as_u64() <= deep["reflected_rays"].as_u64()
+    );
+    assert!(deep["reflected_rays"].as_u64() > Some(0));
+    assert_eq!(none["camera_rays"], 24 * 18 * 2);
+}
+
+#[test]
+fn size_samples_and_time() {
+    let desk = room();
+    let report = desk.report("room.toml --width 7 --height 5 --samples 9 -o a.png");
+    assert_eq!((&report["image"]["width"], &report["image"]["height"]), (&7.into(), &5.into()));
+    assert_eq!(report["image"]["samples"]["max"], 9);
+    let decoder =
+        png::Decoder::new(std::io::BufReader::new(fs::File::open(desk.path("a.png")).expect("a picture")));
+    let reader = decoder.read_info().expect("a PNG");
+    assert_eq!((reader.info().width, reader.info().height), (7, 5));
+    let report = desk.report("room.toml --samples 4000000000 --time 0.3");
+    assert_eq!(report["image"]["complete"], false);
+    assert!(report["seconds"].as_f64() < Some(20.0));
+    assert!(report["image"]["samples"]["min"].as_u64() > Some(0));
+}
+
+#[test]
+fn a_crop_has_the_pixels_of_the_whole_and_black_around() {
+    let desk = room();
+    let whole = picture(&desk, "");
+    let cut = picture(&desk, "--crop 5,4,10,8");
+    let (whole, cut) = (pixels(&whole, 24 * 18), pixels(&cut, 24 * 18));
+    for (index, (a, b)) in whole.chunks(3).zip(cut.chunks(3)).enumerate() {
+        let (x, y) = (index % 24, index / 24);
+        let is_inside = (5..15).contains(&x) && (4..12).contains(&y);
+        assert_eq!(b, if is_inside { a } else { &[0, 0, 0] }, "{x}, {y}");
+    }
+    assert!(cut.iter().any(|byte| *byte > 0));
+}
+
+#[test]
+fn every_format_at_once_and_depth_of_bits() {
+    let desk = room();
+    let report = desk.report("room.toml -o a.png -o a.exr -o a.ppm -o a.hdr -o a.jpg");
+    assert_eq!(report["image"]["path"], "a.png");
+    for (name, start) in [
+        ("a.png", b"\x89PNG\r\n\x1a\n".as_slice()),
+        ("a.exr", b"\x76\x2f\x31\x01"),
+        ("a.ppm", b"P6"),
+        ("a.hdr", b"#?RADIANCE"),
+        ("a.jpg", b"\xff\xd8\xff"),
+    ] {
+        assert!(desk.bytes(name).starts_with(start), "{name}");
+        assert_eq!(image::open(desk.path(name)).map(|image| image.width()).ok(), Some(24), "{name}");
+    }
+    let depth = |option: &str| {
+        desk.report(&format!("room.toml -o depth.png {option}"));
+        image::open(desk.path("depth.png")).expect("a picture").color().bits_per_pixel()
+    };
+    assert_eq!((depth(""), depth("--bit-depth 8"), depth("--bit-depth 16")), (24, 24, 48));
+}
+
+#[test]
+fn wrong_values_are_answered_with_what_is_expected() {
+    let desk = Desk::new();
+    for (option, words) in [
+        ("--samples abc", "expected a whole number from 1 to 4294967295"),
+        ("--samples -1", "expected a whole number from 1 to 4294967295"),
+        ("--width 0", "expected a whole number from 1 to 65536"),
+        ("--height 65537", "expected a whole number from 1 to 65536"),
+        ("--seed -1", "expected a whole number from 0 to 4294967295"),
+        ("--max-depth 1.5", "expected a whole number from 0 to 4294967295"),
+        ("--time -3", "expected a number of seconds above 0"),
+        ("--time nan", "expected a number of seconds above 0"),
+        ("--threads -2", "expected a number from 0 to 4096"),
+        ("--bit-depth 10", "expected 8 or 16"),
+        ("--crop -1,0,2,2", "expected four whole numbers X,Y,W,H"),
+        ("--crop 30,0,9,9", "does not lie inside the picture of 32×24 pixels"),
+        ("--shadows maybe", "[possible values: off, hard, soft]"),
+        ("--dof perhaps", "[possible values: on, off]"),
+        ("--view nothing", "beauty, normal, depth"),
+        ("--progress loud", "[possible values: auto, plain, json, none]"),
+        ("--color pink", "truecolor"),
+        ("--sampels 3", "--samples"),
+        ("-o a.webp", "use one of .png, .exr"),
+        ("-o a", "use one of .png, .exr"),
+        ("-o a.png -o a.png", "twice"),
+        ("other.toml", "glimt renders one at a time"),
+    ] {
+        let stderr = desk.expect(&format!("ball.toml --once {option}"), 2);
+        assert!(stderr.contains(words), "{option}: {stderr}");
+    }
+    assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
+}
+
+#[test]
+fn targets_are_told_before_the_work() {
+    let desk = Desk::new();
+    std::os::unix::fs::symlink("/dev/full", desk.path("full.png")).expect("a link");
+    let stderr = desk.expect("ball.toml --once -o full.png", 1);
+    assert!(stderr.contains("cannot write full.png: no space left"), "{stderr}");
+    for option in ["-o nowhere/a.png", "--report nowhere/r.json", "--report .", "-o ball.toml/a.png"] {
+        let stderr = desk.expect(&format!("ball.toml --once --samples 4000000000 {option}"), 1);
+        assert!(stderr.contains("cannot write") && !stderr.contains("os error"), "{option}: {stderr}");
+    }
+    let stderr = desk.expect("new nowhere/x.toml", 1);
+    assert!(stderr.contains("cannot write nowhere/x.toml: no such file or directory;"), "{stderr}");
+}
+
+#[test]
+fn help_fits_and_names_every_option() {
+    let desk = Desk::new();
+    for line in ["--help", "-h", "check --help", "new --help"] {
+        let output = desk.run(line);
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        let longest = text.lines().map(|line| line.chars().count()).max().expect("lines");
+        assert!(longest <= 100, "{line}: {longest}\n{text}");
+        assert!(output.stderr.is_empty() && !text.contains('\u{1b}'));
+    }
+    let text = String::from_utf8(desk.run("--help").stdout).expect("UTF-8");
+    for option in [
+        "--once",
+        "--output",
+        "--report",
+        "--width",
+        "--height",
+        "--samples",
+        "--time",
+        "--crop",
+        "--view",
+        "--seed",
+        "--integrator",
+        "--max-depth",
+        "--shadows",
+        "--photons",
+        "--dof",
+        "--accel",
+        "--threads",
+        "--progress",
+        "--preview",
+        "--color",
+        "--bit-depth",
+    ] {
+        assert!(text.contains(option), "{option}");
+    }
+}
+
+#[test]
+fn progress_plain_and_none_and_color() {
+    let desk = room();
+    let plain = desk.expect("room.toml --once --progress plain", 0);
+    let stages: Vec<&str> = plain.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(
+        stages.starts_with(&["parse", "meshes", "textures", "accel", "lights", "photons", "render"]),
+        "{plain}"
+    );
+    assert_eq!(plain, plain.trim_start(), "{plain}");
+    desk.write("room.toml", ROOM.replace("radius = 0.5", "radius = 0"));
+    assert!(!desk.expect("room.toml --once --progress none", 2).is_empty(), "errors are always said");
+    let colored = desk.run("room.toml --once --color truecolor");
+    assert!(String::from_utf8_lossy(&colored.stderr).contains("\u{1b}["));
+    assert!(!desk.expect("room.toml --once --color none", 2).contains('\u{1b}'));
+}
+
+#[test]
+fn what_failed_is_not_called_loaded() {
+    let desk = Desk::new();
+    desk.write("bad.obj", "v 0 0 0\n");
+    desk.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"bad.obj\"\nmaterial = \"ball\"\n"));
+    let stderr = desk.expect("ball.toml --once --progress plain", 2);
+    assert!(!stderr.contains("loaded") && stderr.contains("1 failed"), "{stderr}");
+}
+
+#[test]
+fn streams_that_nobody_reads() {
+    let desk = Desk::new();
+    for line in
+        ["--help", "--version", "check ball.toml", "ball.toml --once", "missing.toml --once", "--nonsense"]
+    {
+        let mut child =
+            desk.glimt(line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+        drop((child.stdout.take(), child.stderr.take()));
+        let code = child.wait().expect("it ends").code();
+        let expected = if ["missing.toml --once", "--nonsense"].contains(&line) { 2 } else { 0 };
+        assert_eq!(code, Some(expected), "{line}");
+    }
+    // A panic would be heard on the stream that is left.
+    let mut child =
+        desk.glimt("check ball.toml").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("runs");
+    drop(child.stdout.take());
+    let mut said = String::new();
+    child.stderr.take().expect("piped").read_to_string(&mut said).expect("UTF-8");
+    child.wait().expect("it ends");
+    assert_eq!(said, "");
+}

@@ -51,7 +51,10 @@ fn every_lossless_format_gives_the_same_texels() {
 fn the_content_counts_before_the_ending() {
     assert!(load_bytes("a.jpg", &png(), ImageEncoding::Color).is_ok());
     assert!(load_bytes("none", &png(), ImageEncoding::Color).is_ok());
-    assert!(says("a.txt", b"some words that are no image").contains("a.txt: no image that can be read"));
+    assert!(
+        says("a.txt", b"some words that are no image")
+            .contains("a.txt: its content is no image that can be read")
+    );
     assert!(says("a.gif", b"GIF89a\x01\0\x01\0\0\0\0;").contains("no image that can be read"));
 }
 

@@ -8,11 +8,12 @@ use rayon::prelude::*;
 use super::super::cache::Pool;
 use super::super::fingerprint::{Fingerprint, Key};
 use super::super::watch::content::FileRead;
-use super::{Asset, Findings, Reading, Staged, Stop, loaded_and_kept};
+use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, Dropped, LoadedMesh};
 use crate::control::Cancelled;
 use crate::scene::Loaded;
+use crate::scene::description::Shape;
 
 /// A mesh file with the files that it names.
 #[derive(Debug)]
@@ -55,19 +56,21 @@ pub(in crate::pipeline) fn meshes(
             .collect::<Result<_, _>>()
     })?;
     let mut meshes = Vec::new();
-    let mut kept = 0;
+    let mut counts = Counts::default();
     for (file, asset) in files.iter().zip(assets) {
         let content = asset.files[0].content;
         asset.files.into_iter().for_each(|file| findings.read(file));
         let mesh = match asset.result {
             Ok((mesh, was_kept)) => {
-                kept += usize::from(was_kept);
+                counts.kept += usize::from(was_kept);
+                counts.loaded += usize::from(!was_kept);
                 warn(loaded, file.span.clone(), &file.value, &mesh.mesh, findings);
                 cache.insert(canonical(&file.value), file_key(&file.value, content), mesh.clone());
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => {
+                counts.failed += 1;
                 findings.asset_error(loaded, file.span.clone(), &error);
                 let key = file_key(&file.value, content);
                 Arc::new(KeptMesh { mesh: Arc::default(), key, companions: Vec::new() })
@@ -75,8 +78,17 @@ pub(in crate::pipeline) fn meshes(
         };
         meshes.push(mesh);
     }
-    let loaded = meshes.len() - kept;
-    Ok(loaded_and_kept(meshes, loaded, kept))
+    for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
+        if let Shape::Mesh { file, .. } = object.shape
+            && meshes[file].mesh.lacks_materials()
+        {
+            let name = files[file].value.display();
+            let message = format!("[[mesh]] needs `material`: {name} has no materials of its own");
+            let help = "add a line such as `material = \"name\"`";
+            findings.error(loaded, object.span.clone(), message, help);
+        }
+    }
+    Ok(loaded_and_kept(meshes, counts))
 }
 
 /// One file: from before if it and all that it names are as they were.

@@ -94,6 +94,11 @@ impl Findings {
         self.errors.push(at(loaded, span, Severity::Error, error.to_string()));
     }
 
+    /// Something in the scene does not go with the assets.
+    pub(super) fn error(&mut self, loaded: &Loaded, span: Range<usize>, message: String, help: &str) {
+        self.errors.push(loaded.diagnostic_at(span, Severity::Error, message, Some(help.to_owned())));
+    }
+
     pub(super) fn warn(&mut self, loaded: &Loaded, span: Range<usize>, message: String) {
         self.warnings.push(at(loaded, span, Severity::Warning, message));
     }
@@ -120,10 +125,21 @@ pub(super) struct Asset<T> {
 }
 
 /// The words for how many of some assets were loaded and how many kept.
-pub(super) fn loaded_and_kept<T>(value: T, loaded: usize, kept: usize) -> Staged<T> {
-    match (loaded, kept) {
-        (0, _) => Staged::reused(value, "the files did not change"),
-        (_, 0) => Staged::done(value, format!("{loaded} loaded")),
-        _ => Staged::done(value, format!("{loaded} loaded, {kept} kept")),
+pub(super) fn loaded_and_kept<T>(value: T, counts: Counts) -> Staged<T> {
+    let Counts { loaded, kept, failed } = counts;
+    if loaded + failed == 0 {
+        return Staged::reused(value, "the files did not change");
     }
+    let parts = [(loaded, "loaded"), (kept, "kept"), (failed, "failed")].into_iter();
+    let parts: Vec<String> =
+        parts.filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+    Staged::done(value, parts.join(", "))
+}
+
+/// What became of the files of a stage.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Counts {
+    pub(super) loaded: usize,
+    pub(super) kept: usize,
+    pub(super) failed: usize,
 }

@@ -11,7 +11,7 @@ use super::super::cache::Pool;
 use super::super::fingerprint::{Fingerprint, Key};
 use super::super::watch::content::{Content, FileRead};
 use super::meshes::canonical;
-use super::{Asset, Findings, Reading, Staged, Stop, loaded_and_kept};
+use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
 use crate::assets::image::{ImageEncoding, ImageLimits, load};
 use crate::control::Cancelled;
@@ -61,24 +61,28 @@ pub(in crate::pipeline) fn textures(
             .map(|(one, (content, kept))| load_one(one, content, kept, reading))
             .collect()
     });
-    let mut kept = 0;
+    let mut counts = Counts::default();
     for (one, asset) in needed.iter().zip(assets) {
         let file = asset.files[0].clone();
         let key = key(&one.source, file.content);
         findings.read(file);
         match asset.result {
             Ok((texels, was_kept)) => {
-                kept += usize::from(was_kept);
+                counts.kept += usize::from(was_kept);
+                counts.loaded += usize::from(!was_kept);
                 textures.texels_loaded += if was_kept { 0 } else { texels.len() as u64 };
                 cache.insert(name(&one.source), key, texels.clone());
                 textures.keys.push(key);
                 textures.texels.insert(one.source.clone(), texels);
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error) => findings.asset_error(loaded, place(loaded, one), &error),
+            Err(error) => {
+                counts.failed += 1;
+                findings.asset_error(loaded, place(loaded, one), &error);
+            }
         }
     }
-    Ok(loaded_and_kept(textures, needed.len() - kept, kept))
+    Ok(loaded_and_kept(textures, counts))
 }
 
 fn load_one(

@@ -80,9 +80,8 @@ fn plausible(
     let remaining = (source.bytes.len() - at) as u64;
     if needed > remaining + 1 {
         let Element { name, count, .. } = element;
-        return Err(
-            source.wrong(format!("the header claims {count} of {name}, and only {remaining} bytes follow"))
-        );
+        let claim = format!("the header claims {count} times the element `{name}`");
+        return Err(source.wrong(format!("{claim}, and only {remaining} bytes follow")));
     }
     Ok(())
 }

@@ -135,7 +135,10 @@ fn lies_cost_nothing() {
     for encoding in ["ascii", "binary_little_endian"] {
         let vertices = VERTEX.replace('4', "4000000000");
         let text = format!("ply\nformat {encoding} 1.0\n{vertices}{FACE}0 0 0\n");
-        assert!(says(text.as_bytes()).contains("claims 4000000000 of vertex, and only 6 bytes follow"));
+        assert!(
+            says(text.as_bytes())
+                .contains("claims 4000000000 times the element `vertex`, and only 6 bytes follow")
+        );
         let faces = FACE.replace("face 1", "face 4000000000");
         let text = format!("ply\nformat {encoding} 1.0\n{faces}");
         assert!(says(text.as_bytes()).contains("claims 4000000000 of face"));
