@@ -49,7 +49,7 @@ fn json_lines_have_the_keys_that_are_documented() {
 #[test]
 fn json_lines_hold_the_errors_and_nothing_is_mixed_with_them() {
     let desk = Desk::new();
-    desk.write("ball.toml", &SCENE.replace("\"ball\"", "\"bal\""));
+    desk.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = desk.expect("ball.toml --once --progress json", 2);
     let lines: Vec<serde_json::Value> =
         stderr.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
@@ -103,7 +103,7 @@ fn the_report_has_its_keys() {
 fn a_wrong_scene_is_2_and_leaves_the_picture() {
     let desk = Desk::new();
     desk.write("ball.png", "the old one");
-    desk.write("ball.toml", &SCENE.replace("width = 32", "width = = 32"));
+    desk.write("ball.toml", SCENE.replace("width = 32", "width = = 32"));
     let stderr = desk.expect("ball.toml --once", 2);
     assert!(stderr.contains("error") && stderr.contains("ball.toml:2:"), "{stderr}");
     assert_eq!(fs::read(desk.path("ball.png")).expect("there"), b"the old one");
@@ -114,7 +114,7 @@ fn a_wrong_scene_is_2_and_leaves_the_picture() {
 #[test]
 fn a_mesh_that_is_not_there_is_2_and_named() {
     let desk = Desk::new();
-    desk.write("ball.toml", &format!("{SCENE}\n[[mesh]]\nfile = \"no.obj\"\nmaterial = \"ball\"\n"));
+    desk.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"no.obj\"\nmaterial = \"ball\"\n"));
     let stderr = desk.expect("ball.toml --once", 2);
     assert!(stderr.contains("no.obj") && stderr.contains("ball.toml:25:"), "{stderr}");
     assert!(!desk.path("ball.png").exists());
@@ -166,7 +166,7 @@ fn check_says_what_there_is() {
     assert_eq!(output.status.code(), Some(0));
     let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(stdout.starts_with("ok: ball.toml: 1 object, 0 triangles"), "{stdout}");
-    desk.write("ball.toml", &SCENE.replace("\"ball\"", "\"bal\""));
+    desk.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = desk.expect("check ball.toml", 2);
     assert!(stderr.contains("bal") && stderr.contains("ball.toml:17:"), "{stderr}");
 }
