@@ -141,7 +141,7 @@ fn lies_cost_nothing() {
         );
         let faces = FACE.replace("face 1", "face 4000000000");
         let text = format!("ply\nformat {encoding} 1.0\n{faces}");
-        assert!(says(text.as_bytes()).contains("claims 4000000000 of face"));
+        assert!(says(text.as_bytes()).contains("claims 4000000000 times the element `face`"));
     }
     let list = FACE.replace("uchar int", "uint int");
     let mut file = format!("ply\nformat binary_little_endian 1.0\n{VERTEX}{list}").into_bytes();
