@@ -8,7 +8,7 @@ use glimt::integrators::render_tile;
 use glimt::lights::Source;
 use glimt::materials::fresnel::dielectric;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::Falloff;
+use glimt::scene::description::{Falloff, Shape};
 use glimt::world::{Geometry, Hit};
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
@@ -84,19 +84,28 @@ fn no_convex_shape_hits_itself() {
 }
 
 #[test]
-fn flat_shapes_through_the_origin_do_not_hit_themselves() {
-    // The coordinate along the normal is nearly 0 though the corners are far: the error of the sums is theirs.
+fn shapes_through_the_origin_do_not_hit_themselves_there() {
+    // The coordinates of the hit are nearly 0 though the shape is large: the error of the sums is that of their terms.
     let mut random = Random(3);
     for _ in 0..200 {
         let (u, w) = (random.direction() * 1e4, random.direction() * 1e4);
         let corner = -(u * random.unit() + w * random.unit());
-        for build in [
-            scene().quad(corner, u, w, matte(0.5)),
-            scene().triangle([corner, corner + u * 2.0, corner + w * 2.0], matte(0.5)),
-            scene().cuboid(-u, DVec3::splat(2e4), random.direction() * 90.0, matte(0.5)),
+        let n = random.direction();
+        let radius = 10.0_f64.powf(6.0 * random.unit());
+        let plane = Shape::Plane { point: n.cross(u), normal: n };
+        for (what, build) in [
+            ("quad", scene().quad(corner, u, w, matte(0.5))),
+            ("triangle", scene().triangle([corner, corner + u * 2.0, corner + w * 2.0], matte(0.5))),
+            ("box", scene().cuboid(v(0.0, 0.0, -1e4), DVec3::splat(2e4), DVec3::ZERO, matte(0.5))),
+            ("box", scene().cuboid(-u, DVec3::splat(2e4), v(0.0, u.z.atan2(u.x), 0.0), matte(0.5))),
+            ("sphere", scene().sphere(n * radius, radius, matte(0.5))),
+            ("plane", scene().shape(plane, matte(0.5))),
         ] {
-            let (hits, _) = self_hits(&build, &mut random, DVec3::ZERO, 1.0, 60);
-            assert_eq!(hits, 0, "quad {corner} {u} {w}");
+            for _ in 0..10 {
+                let size = 10.0_f64.powf(-14.0 * random.unit());
+                let (hits, tried) = self_hits(&build, &mut random, DVec3::ZERO, size, 6);
+                assert_eq!(hits, 0, "of {tried} rays, {what} {u} {w} {n} {radius} within {size}");
+            }
         }
     }
 }
