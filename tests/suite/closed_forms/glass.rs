@@ -5,7 +5,7 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::materials::fresnel::{dielectric, refract};
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::MaterialKind;
+use glimt::scene::description::{MaterialKind, Shape};
 use glimt::world::Geometry;
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, scene};
@@ -244,4 +244,37 @@ fn nested_glass() {
     // From within the slab one surface is left.
     let within = slab(0.0, glass(1.5)).seen(v(0.0, -0.5, 0.0), v(0.0, -1.0, 0.0));
     assert_close("from within", lit_from_below(within).depth(1).value(), 0.96 * 2.25);
+}
+
+#[test]
+fn bent_normals_make_no_light() {
+    // Reflection and refraction share a ray's radiance over n², the choice of one of them by chance keeps it whole, and each
+    // part that leaves sees the sky once: at most n²·1 inside the glass. Rays that the smooth normal refracts along
+    // the outside, but not through the facet, must not count as having left.
+    let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
+    ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
+    let seen = scene().mesh(ball, AS_IT_IS, glass(1.5)).background(1.0).depth(50).with(|scene| {
+        if let Shape::Mesh { smooth, .. } = &mut scene.objects[0].shape {
+            *smooth = true;
+        }
+    });
+    let geometry = seen.world().geometry;
+    let mut random = super::Random(77);
+    let mut along = 0;
+    for _ in 0..30_000 {
+        let eye = (random.direction() * 0.85).as_vec3();
+        let direction = random.direction().as_vec3();
+        let ray = Ray::new(eye, direction);
+        let hit = geometry.closest(&ray).expect("inside a closed mesh");
+        let surface = geometry.surface(&ray, &hit);
+        let (_, cosine) = dielectric(surface.shading_normal.dot(direction), 1.0 / 1.5);
+        let refracted = cosine.map(|c| refract(direction, -surface.shading_normal, 1.0 / 1.5, c));
+        if refracted.is_none_or(|refracted| refracted.dot(surface.normal) > 0.0) {
+            continue;
+        }
+        along += 1;
+        let value = seen.clone().seen(eye.as_dvec3(), (eye + direction).as_dvec3()).value();
+        assert!(value <= 2.25 * (1.0 + 1e-5), "from {eye} along {direction}: {value}");
+    }
+    assert!(along > 50, "{along}");
 }
