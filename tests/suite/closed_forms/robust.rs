@@ -75,7 +75,7 @@ fn no_convex_shape_hits_itself() {
                 ("instance", scene().mesh(unit, [v(size, size * 0.7, -size), angles, center], matte(0.5))),
             ];
             for (what, build) in shapes {
-                let (hits, tried) = self_hits(&build, &mut random, center, size, 900);
+                let (hits, tried) = self_hits(&build, &mut random, center, size, 4000);
                 assert!(tried > 0, "{what} of size {size} at {center} is never hit");
                 assert_eq!(hits, 0, "of {tried} rays, {what} of size {size} at {center}");
             }
@@ -154,7 +154,7 @@ fn a_closed_mesh_has_no_leaks() {
             moved.point(p)
         };
         let mut leaks = 0;
-        for i in 0..50_000 {
+        for i in 0..200_000 {
             let triangle = mesh.triangles[i % mesh.triangles.len()];
             let (a, b) = (corner(triangle[i % 3]), corner(triangle[(i + 1) % 3]));
             let target = if i % 2 == 0 { a } else { a.lerp(b, random.unit()) };
