@@ -1,8 +1,12 @@
 //! Bytes → meshes, textures and cameras. Every error names the file and, where it has lines, the line.
 
-pub mod normals;
+pub mod contain;
+pub mod image;
+pub mod mesh;
+pub mod orbiter;
+mod read;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
@@ -33,6 +37,16 @@ pub enum AssetError {
     Cancelled(#[from] crate::control::Cancelled),
 }
 
+impl AssetError {
+    pub(crate) fn unreadable(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Unreadable { path: path.to_owned(), reason: reason.into() }
+    }
+
+    pub(crate) fn malformed(path: &Path, line: Option<usize>, reason: impl Into<String>) -> Self {
+        Self::Malformed { path: path.to_owned(), line, reason: reason.into() }
+    }
+}
+
 /// A mesh file's content.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadedMesh {
@@ -44,6 +58,9 @@ pub struct LoadedMesh {
     pub dropped: Dropped,
     /// Anything else worth saying, a line each.
     pub warnings: Vec<String>,
+    /// Files that were read besides the mesh file, or should have been: material libraries. When one of them
+    /// changes, so does this value.
+    pub companions: Vec<PathBuf>,
 }
 
 /// Faces that could not be used.

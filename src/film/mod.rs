@@ -1,6 +1,18 @@
 //! Sums of samples, tone mapping, pictures.
+//!
+//! Integrators make [`TileSamples`]; a [`Film`] sums them in f64; [`Film::radiance`] is what is written,
+//! [`Previewer`] shrinks it for the screen while it grows, and [`tone::develop`] turns either into a [`Picture`].
 
+mod curves;
+mod preview;
+mod resample;
+mod srgb;
+mod sums;
 pub mod tone;
+
+pub use preview::Previewer;
+pub use srgb::linear_to_srgb8;
+pub use sums::{Film, FilmError, SampleStats, TILE_SIZE};
 
 use crate::math::Vec3;
 
@@ -22,6 +34,21 @@ impl Rect {
     pub fn area(&self) -> usize {
         self.width as usize * self.height as usize
     }
+
+    /// The pixels in both, if there are any.
+    pub fn intersection(&self, other: &Self) -> Option<Self> {
+        let (x, width) = overlap((self.x, self.width), (other.x, other.width))?;
+        let (y, height) = overlap((self.y, self.height), (other.y, other.height))?;
+        Some(Self { x, y, width, height })
+    }
+}
+
+/// What two spans (start, length) have in common; u64, as a start and a length may add up to more than u32 holds.
+fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
+    let end = |(start, length): (u32, u32)| u64::from(start) + u64::from(length);
+    let start = a.0.max(b.0);
+    let length = end(a).min(end(b)).checked_sub(u64::from(start)).filter(|&length| length > 0)?;
+    Some((start, u32::try_from(length).ok()?))
 }
 
 /// What an integrator made of a tile: `samples` radiances for each pixel of `rect`, pixel after pixel in rows.
@@ -46,6 +73,19 @@ pub struct RadianceImage {
     pub pixels: Vec<Vec3>,
 }
 
+impl RadianceImage {
+    /// A picture without light.
+    pub fn black(width: u32, height: u32) -> Self {
+        Self { width, height, pixels: vec![Vec3::ZERO; width as usize * height as usize] }
+    }
+
+    /// The same picture at another size: every new pixel is the mean over its area of the old ones, exact for
+    /// any ratio, so that the mean of the whole stays.
+    pub fn resized(&self, width: u32, height: u32) -> Self {
+        resample::resized(self, width, height)
+    }
+}
+
 /// An sRGB picture for eyes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
@@ -55,4 +95,29 @@ pub struct Picture {
     pub height: u32,
     /// `width·height` pixels.
     pub pixels: Vec<[u8; 3]>,
+}
+
+/// An sRGB picture of 16 bits a channel, for files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture16 {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width·height` pixels.
+    pub pixels: Vec<[u16; 3]>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Rect;
+
+    #[test]
+    fn intersections() {
+        let a = Rect { x: 2, y: 3, width: 10, height: 4 };
+        let b = Rect { x: 10, y: 0, width: u32::MAX, height: 5 };
+        assert_eq!(a.intersection(&b), Some(Rect { x: 10, y: 3, width: 2, height: 2 }));
+        assert_eq!(a.intersection(&Rect { x: 12, ..b }), None);
+        assert_eq!(a.intersection(&Rect { width: 0, ..a }), None);
+    }
 }

@@ -1,1 +1,184 @@
-//! From radiance to what a display shows.
+//! From radiance to what a display shows: exposure, tone curve, clamp, sRGB.
+
+use rayon::prelude::*;
+
+use super::{Picture, Picture16, RadianceImage, curves, linear_to_srgb8};
+use crate::math::Vec3;
+use crate::math::color::linear_to_srgb;
+
+/// Tone curves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Curve {
+    /// Clamp.
+    #[default]
+    None,
+    /// x/(1 + x) on luminance (Reinhard et al. 2002).
+    Reinhard,
+    /// A fit of the ACES filmic curve (Narkowicz 2015).
+    Aces,
+    /// AgX (Sobotka 2022).
+    Agx,
+}
+
+/// How radiance becomes display light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToneMapping {
+    /// Radiance is multiplied by 2 to this power.
+    pub exposure_stops: f32,
+    /// What then brings it into [0, 1].
+    pub curve: Curve,
+}
+
+/// Far above everything that any curve tells apart, far below what overflows inside one.
+const BRIGHTEST: f32 = 1e10;
+/// Below this many pixels other threads are not worth waking: a preview is developed where it is shown.
+const PARALLEL_PIXELS: usize = 1 << 18;
+
+impl ToneMapping {
+    /// One colour: linear display light in [0, 1], whatever is fed; NaN and negative components count as 0.
+    pub fn apply(&self, radiance: Vec3) -> Vec3 {
+        self.exposed(radiance, self.exposure_stops.exp2())
+    }
+
+    fn exposed(&self, radiance: Vec3, factor: f32) -> Vec3 {
+        let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
+        let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
+        match self.curve {
+            Curve::None => color.min(Vec3::ONE),
+            Curve::Reinhard => curves::reinhard(color),
+            Curve::Aces => curves::aces(color),
+            Curve::Agx => curves::agx(color),
+        }
+    }
+}
+
+/// A picture of 8 bits a channel.
+pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
+    let pixels = map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8));
+    Picture { width: image.width, height: image.height, pixels }
+}
+
+/// A picture of 16 bits a channel.
+pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Picture16 {
+    let quantise = |x: f32| (linear_to_srgb(x) * 65535.0 + 0.5) as u16;
+    let pixels = map_pixels(image, tone, |color| color.to_array().map(quantise));
+    Picture16 { width: image.width, height: image.height, pixels }
+}
+
+fn map_pixels<T: Send>(
+    image: &RadianceImage,
+    tone: &ToneMapping,
+    encode: impl Fn(Vec3) -> T + Sync,
+) -> Vec<T> {
+    let factor = tone.exposure_stops.exp2();
+    let pixel = |&radiance: &Vec3| encode(tone.exposed(radiance, factor));
+    if image.pixels.len() < PARALLEL_PIXELS {
+        image.pixels.iter().map(pixel).collect()
+    } else {
+        image.pixels.par_iter().with_min_len(1 << 14).map(pixel).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CURVES: [Curve; 4] = [Curve::None, Curve::Reinhard, Curve::Aces, Curve::Agx];
+
+    fn tone(curve: Curve) -> ToneMapping {
+        ToneMapping { exposure_stops: 0.0, curve }
+    }
+
+    fn grey(curve: Curve, value: f32) -> f32 {
+        tone(curve).apply(Vec3::splat(value)).y
+    }
+
+    #[test]
+    fn a_brighter_grey_is_never_darker() {
+        for curve in CURVES {
+            let mut before = grey(curve, 0.0);
+            assert!(before.abs() < 1e-6, "{curve:?} takes black to {before}");
+            for step in -200..=200 {
+                let now = grey(curve, (step as f32 / 10.0).exp2());
+                assert!(now >= before - 1e-6 && now <= 1.0, "{curve:?} at 2^{}: {now}", step as f32 / 10.0);
+                before = now;
+            }
+            assert!(before > 0.999, "{curve:?} ends at {before}");
+        }
+    }
+
+    #[test]
+    fn known_values() {
+        assert_eq!(grey(Curve::None, 0.25), 0.25);
+        assert!((grey(Curve::Reinhard, 1.0) - 0.5).abs() < 1e-6);
+        assert!((grey(Curve::Reinhard, 3.0) - 0.75).abs() < 1e-6);
+        // On luminance: pure red of radiance 1 has 0.2126 of it.
+        let red = tone(Curve::Reinhard).apply(Vec3::X);
+        assert!((red - Vec3::X / 1.2126).abs().max_element() < 1e-6);
+        assert!((grey(Curve::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
+        // Middle grey is the sigmoid's pivot, ½ in a display of power 2.2.
+        assert!((grey(Curve::Agx, 0.18) - 0.5_f32.powf(2.2)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn agx_takes_bright_saturated_light_towards_white() {
+        let blue = tone(Curve::Agx).apply(Vec3::new(0.0, 0.0, 1000.0));
+        assert!(blue.min_element() > 0.3 && blue.z > 0.9, "{blue}");
+    }
+
+    #[test]
+    fn exposure_is_in_stops() {
+        let image = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::new(0.05, 0.1, 0.2)] };
+        let brighter = RadianceImage { pixels: vec![Vec3::new(0.2, 0.4, 0.8)], width: 1, height: 1 };
+        for curve in CURVES {
+            let exposed = ToneMapping { exposure_stops: 2.0, curve };
+            assert_eq!(develop(&image, &exposed), develop(&brighter, &tone(curve)), "{curve:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_wraps() {
+        let hostile =
+            [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1e30, f32::MAX, 0.0, 1e-45];
+        for curve in CURVES {
+            for exposure_stops in [0.0, 10.0, -10.0, 500.0, -500.0, f32::NAN] {
+                let mapping = ToneMapping { exposure_stops, curve };
+                for [r, g, b] in hostile.iter().flat_map(|&a| hostile.map(|b| [a, b, 0.5])) {
+                    let color = mapping.apply(Vec3::new(r, g, b));
+                    assert!(color.is_finite(), "{mapping:?} of {r}, {g}, {b}: {color}");
+                    assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "{mapping:?}: {color}");
+                }
+            }
+            let dark = Vec3::new(f32::NAN, -1.0, f32::NEG_INFINITY);
+            let image = RadianceImage { width: 2, height: 1, pixels: vec![dark, Vec3::splat(1e30)] };
+            assert_eq!(develop(&image, &tone(curve)).pixels, [[0; 3], [255; 3]], "{curve:?}");
+            assert_eq!(develop16(&image, &tone(curve)).pixels, [[0; 3], [65535; 3]], "{curve:?}");
+        }
+    }
+
+    #[test]
+    fn sixteen_bits_refine_eight() {
+        let pixels: Vec<_> = (0..=1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
+        let image = RadianceImage { width: 1001, height: 1, pixels };
+        let coarse = develop(&image, &tone(Curve::None)).pixels;
+        let fine = develop16(&image, &tone(Curve::None)).pixels;
+        for (eight, sixteen) in coarse.iter().zip(&fine) {
+            assert!(
+                (f64::from(sixteen[0]) / 257.0 - f64::from(eight[0])).abs() <= 0.502,
+                "{eight:?} {sixteen:?}"
+            );
+        }
+        assert!(fine.windows(2).all(|pair| pair[0] < pair[1]), "every thousandth is told apart");
+    }
+
+    #[test]
+    fn many_pixels_are_the_same_as_one_by_one() {
+        let pixels: Vec<_> = (0..PARALLEL_PIXELS + 7).map(|i| Vec3::splat(i as f32 * 1e-5)).collect();
+        let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
+        let mapping = tone(Curve::Aces);
+        let developed = develop(&image, &mapping).pixels;
+        for (pixel, &radiance) in developed.iter().zip(&image.pixels) {
+            assert_eq!(*pixel, mapping.apply(radiance).to_array().map(linear_to_srgb8));
+        }
+    }
+}

@@ -12,7 +12,7 @@ use crate::math::{Vec2, Vec3};
 use crate::sampling::filter::Filter;
 use crate::sampling::{PixelSampler, Purpose, warp};
 use crate::scene::description::PixelFilter;
-use crate::world::World;
+use crate::world::{Hit, World};
 
 /// The samples of a tile. A slot is the place of a sample among them: all of the first pixel, all of the next.
 pub struct SampleBlock {
@@ -88,6 +88,15 @@ impl RayQueue {
         self.medium.push(ray.medium);
     }
 
+    /// Forget all rays, keep the memory.
+    pub fn clear(&mut self) {
+        self.ray.clear();
+        self.throughput.clear();
+        self.slot.clear();
+        self.path.clear();
+        self.medium.clear();
+    }
+
     /// The ray at a place.
     pub fn get(&self, i: usize) -> PathRay {
         PathRay {
@@ -136,6 +145,19 @@ impl ShadowQueue {
     }
 }
 
+/// The memory of a tile's batches, used again by each.
+#[derive(Default)]
+pub struct Queues {
+    /// Rays of this round; camera rays at first.
+    pub rays: RayQueue,
+    /// Rays of the next round.
+    pub next: RayQueue,
+    /// Shadow rays of this round.
+    pub shadows: ShadowQueue,
+    /// What the rays of this round hit.
+    pub hits: Vec<Option<Hit>>,
+}
+
 /// What all rays of a tile have in common.
 pub struct Tracer<'a> {
     /// The scene.
@@ -149,13 +171,12 @@ pub struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
-    /// Rays through the pixels of some slots.
-    pub fn camera_rays(&self, slots: Range<u32>) -> RayQueue {
-        let mut queue = RayQueue::default();
+    /// Rays through the pixels of some slots, in place of what is in the queue.
+    pub fn camera_rays(&self, slots: Range<u32>, queue: &mut RayQueue) {
+        queue.clear();
         for slot in slots {
             queue.push(self.camera_ray(slot));
         }
-        queue
     }
 
     fn camera_ray(&self, slot: u32) -> PathRay {

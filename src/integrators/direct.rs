@@ -5,7 +5,7 @@ use super::batch::PathRay;
 use super::whitted::Wave;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::{Light, LightSample};
+use crate::lights::LightSample;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::color::luminance;
@@ -68,9 +68,8 @@ impl<'a> PhongVertex<'a> {
         if !(between > 0.0) { 1.0 } else { -g * g * g + g * g + g }
     }
 
-    fn shadow_ray(&self, target: Vec3) -> Ray {
-        let origin = offset_origin(self.surface.point, self.surface.error, self.normal, self.normal);
-        Ray::segment(origin, target)
+    fn shadow_origin(&self) -> Vec3 {
+        offset_origin(self.surface.point, self.surface.error, self.normal, self.normal)
     }
 }
 
@@ -78,57 +77,73 @@ impl<'a> PhongVertex<'a> {
 pub(super) fn light(wave: &mut Wave<'_>, vertex: &PhongVertex<'_>) {
     let settings = wave.tracer.settings;
     let sampler = wave.tracer.block.sampler(settings.seed, vertex.path.slot);
-    let mut samples = Vec::new();
-    for (number, light) in (0_u32..).zip(&wave.tracer.world.lights) {
-        let repetitions = match settings.shadows {
-            Shadows::Hard => 1,
-            _ if light.is_delta() => 1,
-            _ => settings.shadow_samples,
-        };
+    let mut arrivals = Arrivals::new(wave, vertex);
+    for (number, light) in (0_u32..).zip(&arrivals.wave.tracer.world.lights) {
+        if settings.shadows == Shadows::Hard {
+            arrivals.push(light.middle(vertex.surface.point), 1);
+            continue;
+        }
+        let Some(seen) = light.seen_from(vertex.surface.point) else { continue };
+        let repetitions = if light.is_delta() { 1 } else { settings.shadow_samples };
         for i in 0..repetitions {
-            let sample = match settings.shadows {
-                Shadows::Hard => light.middle(vertex.surface.point),
-                _ => sample_light(light, vertex, &sampler, number, (i, repetitions)),
-            };
-            let Some(sample) = sample else { continue };
-            let value = vertex.reflected(&sample, settings.view) / repetitions as f32;
-            if value != Vec3::ZERO {
-                samples.push((sample, value));
-            }
+            let u =
+                if light.is_delta() { [0.5; 2] } else { numbers(&sampler, vertex, number, (i, repetitions)) };
+            arrivals.push(seen.sample(u), repetitions);
         }
     }
-    let scale = vertex.path.throughput * shadow_view_scale(settings.view, &samples);
-    for (sample, value) in samples {
-        let contribution = value * scale;
-        if settings.shadows == Shadows::Off {
-            wave.radiance[vertex.path.slot as usize] += contribution;
+    arrivals.finish();
+}
+
+/// Two random numbers for the `i`-th of some samples of a light; two lights share four numbers.
+fn numbers(sampler: &PixelSampler, vertex: &PhongVertex<'_>, light: u32, (i, n): (u32, u32)) -> [f32; 2] {
+    let [a, b, c, d] = sampler.get4_of(Purpose::at_vertex(vertex.path.path, light / 2), i, n);
+    if light.is_multiple_of(2) { [a, b] } else { [c, d] }
+}
+
+/// Takes what arrives at a vertex to the queue of shadow rays.
+struct Arrivals<'a, 'w, 'v> {
+    wave: &'a mut Wave<'w>,
+    vertex: &'a PhongVertex<'v>,
+    shadow_origin: Vec3,
+    /// Length of the queue before.
+    first: usize,
+    /// Sum of the values in the view of shadows.
+    total: f32,
+}
+
+impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
+    fn new(wave: &'a mut Wave<'w>, vertex: &'a PhongVertex<'v>) -> Self {
+        let first = wave.shadows.len();
+        Self { wave, vertex, shadow_origin: vertex.shadow_origin(), first, total: 0.0 }
+    }
+
+    fn push(&mut self, sample: Option<LightSample>, repetitions: u32) {
+        let Some(sample) = sample else { return };
+        let settings = self.wave.tracer.settings;
+        let value = self.vertex.reflected(&sample, settings.view) / repetitions as f32;
+        if value == Vec3::ZERO {
+            return;
+        }
+        let (contribution, slot) = (value * self.vertex.path.throughput, self.vertex.path.slot);
+        self.total += value.x;
+        if settings.shadows == Shadows::Off && settings.view != View::Shadow {
+            self.wave.radiance[slot as usize] += contribution;
         } else {
-            wave.shadows.push(
-                vertex.shadow_ray(sample.target),
+            self.wave.shadows.push(
+                Ray::segment(self.shadow_origin, sample.target),
                 sample.source,
                 contribution,
-                vertex.path.slot,
+                slot,
             );
         }
     }
-}
 
-fn sample_light(
-    light: &Light,
-    vertex: &PhongVertex<'_>,
-    sampler: &PixelSampler,
-    number: u32,
-    (i, repetitions): (u32, u32),
-) -> Option<LightSample> {
-    if light.is_delta() {
-        return light.sample(vertex.surface.point, [0.5; 2]);
+    /// In the view of shadows contributions are parts of the whole that could arrive.
+    fn finish(self) {
+        if self.wave.tracer.settings.view == View::Shadow {
+            for contribution in &mut self.wave.shadows.contribution[self.first..] {
+                *contribution /= self.total;
+            }
+        }
     }
-    let u = sampler.get4_of(Purpose::at_vertex(vertex.path.path, number / 2), i, repetitions);
-    let pair = if number.is_multiple_of(2) { [u[0], u[1]] } else { [u[2], u[3]] };
-    light.sample(vertex.surface.point, pair)
-}
-
-/// In the view of shadows contributions are parts of the whole that could arrive.
-fn shadow_view_scale(view: View, samples: &[(LightSample, Vec3)]) -> f32 {
-    if view == View::Shadow { 1.0 / samples.iter().map(|(_, value)| value.x).sum::<f32>() } else { 1.0 }
 }

@@ -10,7 +10,7 @@ mod whitted;
 
 use std::ops::Range;
 
-use batch::{SampleBlock, Tracer};
+use batch::{Queues, SampleBlock, Tracer};
 
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Rect, TileSamples};
@@ -151,14 +151,15 @@ pub fn render_tile(
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
     let tracer = Tracer { world, settings, block: &block, token };
+    let mut queues = Queues::default();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
-        let cameras = tracer.camera_rays(slots);
-        counters.camera_rays += cameras.len() as u64;
+        tracer.camera_rays(slots, &mut queues.rays);
+        counters.camera_rays += queues.rays.len() as u64;
         if settings.view.is_data() {
-            views::shade(&tracer, &cameras, &mut radiance, &mut counters)?;
+            views::shade(&tracer, &mut queues, &mut radiance, &mut counters)?;
         } else {
-            whitted::trace(&tracer, cameras, &mut radiance, &mut counters)?;
+            whitted::trace(&tracer, &mut queues, &mut radiance, &mut counters)?;
         }
     }
     Ok((TileSamples { rect: block.tile, samples: block.samples.len() as u32, radiance }, counters))

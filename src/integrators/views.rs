@@ -1,6 +1,6 @@
 //! Pictures of numbers at the first hit. Their values are meant as display values in [0, 1], not as radiance.
 
-use super::batch::{RayQueue, Tracer};
+use super::batch::{Queues, Tracer};
 use super::whitted::closest_hits;
 use super::{RayCounters, View};
 use crate::control::Cancelled;
@@ -8,15 +8,16 @@ use crate::geometry::SurfacePoint;
 use crate::materials::Material;
 use crate::math::{Vec2, Vec3};
 
-/// Show what each camera ray hits; black where nothing.
+/// Show what each camera ray in the queue hits; black where nothing.
 pub fn shade(
     tracer: &Tracer<'_>,
-    cameras: &RayQueue,
+    queues: &mut Queues,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
-    let hits = closest_hits(tracer, cameras)?;
-    for (i, hit) in hits.iter().enumerate() {
+    closest_hits(tracer, queues)?;
+    let cameras = &queues.rays;
+    for (i, hit) in queues.hits.iter().enumerate() {
         let Some(hit) = hit else { continue };
         let surface = tracer.world.geometry.surface(&cameras.ray[i], hit);
         let material = &tracer.world.materials[tracer.world.material_index(hit)];

@@ -1,7 +1,7 @@
 //! Direct light by Phong, mirror, glass and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*,
 //! 1980), over queues instead of recursion.
 
-use super::batch::{PathRay, RayQueue, ShadowQueue, Tracer};
+use super::batch::{PathRay, Queues, RayQueue, ShadowQueue, Tracer};
 use super::direct::{self, PhongVertex};
 use super::{POLL_INTERVAL, RayCounters, View, glass};
 use crate::control::Cancelled;
@@ -10,44 +10,44 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::mirror::reflect;
 use crate::materials::{Material, Mirror, Phong};
 use crate::math::Vec3;
+use crate::scene::description::Shadows;
 use crate::world::Hit;
 
-/// Follow camera rays to the end and add what they see to their samples.
+/// Follow the camera rays in the queue to the end and add what they see to their samples.
 pub fn trace(
     tracer: &Tracer<'_>,
-    cameras: RayQueue,
+    queues: &mut Queues,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
-    let mut queue = cameras;
-    let mut shadows = ShadowQueue::default();
     let mut depth = 0;
-    while queue.len() > 0 {
-        let hits = closest_hits(tracer, &queue)?;
-        let mut wave =
-            Wave { tracer, depth, next: RayQueue::default(), shadows: &mut shadows, radiance, counters };
+    while queues.rays.len() > 0 {
+        closest_hits(tracer, queues)?;
+        queues.next.clear();
+        let Queues { rays, next, shadows, hits } = queues;
+        let mut wave = Wave { tracer, depth, next, shadows, radiance, counters };
         for (i, hit) in hits.iter().enumerate() {
-            let path = queue.get(i);
+            let path = rays.get(i);
             match hit {
                 Some(hit) => wave.shade(path, hit),
                 None => wave.leave(&path),
             }
         }
-        queue = wave.next;
-        trace_shadows(tracer, &mut shadows, radiance, counters)?;
+        trace_shadows(tracer, shadows, radiance, counters)?;
+        std::mem::swap(rays, next);
         depth += 1;
     }
     Ok(())
 }
 
-/// The nearest hit of every ray.
-pub fn closest_hits(tracer: &Tracer<'_>, queue: &RayQueue) -> Result<Vec<Option<Hit>>, Cancelled> {
-    let mut hits = Vec::with_capacity(queue.len());
-    for rays in queue.ray.chunks(POLL_INTERVAL) {
+/// The nearest hit of every ray in the queue.
+pub fn closest_hits(tracer: &Tracer<'_>, queues: &mut Queues) -> Result<(), Cancelled> {
+    queues.hits.clear();
+    for rays in queues.rays.ray.chunks(POLL_INTERVAL) {
         tracer.token.check()?;
-        hits.extend(rays.iter().map(|ray| tracer.world.geometry.closest(ray)));
+        queues.hits.extend(rays.iter().map(|ray| tracer.world.geometry.closest(ray)));
     }
-    Ok(hits)
+    Ok(())
 }
 
 /// Add the contributions that arrive, in the order of the queue.
@@ -61,7 +61,9 @@ fn trace_shadows(
         if i % POLL_INTERVAL == 0 {
             tracer.token.check()?;
         }
-        if !tracer.world.geometry.occluded(&shadows.ray[i], shadows.source[i]) {
+        let visible = tracer.settings.shadows == Shadows::Off
+            || !tracer.world.geometry.occluded(&shadows.ray[i], shadows.source[i]);
+        if visible {
             radiance[shadows.slot[i] as usize] += shadows.contribution[i];
         }
     }
@@ -75,7 +77,7 @@ pub(super) struct Wave<'a> {
     pub(super) tracer: &'a Tracer<'a>,
     /// Scatterings before the hits of this round.
     pub(super) depth: u32,
-    pub(super) next: RayQueue,
+    pub(super) next: &'a mut RayQueue,
     pub(super) shadows: &'a mut ShadowQueue,
     pub(super) radiance: &'a mut [Vec3],
     pub(super) counters: &'a mut RayCounters,

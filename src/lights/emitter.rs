@@ -1,7 +1,7 @@
 //! Shapes that emit.
 
-use super::rectangle::QuadEmitter;
-use super::sphere::SphereEmitter;
+use super::rectangle::{QuadEmitter, SeenQuad};
+use super::sphere::{SeenSphere, SphereEmitter};
 use super::triangles::TriangleEmitter;
 use super::{LightSample, Source};
 use crate::math::Vec3;
@@ -29,14 +29,14 @@ pub enum Emitter {
 }
 
 impl AreaLight {
-    /// Sample what arrives at a point; none where that is nothing.
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let source = Source::Object(self.object);
-        match &self.shape {
-            Emitter::Sphere(sphere) => sphere.sample(point, u, self.radiance, source),
-            Emitter::Quad(quad) => quad.sample(point, u, self.radiance, source),
-            Emitter::Triangles(triangles) => triangles.sample(point, u, self.radiance, self.object),
-        }
+    /// The light as seen from a point; none where it certainly sends nothing there.
+    pub fn seen_from(&self, point: Vec3) -> Option<SeenLight<'_>> {
+        let shape = match &self.shape {
+            Emitter::Sphere(sphere) => SeenShape::Sphere(sphere.seen_from(point)?),
+            Emitter::Quad(quad) => SeenShape::Quad(quad.seen_from(point)?),
+            Emitter::Triangles(triangles) => SeenShape::Triangles(triangles, point),
+        };
+        Some(SeenLight::Area(self, shape))
     }
 
     /// All of it as if it came from the middle.
@@ -46,6 +46,45 @@ impl AreaLight {
             Emitter::Sphere(sphere) => sphere.middle(point, self.radiance, source),
             Emitter::Quad(quad) => quad.middle(point, self.radiance, source),
             Emitter::Triangles(triangles) => triangles.middle(point, self.radiance, self.object),
+        }
+    }
+}
+
+/// A light and a point that it may shine on, ready to be sampled many times.
+#[derive(Clone, Copy, Debug)]
+pub enum SeenLight<'a> {
+    /// There is but one way.
+    Only(LightSample),
+    /// A shape.
+    Area(&'a AreaLight, SeenShape<'a>),
+}
+
+/// A shape as seen from a point.
+#[derive(Clone, Copy, Debug)]
+pub enum SeenShape<'a> {
+    /// A sphere.
+    Sphere(SeenSphere),
+    /// A parallelogram.
+    Quad(SeenQuad<'a>),
+    /// Triangles, and the point.
+    Triangles(&'a TriangleEmitter, Vec3),
+}
+
+impl SeenLight<'_> {
+    /// One way for light to arrive; none where the part that was chosen sends nothing.
+    pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
+        match self {
+            Self::Only(sample) => Some(*sample),
+            Self::Area(light, shape) => {
+                let source = Source::Object(light.object);
+                match shape {
+                    SeenShape::Sphere(sphere) => Some(sphere.sample(u, light.radiance, source)),
+                    SeenShape::Quad(quad) => Some(quad.sample(u, light.radiance, source)),
+                    SeenShape::Triangles(triangles, point) => {
+                        triangles.sample(*point, u, light.radiance, light.object)
+                    }
+                }
+            }
         }
     }
 }

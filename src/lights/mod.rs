@@ -6,7 +6,7 @@ pub mod rectangle;
 pub mod sphere;
 pub mod triangles;
 
-pub use emitter::AreaLight;
+pub use emitter::{AreaLight, SeenLight};
 pub use point::PointLight;
 
 use crate::math::Vec3;
@@ -57,12 +57,17 @@ impl Source {
 }
 
 impl Light {
+    /// The light as seen from a point; none where it certainly sends nothing there.
+    pub fn seen_from(&self, point: Vec3) -> Option<SeenLight<'_>> {
+        match self {
+            Self::Point(light) => light.sample(point).map(SeenLight::Only),
+            Self::Area(light) => light.seen_from(point),
+        }
+    }
+
     /// Sample the light as seen from `point`; none where it sends nothing there.
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        match self {
-            Self::Point(light) => light.sample(point),
-            Self::Area(light) => light.sample(point, u),
-        }
+        self.seen_from(point)?.sample(u)
     }
 
     /// The middle of the light with all that it sends, as if it came from there.

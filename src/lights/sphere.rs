@@ -17,22 +17,15 @@ pub struct SphereEmitter {
 }
 
 impl SphereEmitter {
-    /// Uniform over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exact for narrow cones too.
-    pub fn sample(&self, point: Vec3, u: [f32; 2], radiance: Vec3, source: Source) -> Option<LightSample> {
-        let (axis, distance, sin2_max) = self.seen_from(point)?;
-        let one_minus_cos_max = sin2_max / (1.0 + (1.0 - sin2_max).sqrt());
-        let local = warp::cone(Vec2::from_array(u), one_minus_cos_max);
-        let direction = Frame::from_normal(axis).to_world(local);
-        // The near root along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
-        let sin2 = local.truncate().length_squared();
-        let depth = (sin2_max - sin2).max(0.0).sqrt();
-        let target = point + direction * (distance * (local.z - depth));
-        Some(LightSample { target, direction, weight: radiance * (2.0 * PI * one_minus_cos_max), source })
+    /// The light as seen from a point; none from inside.
+    pub fn seen_from(&self, point: Vec3) -> Option<SeenSphere> {
+        let (axis, distance, sin2_max) = self.cone(point)?;
+        Some(SeenSphere { point, frame: Frame::from_normal(axis), distance, sin2_max })
     }
 
     /// As from the centre: πR²/d² is what a whole visible sphere gives a surface that faces it.
     pub fn middle(&self, point: Vec3, radiance: Vec3, source: Source) -> Option<LightSample> {
-        let (direction, _, sin2_max) = self.seen_from(point)?;
+        let (direction, _, sin2_max) = self.cone(point)?;
         Some(LightSample {
             target: self.center.as_vec3(),
             direction,
@@ -42,10 +35,35 @@ impl SphereEmitter {
     }
 
     /// Unit direction to the centre, distance, and sin² of the half angle; none from inside.
-    fn seen_from(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
+    fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
         let to_center = self.center - point.as_dvec3();
         let distance = to_center.length();
         let sin = self.radius / distance;
         (sin < 1.0).then(|| ((to_center / distance).as_vec3(), distance as f32, (sin * sin) as f32))
+    }
+}
+
+/// A sphere and a point outside.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenSphere {
+    point: Vec3,
+    /// Around the direction to the centre.
+    frame: Frame,
+    distance: f32,
+    /// sin² of the half angle.
+    sin2_max: f32,
+}
+
+impl SeenSphere {
+    /// Uniform over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exact for narrow cones too.
+    pub fn sample(&self, u: [f32; 2], radiance: Vec3, source: Source) -> LightSample {
+        let one_minus_cos_max = self.sin2_max / (1.0 + (1.0 - self.sin2_max).sqrt());
+        let local = warp::cone(Vec2::from_array(u), one_minus_cos_max);
+        let direction = self.frame.to_world(local);
+        // The near root along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
+        let sin2 = local.truncate().length_squared();
+        let depth = (self.sin2_max - sin2).max(0.0).sqrt();
+        let target = self.point + direction * (self.distance * (local.z - depth));
+        LightSample { target, direction, weight: radiance * (2.0 * PI * one_minus_cos_max), source }
     }
 }

@@ -1,1 +1,84 @@
-//! output
+//! Pictures to bytes, bytes to files.
+//!
+//! [`check_target`] before hours of work, [`encode`] into memory, [`write::atomic`] to disk: a file is whole, or it is
+//! the one that was there before.
+
+mod error;
+mod exr;
+mod format;
+mod hdr;
+mod jpeg;
+mod place;
+mod png;
+mod ppm;
+mod temporary;
+pub mod write;
+
+use std::path::Path;
+
+pub use error::OutputError;
+pub use format::{BitDepth, Format};
+
+use crate::film::RadianceImage;
+use crate::film::tone::ToneMapping;
+
+/// What a file says of the program that wrote it.
+const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
+
+/// How a picture becomes a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EncodeOptions {
+    /// For files of 8 and 16 bits; float files get linear radiance, unexposed.
+    pub tone: ToneMapping,
+    /// Of PNG and PPM; float files have 32 bits whatever is said here.
+    pub bit_depth: BitDepth,
+    /// Names and values (the scene, the settings), written into PNG text chunks and the comments of EXR, HDR and
+    /// PPM files. The program and its version are always written.
+    pub metadata: Vec<(String, String)>,
+}
+
+/// The bytes of a file of this format. The same picture and options give the same bytes.
+///
+/// # Errors
+/// A format that cannot hold a picture of this size or depth; an encoder that fails.
+pub fn encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    format: Format,
+) -> Result<Vec<u8>, OutputError> {
+    format.check_picture(image.width, image.height, options.bit_depth)?;
+    if image.pixels.len() != image.width as usize * image.height as usize {
+        return Err(OutputError::encoder(format, &"the picture's size and its pixels do not agree"));
+    }
+    match format {
+        Format::Png => png::encode(image, options),
+        Format::Exr => exr::encode(image, options),
+        Format::Hdr => Ok(hdr::encode(image, options)),
+        Format::Jpeg => jpeg::encode(image, options),
+        Format::Ppm => Ok(ppm::encode(image, options)),
+    }
+}
+
+/// Whether a picture can be written here, as far as can be told without writing: told before the work rather than
+/// after it. Gives the format that the ending names.
+///
+/// # Errors
+/// An ending that names no format; a missing directory; a target that is a directory or that may not be written.
+pub fn check_target(path: &Path) -> Result<Format, OutputError> {
+    let format = Format::of(path)?;
+    place::find(path)?;
+    Ok(format)
+}
+
+/// A component as float files hold it: the light of a picture is neither negative nor infinite.
+fn as_light(component: f32) -> f32 {
+    if component.is_nan() || component < 0.0 { 0.0 } else { component.min(f32::MAX) }
+}
+
+/// A name or value as a line of a text header can hold it.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::settings::Overrides;
+use super::watch::content::FileRead;
 use crate::film::Picture;
 use crate::scene::diagnostic::Diagnostic;
 
@@ -21,7 +22,7 @@ pub enum Command {
     Write,
     /// Stop the render under way.
     Cancel,
-    /// Hold the render, or let it go on.
+    /// Hold the render, or let it go on. A new request is not held.
     Pause(bool),
     /// End the worker.
     Quit,
@@ -69,6 +70,14 @@ pub enum Event {
         /// What happened.
         stage: StageReport,
     },
+    /// These files were read, or tried: what they hold is what the request is made of. Each such event holds all
+    /// files known so far; a front end watches those of the latest.
+    Files {
+        /// Of which request.
+        generation: u64,
+        /// The scene and everything that it names.
+        files: Vec<FileRead>,
+    },
     /// An asset is loading.
     Asset {
         /// Of which request.
@@ -103,6 +112,13 @@ pub enum Event {
         path: PathBuf,
         /// Its size.
         bytes: u64,
+    },
+    /// [`Command::Write`] could not be done; a render under way goes on.
+    WriteFailed {
+        /// Of which request.
+        generation: u64,
+        /// Which file, and why.
+        message: String,
     },
     /// Everything that was asked for is done.
     Done {
@@ -267,7 +283,13 @@ pub struct Effective {
     /// Threads that render.
     pub threads: usize,
     /// The files the picture is written to.
+    #[serde(serialize_with = "lossy_paths")]
     pub outputs: Vec<PathBuf>,
+}
+
+/// Names that are not UTF-8 must not keep a report from being written.
+fn lossy_paths<S: serde::Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }
 
 /// The report of one finished request: the JSON of `--report`.

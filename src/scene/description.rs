@@ -146,6 +146,8 @@ pub enum Camera {
     Orbiter {
         /// The file.
         file: Located<PathBuf>,
+        /// Vertical whole angle in degrees, in (0, 180); none: the file's.
+        fov: Option<f64>,
         /// Lens radius, ≥ 0.
         aperture: f64,
         /// Distance to the plane in focus; none: the file's distance to its centre.

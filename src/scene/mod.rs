@@ -1,4 +1,92 @@
 //! The scene file: its syntax, its validation and what it means.
+//!
+//! [`load`] reads a file safely, [`parse`] turns its text into a [`description::Scene`] and a list of
+//! [`diagnostic::Diagnostic`]s; [`report`] makes text of those.
 
 pub mod description;
 pub mod diagnostic;
+mod document;
+mod nearest;
+mod read;
+pub mod report;
+pub mod sanitize;
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use description::Scene;
+use diagnostic::{Diagnostic, Place, Severity};
+
+/// Scene files over this size, in bytes, are refused.
+pub const MAX_FILE_BYTES: u64 = 16 << 20;
+
+/// A scene file that can be rendered.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// What it means.
+    pub scene: Scene,
+    /// Its text, which every span in [`Self::scene`] points into.
+    pub source: Arc<str>,
+    /// The file, as named by the caller.
+    pub path: PathBuf,
+    /// What is probably not meant, in the order of the file.
+    pub warnings: Vec<Diagnostic>,
+    /// Of the file's bytes.
+    pub content_hash: blake3::Hash,
+}
+
+impl Loaded {
+    /// A diagnostic at a place of this scene file, for what shows only later: a mesh without a usable face, a
+    /// texture that does not decode.
+    pub fn diagnostic_at(
+        &self,
+        span: Range<usize>,
+        severity: Severity,
+        message: impl Into<String>,
+        help: Option<String>,
+    ) -> Diagnostic {
+        let place = Place { source: Arc::clone(&self.source), span, label: String::new() };
+        Diagnostic { severity, message: message.into(), path: self.path.clone(), place: Some(place), help }
+    }
+}
+
+/// What a text says, as far as it could be understood.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The scene; none if there is an error.
+    pub scene: Option<Scene>,
+    /// Errors and warnings, in the order of the text.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Reads and validates a scene file.
+///
+/// # Errors
+/// Everything that is wrong with it, and its warnings, in the order of the file. Anything but a regular file
+/// of at most [`MAX_FILE_BYTES`] bytes of UTF-8 text is refused without blocking.
+pub fn load(path: &Path) -> Result<Loaded, Vec<Diagnostic>> {
+    let (source, content_hash) = read::text(path).map_err(|problem| vec![*problem])?;
+    let Outcome { scene, diagnostics } = parse(Arc::clone(&source), path);
+    match scene {
+        Some(scene) => {
+            Ok(Loaded { scene, source, path: path.to_owned(), warnings: diagnostics, content_hash })
+        }
+        None => Err(diagnostics),
+    }
+}
+
+/// Validates the text of a scene file. Of the files that it names only the metadata are looked at; they are
+/// searched for beside `path`, which names the scene in diagnostics and is not read.
+#[allow(clippy::needless_pass_by_value, reason = "the diagnostics share the text")]
+pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
+    document::lower(&text, path)
+}
+
+/// The commented scene that a new file starts with.
+pub fn starter() -> &'static str {
+    include_str!("starter.toml")
+}
+
+#[cfg(test)]
+mod tests;

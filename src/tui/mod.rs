@@ -1,1 +1,28 @@
-//! tui
+//! The terminal front end: messages and a picture in, requests and cells out.
+//!
+//! An event comes in, `update` turns state and event into effects, `view` draws the state; one loop in
+//! [`run`](fn@run) owns the terminal and is the only place with side effects. Nothing is drawn unless something
+//! changed. The help and the bottom line are made from the one table in `keymap`.
+
+mod action;
+mod color;
+mod event;
+mod keymap;
+mod options;
+mod run;
+mod signals;
+mod state;
+mod terminal;
+mod update;
+mod view;
+
+#[cfg(test)]
+mod by_hand;
+#[cfg(test)]
+mod fixtures;
+#[cfg(test)]
+mod tests;
+
+pub use color::ColorChoice;
+pub use options::{Changed, ExitStatus, Options, PreviewChoice, TuiError};
+pub use run::run;

@@ -40,8 +40,9 @@ impl Camera {
                     focus: *focus,
                 }
             }
-            description::Camera::Orbiter { aperture, focus, .. } => {
-                let orbiter = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
+            description::Camera::Orbiter { fov, aperture, focus, .. } => {
+                let file = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
+                let orbiter = OrbiterCamera { fov: fov.unwrap_or(file.fov), ..file };
                 Self {
                     aperture: *aperture,
                     focus: focus.unwrap_or(orbiter.size),

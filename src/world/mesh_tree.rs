@@ -47,7 +47,7 @@ impl MeshTree {
     /// Vertex normals: the file's, or computed ones.
     pub fn normals(&self) -> &[Vec3] {
         if self.loaded.mesh.normals.is_empty() {
-            self.computed_normals.get_or_init(|| crate::assets::normals::vertex_normals(&self.loaded.mesh))
+            self.computed_normals.get_or_init(|| crate::assets::mesh::vertex_normals(&self.loaded.mesh))
         } else {
             &self.loaded.mesh.normals
         }

@@ -33,6 +33,8 @@ struct Subtree {
     nodes: Vec<Node>,
     root: Child,
     bounds: Aabb,
+    /// Levels of nodes.
+    depth: usize,
 }
 
 impl Bvh {
@@ -48,14 +50,14 @@ impl Bvh {
             .map(|(id, &bounds)| Reference { bounds, id: id as u32 })
             .collect();
         if references.is_empty() {
-            return Ok(Self { nodes: Vec::new(), order: Vec::new(), bounds: Aabb::EMPTY });
+            return Ok(Self { nodes: Vec::new(), order: Vec::new(), bounds: Aabb::EMPTY, depth: 0 });
         }
         let mut tree = build_subtree(&mut references, 0, 0, token)?;
         if tree.nodes.is_empty() {
             tree.nodes.push(Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root, Child::NONE] });
         }
         let order = references.iter().map(|reference| reference.id).collect();
-        Ok(Self { nodes: tree.nodes, order, bounds: tree.bounds })
+        Ok(Self { nodes: tree.nodes, order, bounds: tree.bounds, depth: tree.depth.max(1) })
     }
 }
 
@@ -69,7 +71,7 @@ fn build_subtree(
     let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
     let leaf = Child { first: first as u32, count: references.len() as u32 };
     let Some(middle) = partition(references, bounds, depth) else {
-        return Ok(Subtree { nodes: Vec::new(), root: leaf, bounds });
+        return Ok(Subtree { nodes: Vec::new(), root: leaf, bounds, depth: 0 });
     };
     let parallel = references.len() > PARALLEL_SIZE;
     let (left, right) = references.split_at_mut(middle);
@@ -106,7 +108,7 @@ fn join(left: Subtree, right: Subtree, bounds: Aabb) -> Subtree {
             node
         }));
     }
-    Subtree { nodes, root: Child { first: 0, count: 0 }, bounds }
+    Subtree { nodes, root: Child { first: 0, count: 0 }, bounds, depth: 1 + left.depth.max(right.depth) }
 }
 
 /// Sort the references into two halves; none where a leaf is cheaper.

@@ -12,7 +12,10 @@ const LEAF_SIZE: usize = 4;
 const SURFACE_AREA_LEVELS: usize = 56;
 
 /// Room for the deepest tree there can be: the levels above and a halving of 2³² primitives.
-const STACK_SIZE: usize = SURFACE_AREA_LEVELS + 34;
+const DEEP_STACK: usize = SURFACE_AREA_LEVELS + 34;
+
+/// Room for small trees, whose traversal takes less time than clearing a deep stack.
+const SHALLOW_STACK: usize = 12;
 
 /// A tree over boxes that are known by their index.
 #[derive(Clone, Debug)]
@@ -22,6 +25,8 @@ pub struct Bvh {
     /// Ids of the boxes, in the order of the leaves.
     order: Vec<u32>,
     bounds: Aabb,
+    /// Levels of nodes.
+    depth: usize,
 }
 
 /// Two children with their boxes, one cache line.

@@ -1,6 +1,6 @@
 //! Ordered traversal for the closest hit, and for any.
 
-use super::{Bvh, Child, STACK_SIZE};
+use super::{Bvh, Child, DEEP_STACK, SHALLOW_STACK};
 use crate::geometry::Ray;
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 
@@ -9,7 +9,20 @@ impl Bvh {
     /// is its place in [`Bvh::order`], and returns the new end of the ray if it hits; primitives at exactly the
     /// ray's end are still tested, so that the caller can break ties by id.
     #[inline]
-    pub fn closest(&self, ray: &Ray, mut test: impl FnMut(u32, u32, f32) -> Option<f32>) {
+    pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, u32, f32) -> Option<f32>) {
+        if self.depth < SHALLOW_STACK {
+            self.closest_within::<SHALLOW_STACK>(ray, test);
+        } else {
+            self.closest_within::<DEEP_STACK>(ray, test);
+        }
+    }
+
+    #[inline]
+    fn closest_within<const STACK_SIZE: usize>(
+        &self,
+        ray: &Ray,
+        mut test: impl FnMut(u32, u32, f32) -> Option<f32>,
+    ) {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let mut t_max = ray.t_max;
         let mut stack = [(0.0_f32, Child::NONE); STACK_SIZE];
@@ -66,7 +79,16 @@ impl Bvh {
 
     /// Whether `test(place, id)` holds for any primitive that the ray may meet.
     #[inline]
-    pub fn any(&self, ray: &Ray, mut test: impl FnMut(u32, u32) -> bool) -> bool {
+    pub fn any(&self, ray: &Ray, test: impl FnMut(u32, u32) -> bool) -> bool {
+        if self.depth < SHALLOW_STACK {
+            self.any_within::<SHALLOW_STACK>(ray, test)
+        } else {
+            self.any_within::<DEEP_STACK>(ray, test)
+        }
+    }
+
+    #[inline]
+    fn any_within<const STACK_SIZE: usize>(&self, ray: &Ray, mut test: impl FnMut(u32, u32) -> bool) -> bool {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let mut stack = [Child::NONE; STACK_SIZE];
         let mut size = 1;

@@ -1,0 +1,61 @@
+//! Decoded pixels of any kind → texels.
+
+use ::image::DynamicImage;
+
+use super::ImageEncoding;
+use crate::materials::texels::{TexelData, Texels};
+use crate::math::Vec3;
+use crate::math::color::srgb_to_linear;
+
+pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding) -> Texels {
+    let (width, height) = (image.width(), image.height());
+    let channels = usize::from(image.color().channel_count());
+    let data = match image {
+        DynamicImage::ImageLuma8(pixels) => bytes(&pixels, channels, encoding),
+        DynamicImage::ImageLumaA8(pixels) => bytes(&pixels, channels, encoding),
+        DynamicImage::ImageRgb8(pixels) => bytes(&pixels, channels, encoding),
+        DynamicImage::ImageRgba8(pixels) => bytes(&pixels, channels, encoding),
+        DynamicImage::ImageLuma16(pixels) => words(&pixels, channels, encoding),
+        DynamicImage::ImageLumaA16(pixels) => words(&pixels, channels, encoding),
+        DynamicImage::ImageRgb16(pixels) => words(&pixels, channels, encoding),
+        DynamicImage::ImageRgba16(pixels) => words(&pixels, channels, encoding),
+        DynamicImage::ImageRgb32F(pixels) => floats(&pixels, channels, encoding),
+        DynamicImage::ImageRgba32F(pixels) => floats(&pixels, channels, encoding),
+        // Kinds that a later `image` may add.
+        other => floats(&other.into_rgb32f(), 3, encoding),
+    };
+    Texels { width, height, data }
+}
+
+/// Red, green and blue of a pixel of 1 (grey), 2 (grey, alpha), 3 or 4 samples.
+fn rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
+    match *pixel {
+        [red, green, blue, ..] => [red, green, blue],
+        _ => [pixel[0]; 3],
+    }
+}
+
+fn bytes(samples: &[u8], channels: usize, encoding: ImageEncoding) -> TexelData {
+    let texels = samples.chunks_exact(channels).map(rgb).collect();
+    if encoding == ImageEncoding::Linear { TexelData::Linear8(texels) } else { TexelData::Srgb8(texels) }
+}
+
+fn words(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData {
+    let value = |word: u16| f32::from(word) / f32::from(u16::MAX);
+    let linear: Vec<f32> = match encoding {
+        ImageEncoding::Linear => (0..=u16::MAX).map(value).collect(),
+        _ => (0..=u16::MAX).map(|word| srgb_to_linear(value(word))).collect(),
+    };
+    let texel = |pixel| Vec3::from_array(rgb(pixel).map(|word| linear[usize::from(word)]));
+    TexelData::Float(samples.chunks_exact(channels).map(texel).collect())
+}
+
+fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding) -> TexelData {
+    let clean = |value: f32| if value.is_finite() { value.max(0.0) } else { 0.0 };
+    let decode = |value: f32| match encoding {
+        ImageEncoding::Srgb => clean(srgb_to_linear(clean(value))),
+        _ => clean(value),
+    };
+    let texel = |pixel| Vec3::from_array(rgb(pixel).map(decode));
+    TexelData::Float(samples.chunks_exact(channels).map(texel).collect())
+}

@@ -1,0 +1,29 @@
+//! What the JPEG decoder forgives and a texture must not: it fills what is missing with grey.
+
+use std::path::Path;
+
+use crate::assets::AssetError;
+use crate::assets::read::{self, Watch};
+use crate::control::{CancelToken, unwatched};
+
+/// Whether the last scan ends: the marker of the end of the image follows that of the scan's start. Within a scan
+/// neither can occur (ITU-T T.81, B.1.1.5).
+pub(super) fn check_whole(path: &Path, limit: u64) -> Result<(), String> {
+    let token = CancelToken::new();
+    let bytes = read::bytes(path, limit, Watch { progress: &unwatched, token: &token });
+    let bytes = bytes.map_err(|error: AssetError| error.to_string())?;
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    match (last([0xff, 0xda]), last([0xff, 0xd9])) {
+        (Some(scan), Some(end)) if scan < end => Ok(()),
+        _ => Err("the file ends before the image does".to_owned()),
+    }
+}
+
+/// Each block of 8 × 8 pixels takes at least one bit, that of its mean.
+pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
+    let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
+    if blocks > file_bytes.saturating_mul(8) {
+        return Err(format!("it claims {width} × {height} pixels, which {file_bytes} bytes cannot hold"));
+    }
+    Ok(())
+}

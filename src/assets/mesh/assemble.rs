@@ -1,0 +1,325 @@
+//! What a parser found → a mesh that keeps the invariants.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::Source;
+use super::normals::fill_missing_normals;
+use super::polygon::triangulate;
+use crate::assets::{AssetError, Dropped, FileMaterial, LoadedMesh};
+use crate::geometry::mesh::TriangleMesh;
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// Most triangles of a mesh: their indices and those of tree nodes stay within 32 bits.
+const MOST_TRIANGLES: usize = (u32::MAX / 2) as usize;
+
+/// Faces between two polls of the token.
+const BATCH: usize = 1 << 14;
+
+/// Polygons over vertices: corners of all, one after the other.
+#[derive(Debug, Default)]
+pub(super) struct Faces {
+    corners: Vec<u32>,
+    /// Corners of each face; empty as long as all are triangles.
+    arities: Vec<u32>,
+}
+
+impl Faces {
+    /// Add a corner to the face that [`Faces::close`] will end.
+    pub(super) fn corner(&mut self, vertex: u32) {
+        self.corners.push(vertex);
+    }
+
+    /// End a face of this many corners.
+    pub(super) fn close(&mut self, arity: usize) {
+        if self.arities.is_empty() && arity == 3 {
+            return;
+        }
+        if self.arities.is_empty() {
+            let before = self.corners.len().saturating_sub(arity) / 3;
+            self.arities.resize(before, 3);
+        }
+        self.arities.push(arity as u32);
+    }
+
+    pub(super) fn reserve(&mut self, triangles: usize) {
+        self.corners.reserve(3 * triangles);
+    }
+
+    /// Faces in all.
+    pub(super) fn len(&self) -> usize {
+        if self.arities.is_empty() { self.corners.len() / 3 } else { self.arities.len() }
+    }
+}
+
+/// A mesh file's numbers. `normals` and `uvs` are empty or one for each position; a normal of zero is missing.
+/// `face_materials` is empty or one for each face.
+#[derive(Debug, Default)]
+pub(super) struct Parsed {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) normals: Vec<Vec3>,
+    pub(super) uvs: Vec<Vec2>,
+    pub(super) faces: Faces,
+    pub(super) face_materials: Vec<u32>,
+    pub(super) materials: Vec<FileMaterial>,
+    pub(super) warnings: Vec<String>,
+    pub(super) companions: Vec<PathBuf>,
+}
+
+/// Cut, drop, compact, complete.
+pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+    let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings, companions } = parsed;
+    let mut cutter = Cutter { positions: &positions, materials: &face_materials, ..Cutter::default() };
+    cutter.cut_all(source, &faces)?;
+    let Cutter { triangles, triangle_materials, dropped, .. } = cutter;
+    if triangles.is_empty() {
+        return Err(source.wrong(no_usable_face(faces.len(), dropped)));
+    }
+    let materials_of = triangle_materials;
+    let mut mesh = TriangleMesh { positions, normals, uvs, triangles, materials: materials_of };
+    drop_unused_vertices(&mut mesh);
+    for uv in mesh.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
+        *uv = Vec2::ZERO;
+    }
+    complete_normals(&mut mesh);
+    Ok(LoadedMesh { mesh, materials, dropped, warnings, companions })
+}
+
+fn no_usable_face(faces: usize, dropped: Dropped) -> String {
+    if faces == 0 {
+        return "no usable face: the file has none".to_owned();
+    }
+    let Dropped { non_finite, degenerate } = dropped;
+    format!(
+        "no usable face: of {faces}, {non_finite} have a corner that is not finite and {degenerate} have no area"
+    )
+}
+
+#[derive(Default)]
+struct Cutter<'a> {
+    positions: &'a [Vec3],
+    materials: &'a [u32],
+    triangles: Vec<[u32; 3]>,
+    triangle_materials: Vec<u32>,
+    dropped: Dropped,
+}
+
+impl Cutter<'_> {
+    fn cut_all(&mut self, source: &Source<'_>, faces: &Faces) -> Result<(), AssetError> {
+        if self.take_as_they_are(faces) {
+            return Ok(());
+        }
+        self.triangles.reserve(faces.len());
+        let mut from = 0;
+        for face in 0..faces.len() {
+            if face % BATCH == 0 {
+                source.watch.token.check()?;
+            }
+            let arity = faces.arities.get(face).map_or(3, |arity| *arity as usize);
+            let corners = &faces.corners[from..from + arity];
+            from += arity;
+            if corners.iter().any(|&corner| corner as usize >= self.positions.len()) {
+                return Err(source.wrong(format!("face {}: an index is out of range", face + 1)));
+            }
+            self.cut(corners);
+            if self.triangles.len() > MOST_TRIANGLES {
+                return Err(source.wrong(format!("more than {MOST_TRIANGLES} triangles")));
+            }
+            if let Some(&material) = self.materials.get(face) {
+                self.triangle_materials.resize(self.triangles.len(), material);
+            }
+        }
+        Ok(())
+    }
+
+    /// The common case, in parallel: triangles only, and all of them good.
+    fn take_as_they_are(&mut self, faces: &Faces) -> bool {
+        let (triangles, _) = faces.corners.as_chunks();
+        let in_range = |corner: &u32| (*corner as usize) < self.positions.len();
+        let good = |triangle: &[u32; 3]| {
+            let points = || triangle.map(|corner| self.positions[corner as usize]);
+            triangle.iter().all(in_range)
+                && points().iter().all(|point| point.is_finite())
+                && has_area(points())
+        };
+        let all =
+            faces.arities.is_empty() && triangles.len() <= MOST_TRIANGLES && triangles.par_iter().all(good);
+        if all {
+            self.triangles = triangles.to_vec();
+            self.triangle_materials = self.materials.to_vec();
+        }
+        all
+    }
+
+    /// Add a face's triangles, or count why it has none.
+    fn cut(&mut self, corners: &[u32]) {
+        let before = self.triangles.len();
+        if corners.iter().any(|&corner| !self.positions[corner as usize].is_finite()) {
+            self.dropped.non_finite += 1;
+            return;
+        }
+        match *corners {
+            [a, b, c] => self.keep([a, b, c]),
+            _ => self.cut_polygon(corners),
+        }
+        if self.triangles.len() == before {
+            self.dropped.degenerate += 1;
+        }
+    }
+
+    /// A polygon may touch itself at one place (a quad at a pole): what is left without the repeats counts.
+    fn cut_polygon(&mut self, corners: &[u32]) {
+        let place = |corner: u32| self.positions[corner as usize];
+        let mut distinct = corners.to_vec();
+        distinct.dedup_by(|a, b| place(*a) == place(*b));
+        while distinct.len() > 1 && place(distinct[0]) == place(distinct[distinct.len() - 1]) {
+            distinct.pop();
+        }
+        if distinct.len() >= 3 {
+            let points: Vec<Vec3> = distinct.iter().map(|&corner| place(corner)).collect();
+            triangulate(&points, |triangle| self.keep(triangle.map(|index| distinct[index])));
+        }
+    }
+
+    fn keep(&mut self, triangle: [u32; 3]) {
+        if has_area(triangle.map(|corner| self.positions[corner as usize])) {
+            self.triangles.push(triangle);
+        }
+    }
+}
+
+/// Whether three finite points span an area. In f64 neither overflow nor underflow of f32 points matters, and the
+/// products of nearby points are exact.
+fn has_area([a, b, c]: [Vec3; 3]) -> bool {
+    let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
+    (b - a).cross(c - a) != DVec3::ZERO
+}
+
+/// Bounds are taken over all vertices, and a file may keep anything in those that it does not use.
+fn drop_unused_vertices(mesh: &mut TriangleMesh) {
+    let mut new_index = vec![u32::MAX; mesh.positions.len()];
+    for &corner in mesh.triangles.as_flattened() {
+        new_index[corner as usize] = 0;
+    }
+    if !new_index.contains(&u32::MAX) {
+        return;
+    }
+    for (kept, index) in (0_u32..).zip(new_index.iter_mut().filter(|index| **index == 0)) {
+        *index = kept;
+    }
+    retain_used(&mut mesh.positions, &new_index);
+    retain_used(&mut mesh.normals, &new_index);
+    retain_used(&mut mesh.uvs, &new_index);
+    for corner in mesh.triangles.as_flattened_mut() {
+        *corner = new_index[*corner as usize];
+    }
+}
+
+fn retain_used<T>(values: &mut Vec<T>, new_index: &[u32]) {
+    let mut indices = new_index.iter();
+    values.retain(|_| indices.next().is_some_and(|index| *index != u32::MAX));
+}
+
+fn complete_normals(mesh: &mut TriangleMesh) {
+    for normal in &mut mesh.normals {
+        *normal = normal.as_dvec3().try_normalize().map_or(Vec3::ZERO, |unit| unit.as_vec3());
+    }
+    if mesh.normals.iter().all(|normal| *normal == Vec3::ZERO) {
+        mesh.normals = Vec::new();
+    } else if mesh.normals.contains(&Vec3::ZERO) {
+        fill_missing_normals(mesh);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assets::read::Watch;
+    use crate::control::{CancelToken, unwatched};
+    use std::path::Path;
+
+    fn assembled(parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+        let token = CancelToken::new();
+        let watch = Watch { progress: &unwatched, token: &token };
+        assemble(&Source { path: Path::new("a.off"), bytes: &[], watch }, parsed)
+    }
+
+    fn faces(list: &[&[u32]]) -> Faces {
+        let mut faces = Faces::default();
+        for face in list {
+            face.iter().for_each(|&corner| faces.corner(corner));
+            faces.close(face.len());
+        }
+        faces
+    }
+
+    const SQUARE: [Vec3; 4] = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
+
+    #[test]
+    fn arities_appear_with_the_first_other_polygon() {
+        let faces = faces(&[&[0, 1, 2], &[0, 2, 3], &[0, 1, 2, 3], &[0, 1, 2]]);
+        assert_eq!((faces.len(), faces.arities), (4, vec![3, 3, 4, 3]));
+    }
+
+    #[test]
+    fn faces_without_area_are_counted_and_materials_stay_with_theirs() {
+        let mut positions = SQUARE.to_vec();
+        positions.extend([Vec3::X, Vec3::X * 2.0, Vec3::new(f32::NAN, 0.0, 0.0), Vec3::splat(9.0)]);
+        let list: [&[u32]; 7] =
+            [&[0, 1, 4], &[0, 1, 5], &[0, 1, 6], &[0, 1, 2, 3], &[0, 1], &[1, 4, 2, 3], &[0, 0, 0, 0]];
+        let face_materials = vec![0, 1, 2, 3, 4, 5, 6];
+        let parsed = Parsed { positions, faces: faces(&list), face_materials, ..Parsed::default() };
+        let loaded = assembled(parsed).expect("some faces are good");
+        assert_eq!(loaded.dropped, Dropped { non_finite: 1, degenerate: 4 });
+        assert_eq!(loaded.mesh.materials, [3, 3, 5]);
+        assert_eq!(loaded.mesh.triangles, [[0, 1, 2], [0, 2, 3], [1, 2, 3]]);
+        assert_eq!(loaded.mesh.positions, SQUARE);
+    }
+
+    #[test]
+    fn the_extremes_of_f32_have_area() {
+        for scale in [f32::MAX / 2.0, f32::MIN_POSITIVE / 1024.0] {
+            let positions = vec![Vec3::ZERO, Vec3::X * scale, Vec3::Y * scale];
+            let parsed = Parsed { positions, faces: faces(&[&[0, 1, 2]]), ..Parsed::default() };
+            assert_eq!(assembled(parsed).expect("has area").mesh.triangles.len(), 1);
+        }
+    }
+
+    #[test]
+    fn no_usable_face_says_why() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::X, Vec3::splat(f32::INFINITY)];
+        let parsed = Parsed { positions, faces: faces(&[&[0, 1, 2], &[0, 1, 3]]), ..Parsed::default() };
+        let says = assembled(parsed).expect_err("nothing left").to_string();
+        assert_eq!(
+            says,
+            "a.off: no usable face: of 2, 1 have a corner that is not finite and 1 have no area"
+        );
+        assert!(assembled(Parsed::default()).expect_err("empty").to_string().contains("no usable face"));
+    }
+
+    #[test]
+    fn normals_are_made_unit_and_missing_ones_made() {
+        let normals = vec![Vec3::Z * 1e30, Vec3::ZERO, Vec3::new(0.0, f32::NAN, 0.0), Vec3::NEG_Z * 1e-30];
+        let parsed = Parsed {
+            positions: SQUARE.to_vec(),
+            normals,
+            uvs: vec![Vec2::ONE, Vec2::NAN, Vec2::X, Vec2::Y],
+            faces: faces(&[&[0, 1, 2, 3]]),
+            ..Parsed::default()
+        };
+        let mesh = assembled(parsed).expect("good").mesh;
+        assert_eq!(mesh.normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::NEG_Z]);
+        assert_eq!(mesh.uvs[1], Vec2::ZERO);
+    }
+
+    #[test]
+    fn an_index_out_of_range_names_the_face() {
+        let parsed = Parsed {
+            positions: SQUARE.to_vec(),
+            faces: faces(&[&[0, 1, 2], &[0, 1, 4]]),
+            ..Parsed::default()
+        };
+        assert!(assembled(parsed).expect_err("refused").to_string().contains("face 2"));
+    }
+}

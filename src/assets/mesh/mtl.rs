@@ -1,0 +1,155 @@
+//! MTL by `tobj`, with the checks that it leaves to its caller.
+
+use std::path::Path;
+
+use crate::assets::read::{self, Watch};
+use crate::assets::{AssetError, FileMaterial};
+use crate::math::Vec3;
+
+/// Most bytes of a material file.
+const FILE_LIMIT: u64 = 64 << 20;
+
+/// The materials of an MTL file.
+///
+/// # Errors
+/// Those of reading, and [`AssetError::Malformed`] with the line.
+pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>, AssetError> {
+    let quiet = Watch { progress: &crate::control::unwatched, ..watch };
+    let bytes = read::bytes(path, FILE_LIMIT, quiet)?;
+    let text = String::from_utf8_lossy(&bytes);
+    for (index, line) in text.lines().enumerate() {
+        check(line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
+    }
+    let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())
+        .map_err(|error| AssetError::malformed(path, None, error.to_string()))?;
+    Ok(materials)
+}
+
+/// `tobj` panics on a colour of one number and takes `nan`.
+fn check(line: &str) -> Result<(), String> {
+    let mut words = line.split_whitespace();
+    let Some(keyword) = words.next() else { return Ok(()) };
+    let wanted = match keyword {
+        "Ka" | "Kd" | "Ks" | "Ke" => 3,
+        "Ns" | "Ni" | "d" => 1,
+        _ => return check_words(keyword, words.next()),
+    };
+    let numbers = words.take(wanted).filter(|word| word.parse().is_ok_and(f32::is_finite)).count();
+    let expected = if wanted == 1 { "a finite number" } else { "three finite numbers" };
+    if numbers == wanted { Ok(()) } else { Err(format!("`{keyword}` is followed by {expected}")) }
+}
+
+fn check_words(keyword: &str, argument: Option<&str>) -> Result<(), String> {
+    match (keyword, argument) {
+        ("newmtl", None) => Err("`newmtl` is followed by a name".to_owned()),
+        ("illum", argument) if argument.is_none_or(|word| word.parse::<u8>().is_err()) => {
+            Err("`illum` is followed by a whole number".to_owned())
+        }
+        (map, None) if map == "bump" || map.starts_with("map_") => {
+            Err(format!("`{map}` is followed by a file"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A material as the renderer knows it; files are relative to `folder`, the MTL's. What the file leaves out is as
+/// the format's readers have it: diffuse 0.6 grey without a texture, white with one.
+pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
+    let file = |name: Option<&str>| name.and_then(file_name).map(|name| folder.join(name));
+    let extra = |key: &str| found.unknown_param.get(key).map(String::as_str);
+    let diffuse_texture = file(found.diffuse_texture.as_deref());
+    let plain = if diffuse_texture.is_some() { 1.0 } else { 0.6 };
+    FileMaterial {
+        name: found.name.clone(),
+        diffuse: color(found.diffuse, plain),
+        specular: color(found.specular, 0.0),
+        shininess: found.shininess.unwrap_or(0.0).max(0.0),
+        ambient: found.ambient.map(|ambient| color(Some(ambient), 0.0)),
+        emission: color(found.emissive, 0.0),
+        ior: found.optical_density.unwrap_or(1.0),
+        illumination_model: found.illumination_model,
+        diffuse_texture,
+        specular_texture: file(found.specular_texture.as_deref()),
+        normal_texture: file(extra("norm").or(extra("map_Kn")).or(found.normal_texture.as_deref())),
+    }
+}
+
+/// Negative components are 0.
+fn color(found: Option<[f32; 3]>, otherwise: f32) -> Vec3 {
+    found.map_or(Vec3::splat(otherwise), |numbers| Vec3::from_array(numbers).max(Vec3::ZERO))
+}
+
+/// The file of a map, behind its options (`-bm 1.0 -s 2 2 2 a name.png`), with either slash.
+fn file_name(statement: &str) -> Option<String> {
+    let mut rest = statement.trim();
+    while let Some(option) = rest.strip_prefix('-') {
+        let (name, behind) = option.split_once(char::is_whitespace)?;
+        let most = match name {
+            "o" | "s" | "t" => 3,
+            "mm" => 2,
+            "blendu" | "blendv" | "cc" | "clamp" | "texres" | "bm" | "boost" | "imfchan" | "type" => 1,
+            _ => 0,
+        };
+        rest = behind.trim_start();
+        let numeric = ["o", "s", "t", "mm"].contains(&name);
+        for _ in 0..most {
+            let (argument, behind) = rest.split_once(char::is_whitespace)?;
+            if numeric && argument.parse::<f32>().is_err() {
+                break;
+            }
+            rest = behind.trim_start();
+        }
+    }
+    (!rest.is_empty()).then(|| rest.replace('\\', "/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{CancelToken, unwatched};
+    use std::path::PathBuf;
+
+    fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.mtl");
+        std::fs::write(&path, text).expect("written");
+        let token = CancelToken::new();
+        let found = load(&path, Watch { progress: &unwatched, token: &token })?;
+        Ok(found.iter().map(|found| material(found, Path::new("models"))).collect())
+    }
+
+    #[test]
+    fn every_statement_finds_its_field() {
+        let text = "newmtl red brick\nKa 0.1 0.2 0.3\nKd 0.5 0.4 -0.3\nKs 0.2 0.2 0.2\nKe 4 5 6\nNs 25\nNi 1.5\n\
+                    illum 7\nmap_Kd -s 2 2 2 -o 0.5 wall one.png\nmap_Ks sub\\shine.png\nmap_Bump -bm 0.5 old.png\n\
+                    norm bumps.png\nnewmtl plain\n";
+        let materials = read(text).expect("whole");
+        assert_eq!(materials.len(), 2);
+        let file = |name: &str| Some(PathBuf::from("models").join(name));
+        let expected = FileMaterial {
+            name: "red brick".to_owned(),
+            diffuse: Vec3::new(0.5, 0.4, 0.0),
+            specular: Vec3::splat(0.2),
+            shininess: 25.0,
+            ambient: Some(Vec3::new(0.1, 0.2, 0.3)),
+            emission: Vec3::new(4.0, 5.0, 6.0),
+            ior: 1.5,
+            illumination_model: Some(7),
+            diffuse_texture: file("wall one.png"),
+            specular_texture: file("sub/shine.png"),
+            normal_texture: file("bumps.png"),
+        };
+        assert_eq!(materials[0], expected);
+        assert_eq!((materials[1].diffuse, materials[1].ambient), (Vec3::splat(0.6), None));
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let says = |text: &str| read(text).expect_err("refused").to_string();
+        assert!(says("newmtl a\nKd 0.5\n").ends_with("a.mtl:2: `Kd` is followed by three finite numbers"));
+        assert!(says("newmtl a\n\nNs nan\n").ends_with("a.mtl:3: `Ns` is followed by a finite number"));
+        assert!(says("newmtl\n").ends_with("a.mtl:1: `newmtl` is followed by a name"));
+        assert!(says("illum x\n").contains("whole number"));
+        assert!(says("map_Kd\n").contains("followed by a file"));
+    }
+}

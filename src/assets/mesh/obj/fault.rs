@@ -1,0 +1,75 @@
+//! Where an OBJ is wrong.
+
+use super::super::text::{Cursor, shown};
+use super::super::{AssetError, Source};
+
+/// `tobj` knows that something is wrong, but not where: look for the first line that it refuses.
+pub(super) fn first_fault(source: &Source<'_>) -> Option<AssetError> {
+    let mut counts = [0_i64; 3];
+    let mut cursor = Cursor::new(source.bytes, 0);
+    while cursor.skip_blank() {
+        let at = cursor.at();
+        let reason = match cursor.word() {
+            b"v" => counted(&mut cursor, &mut counts[0], 3, "coordinates"),
+            b"vt" => counted(&mut cursor, &mut counts[1], 2, "texture coordinates"),
+            b"vn" => counted(&mut cursor, &mut counts[2], 3, "normal coordinates"),
+            b"f" => face_fault(&mut cursor, counts),
+            _ => None,
+        };
+        if let Some(reason) = reason {
+            return Some(source.wrong_at(at, reason));
+        }
+        cursor.end_line();
+    }
+    None
+}
+
+fn counted(cursor: &mut Cursor<'_>, count: &mut i64, wanted: usize, what: &str) -> Option<String> {
+    *count += 1;
+    let mut found = 0;
+    while cursor.skip_in_line() {
+        let start = *cursor;
+        if cursor.float().is_none() {
+            let mut start = start;
+            return Some(format!("expected {wanted} {what}, found {}", shown(start.word())));
+        }
+        found += 1;
+    }
+    match found {
+        4 if wanted == 3 => None,
+        5 if what == "coordinates" => {
+            Some("coordinates are followed by one weight or three colours".to_owned())
+        }
+        _ if found < wanted => Some(format!("expected {wanted} {what}, found {found}")),
+        _ => None,
+    }
+}
+
+fn face_fault(cursor: &mut Cursor<'_>, counts: [i64; 3]) -> Option<String> {
+    while cursor.skip_in_line() {
+        let word = cursor.word();
+        if word == b"\\" {
+            cursor.end_line();
+            continue;
+        }
+        let parts: Vec<&[u8]> = word.split(|&byte| byte == b'/').collect();
+        if parts.len() > 3 {
+            return Some(format!("expected a corner like 1/2/3, found {}", shown(word)));
+        }
+        for (part, (count, what)) in
+            parts.iter().zip(counts.iter().zip(["vertex", "texture coordinate", "normal"]))
+        {
+            if part.is_empty() && what != "vertex" {
+                continue;
+            }
+            match Cursor::new(part, 0).integer() {
+                None => return Some(format!("expected a corner like 1/2/3, found {}", shown(word))),
+                Some(index) if index == 0 || index > *count || index < -count => {
+                    return Some(format!("{what} {index} is out of range: there are {count}, from 1"));
+                }
+                Some(_) => {}
+            }
+        }
+    }
+    None
+}

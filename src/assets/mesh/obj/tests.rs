@@ -1,0 +1,108 @@
+use super::*;
+use crate::assets::Dropped;
+use crate::assets::mesh::load;
+use crate::control::{CancelToken, unwatched};
+use std::fs;
+
+fn read_with(files: &[(&str, &[u8])]) -> Result<LoadedMesh, AssetError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, bytes) in files {
+        fs::write(folder.path().join(name), bytes).expect("written");
+    }
+    load(&folder.path().join(files[0].0), &unwatched, &CancelToken::new())
+}
+
+fn read(text: &str) -> Result<LoadedMesh, AssetError> {
+    read_with(&[("a.obj", text.as_bytes())])
+}
+
+fn says(text: &str) -> String {
+    let text = read(text).expect_err("refused").to_string();
+    text.rsplit_once("/a.obj").map_or(text.clone(), |(_, rest)| rest.to_owned())
+}
+
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+#[test]
+fn corners_with_other_uvs_are_other_vertices() {
+    let text = format!("{SQUARE}vt 0 0\nvt 1 0.25\nvn 0 0 2\nf 1/1/1 2/2/1 3/1/1\nf 1/2/1 3/1/1 4/1/1\n");
+    let mesh = read(&text).expect("whole").mesh;
+    assert_eq!((mesh.positions.len(), mesh.uvs.len(), mesh.normals.len()), (5, 5, 5));
+    assert_eq!(mesh.uvs[1], Vec2::new(1.0, 0.25));
+    assert_eq!(mesh.normals, [Vec3::Z; 5]);
+    assert_eq!(mesh.triangles, [[0, 1, 2], [3, 2, 4]]);
+}
+
+#[test]
+fn quads_relative_indices_and_long_lines_are_read() {
+    for faces in
+        ["f 1 2 3 4", "f -4 -3 -2 -1", "f 1 2 \\\n 3 4", "f 1 2 3 4\nl 1 2 3\np 1\nl 2 4", "  f 1 2 3 4\r"]
+    {
+        let mesh = read(&format!("# \u{e9}\n{SQUARE}{faces}\n")).expect(faces).mesh;
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]], "{faces}");
+        assert!(mesh.normals.is_empty() && mesh.uvs.is_empty() && mesh.materials.is_empty());
+    }
+    let bytes = [b"# \xff\xfe\n".as_slice(), SQUARE.as_bytes(), b"f 1 2 3\n"].concat();
+    assert_eq!(read_with(&[("a.obj", &bytes)]).expect("read").mesh.triangles.len(), 1);
+}
+
+#[test]
+fn triangles_know_their_materials() {
+    let text = format!("mtllib my one.mtl\n{SQUARE}f 1 2 3\nusemtl b\nf 1 3 4\nusemtl none\nf 2 3 4\n");
+    let mtl = b"newmtl a\nKd 1 0 0\nnewmtl b\nKe 5 5 5\n";
+    let loaded = read_with(&[("a.obj", text.as_bytes()), ("my one.mtl", mtl)]).expect("whole");
+    assert_eq!(loaded.mesh.materials, [u32::MAX, 1, u32::MAX]);
+    assert_eq!(loaded.materials[1].emission, Vec3::splat(5.0));
+    assert_eq!(loaded.warnings, ["no material is named \"none\""]);
+}
+
+#[test]
+fn a_missing_library_is_a_warning_and_a_wrong_one_an_error() {
+    let text = format!("mtllib none.mtl\nusemtl red\n{SQUARE}f 1 2 3\n");
+    let loaded = read(&text).expect("a mesh all the same");
+    assert_eq!((loaded.warnings.len(), loaded.materials.len(), loaded.mesh.materials.len()), (1, 0, 0));
+    assert!(loaded.warnings[0].contains("none.mtl"), "{:?}", loaded.warnings);
+    let result = read_with(&[("a.obj", text.as_bytes()), ("none.mtl", b"newmtl red\nKd 1\n")]);
+    assert!(result.expect_err("refused").to_string().contains("none.mtl:2: `Kd`"));
+}
+
+#[test]
+fn groups_without_normals_get_them_when_others_have_some() {
+    let text = format!("{SQUARE}vn 0 0 -1\no one\nf 1//1 2//1 3//1\no two\nf 1 3 4\n");
+    let mesh = read(&text).expect("whole").mesh;
+    assert_eq!(mesh.normals, [Vec3::NEG_Z, Vec3::NEG_Z, Vec3::NEG_Z, Vec3::Z, Vec3::Z, Vec3::Z]);
+    let mixed = format!("{SQUARE}vt 0 1\no one\nf 1/1 2 3\n");
+    let loaded = read(&mixed).expect("whole");
+    assert!(loaded.warnings[0].contains("\"one\"") && loaded.mesh.uvs.iter().all(|uv| *uv == Vec2::ZERO));
+}
+
+#[test]
+fn what_tobj_accepts_is_dropped_and_counted() {
+    let text = format!("{SQUARE}v nan 0 0\nv 1e999 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 2\nf 1\nf 1 1 2\n");
+    let loaded = read(&text).expect("one face is good");
+    assert_eq!(loaded.dropped, Dropped { non_finite: 2, degenerate: 3 });
+    assert_eq!(loaded.mesh.positions.len(), 3);
+}
+
+#[test]
+fn errors_name_the_line() {
+    assert_eq!(says("v 0 0 0\nv 1 0 0\nf 1 2 3\n"), ":3: vertex 3 is out of range: there are 2, from 1");
+    assert_eq!(says(&format!("{SQUARE}f 1 2 -9\n")), ":5: vertex -9 is out of range: there are 4, from 1");
+    assert_eq!(
+        says(&format!("{SQUARE}vt 0 0\n\n# x\nf 1/1 2/2 3/1\n")),
+        ":8: texture coordinate 2 is out of range: there are 1, from 1"
+    );
+    assert_eq!(says("v 0 0\n"), ":1: expected 3 coordinates, found 2");
+    assert_eq!(says("v 0 zero 0\n"), ":1: expected 3 coordinates, found \"zero\"");
+    assert_eq!(says(&format!("{SQUARE}f 1 2 x\n")), ":5: expected a corner like 1/2/3, found \"x\"");
+    assert_eq!(says(&format!("{SQUARE}f 0 1 2\n")), ":5: vertex 0 is out of range: there are 4, from 1");
+    assert!(says(SQUARE).contains("no usable face"));
+    assert!(says("").contains("no usable face"));
+}
+
+#[test]
+fn a_face_of_very_many_corners_ends() {
+    let corners: Vec<String> = (0..300_000).map(|index| (index % 4 + 1).to_string()).collect();
+    let loaded = read(&format!("{SQUARE}f {}\n", corners.join(" "))).expect("a fan");
+    assert!(!loaded.mesh.triangles.is_empty());
+}

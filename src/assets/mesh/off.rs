@@ -1,0 +1,284 @@
+//! OFF: a header word, counts, a vertex a line, a polygon a line (Geomview's manual, section *OFF*), and what
+//! occurs in the wild: counts behind the header word, no edge count, undeclared columns behind coordinates and
+//! faces, comments and blank lines anywhere.
+
+use super::assemble::{Faces, Parsed, assemble};
+use super::text::{Cursor, shown};
+use super::{AssetError, LoadedMesh, Source};
+use crate::math::{Vec2, Vec3};
+
+/// Lines between two polls of the token.
+const BATCH: u64 = 1 << 13;
+
+/// What the header word says of each vertex. Colours are passed over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Header {
+    uvs: bool,
+    normals: bool,
+    /// A fourth coordinate that divides the others.
+    homogeneous: bool,
+}
+
+pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
+    Reader { source: *source, cursor: Cursor::new(source.bytes, 0) }.read()
+}
+
+struct Reader<'a> {
+    source: Source<'a>,
+    cursor: Cursor<'a>,
+}
+
+impl Reader<'_> {
+    fn read(mut self) -> Result<LoadedMesh, AssetError> {
+        let header = self.header()?;
+        let vertices = self.count("vertices")?;
+        let faces = self.count("faces")?;
+        self.cursor.end_line();
+        self.plausible(vertices, faces)?;
+        let mut parsed = Parsed::default();
+        self.vertices(header, vertices, &mut parsed)?;
+        self.faces(vertices, faces, &mut parsed.faces)?;
+        assemble(&self.source, parsed)
+    }
+
+    fn wrong<T>(&self, reason: impl Into<String>) -> Result<T, AssetError> {
+        Err(self.source.wrong_at(self.cursor.at(), reason))
+    }
+
+    fn unexpected<T>(&self, wanted: &str) -> Result<T, AssetError> {
+        let mut ahead = self.cursor;
+        self.wrong(format!("expected {wanted}, found {}", shown(ahead.word())))
+    }
+
+    /// The header word: `[ST][C][N][4]OFF`. Counts may follow it without a blank, and it may be missing.
+    fn header(&mut self) -> Result<Header, AssetError> {
+        if !self.cursor.skip_blank() {
+            return self.wrong("the file is empty");
+        }
+        let start = self.cursor;
+        let word = self.cursor.word();
+        if word[0].is_ascii_digit() && !word.ends_with(b"OFF") {
+            self.cursor = start;
+            return Ok(Header::default());
+        }
+        let Some(end) = word.windows(3).position(|part| part == b"OFF") else {
+            self.cursor = start;
+            return self.wrong(format!("expected OFF, found {}", shown(word)));
+        };
+        let (kind, behind) = (&word[..end], &word[end + 3..]);
+        let known = kind.iter().all(|letter| b"STCN4".contains(letter));
+        if !known || !behind.iter().all(u8::is_ascii_digit) {
+            return self.wrong(format!("{} is no kind of OFF that can be read", shown(word)));
+        }
+        self.cursor = Cursor::new(self.source.bytes, self.cursor.at() - behind.len());
+        self.refuse_binary()?;
+        let has = |letter| kind.contains(&letter);
+        Ok(Header { uvs: has(b'S'), normals: has(b'N'), homogeneous: has(b'4') })
+    }
+
+    fn refuse_binary(&mut self) -> Result<(), AssetError> {
+        let mut ahead = self.cursor;
+        if ahead.skip_in_line() && ahead.word() == b"BINARY" {
+            return self.wrong("binary OFF files are not read; write it as text or PLY");
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, of: &str) -> Result<u64, AssetError> {
+        if !self.cursor.skip_blank() {
+            return self.wrong(format!("the file ends before the number of {of}"));
+        }
+        match self.cursor.integer().map(u64::try_from) {
+            Some(Ok(count)) => Ok(count),
+            _ => self.unexpected(&format!("the number of {of}")),
+        }
+    }
+
+    /// A vertex takes at least 6 bytes, a face at least 2: a header that claims more lies.
+    fn plausible(&self, vertices: u64, faces: u64) -> Result<(), AssetError> {
+        let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
+        let remaining = self.cursor.remaining() as u64;
+        if needed > remaining + 1 || vertices > u64::from(u32::MAX) {
+            let reason = format!(
+                "the header claims {vertices} vertices and {faces} faces, and only {remaining} bytes follow"
+            );
+            return Err(self.source.wrong_at(self.cursor.at().saturating_sub(1), reason));
+        }
+        Ok(())
+    }
+
+    fn vertices(&mut self, header: Header, count: u64, parsed: &mut Parsed) -> Result<(), AssetError> {
+        parsed.positions.reserve(count as usize);
+        for index in 0..count {
+            if index % BATCH == 0 {
+                self.source.tick(self.cursor.at())?;
+            }
+            if !self.cursor.skip_blank() {
+                return self.wrong(format!("the file ends after {index} of {count} vertices"));
+            }
+            let position = self.triple("a coordinate")?;
+            let divisor = if header.homogeneous { self.float("a coordinate")? } else { 1.0 };
+            parsed.positions.push(position / divisor);
+            if header.normals {
+                parsed.normals.push(self.triple("a normal")?);
+            }
+            if header.uvs {
+                parsed.uvs.push(self.last_two()?);
+            }
+            self.cursor.end_line();
+        }
+        Ok(())
+    }
+
+    fn triple(&mut self, what: &str) -> Result<Vec3, AssetError> {
+        Ok(Vec3::new(self.float(what)?, self.float(what)?, self.float(what)?))
+    }
+
+    fn float(&mut self, what: &str) -> Result<f32, AssetError> {
+        if !self.cursor.skip_in_line() {
+            return self.wrong(format!("expected {what}, found the line's end"));
+        }
+        match self.cursor.float() {
+            Some(value) => Ok(value),
+            None => self.unexpected(what),
+        }
+    }
+
+    /// Texture coordinates are the last of a line, behind a colour of any length.
+    fn last_two(&mut self) -> Result<Vec2, AssetError> {
+        let mut last = Vec2::new(self.float("u")?, self.float("v")?);
+        while self.cursor.skip_in_line() {
+            last = Vec2::new(last.y, self.float("a number")?);
+        }
+        Ok(last)
+    }
+
+    fn faces(&mut self, vertices: u64, count: u64, faces: &mut Faces) -> Result<(), AssetError> {
+        faces.reserve(count as usize);
+        for index in 0..count {
+            if index % BATCH == 0 {
+                self.source.tick(self.cursor.at())?;
+            }
+            if !self.cursor.skip_blank() {
+                return self.wrong(format!("the file ends after {index} of {count} faces"));
+            }
+            self.face(vertices, faces)?;
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, vertices: u64, faces: &mut Faces) -> Result<(), AssetError> {
+        let arity = match self.cursor.integer().map(usize::try_from) {
+            Some(Ok(arity)) => arity,
+            _ => return self.unexpected("a number of corners"),
+        };
+        if arity.saturating_mul(2) > self.cursor.remaining() {
+            return self.wrong(format!("a face claims {arity} corners, more than the file can hold"));
+        }
+        for corner in 0..arity {
+            if !self.cursor.skip_in_line() && (corner == 0 || !self.cursor.skip_blank()) {
+                return self.wrong(format!("a face of {arity} corners ends after {corner}"));
+            }
+            match self.cursor.integer() {
+                Some(vertex) if (0..vertices as i64).contains(&vertex) => faces.corner(vertex as u32),
+                Some(vertex) => {
+                    return self
+                        .wrong(format!("vertex {vertex} is out of range: there are {vertices}, from 0"));
+                }
+                None => return self.unexpected("a vertex"),
+            }
+        }
+        faces.close(arity);
+        self.cursor.end_line();
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assets::read::Watch;
+    use crate::control::{CancelToken, unwatched};
+    use std::path::Path;
+
+    fn read(text: &str) -> Result<LoadedMesh, AssetError> {
+        let token = CancelToken::new();
+        let watch = Watch { progress: &unwatched, token: &token };
+        parse(&Source { path: Path::new("a.off"), bytes: text.as_bytes(), watch })
+    }
+
+    fn says(text: &str) -> String {
+        read(text).expect_err("refused").to_string()
+    }
+
+    const FACES: &str = "3 0 1 2\n3 0 2 3\n";
+
+    #[test]
+    fn one_mesh_in_all_the_ways_it_occurs() {
+        let coordinates = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"];
+        let lines = |tail: &str| coordinates.map(|line| format!("{line}{tail}\n")).concat();
+        let plain = read(&format!("OFF\n4 2 0\n{}{FACES}", lines(""))).expect("plain").mesh;
+        assert_eq!(plain.triangles, [[0, 1, 2], [0, 2, 3]]);
+        for text in [
+            format!("OFF 4 2 5\n{}{FACES}", lines("")),
+            format!("OFF4 2 0\n{}{FACES}", lines("")),
+            format!("OFF\n4 2\n{}{FACES}", lines("")),
+            format!("4 2 0\n{}{FACES}", lines("")),
+            format!("# first\n\nOFF # kind\n# counts\n4 2 0 # edges\n\n{}#\n{FACES}\n\n", lines(" # here")),
+            format!("OFF\r\n4 2 0\r\n{}{}", lines("\r"), FACES.replace('\n', "\r\n")),
+            format!("COFF\n4 2 0\n{}{FACES}", lines(" 150 151 152 255 ")),
+            format!("COFF\n4 2 0\n{}{FACES}", lines(" 0.1 0.5 0.25")),
+            // Normals that the header does not declare.
+            format!("OFF\n4 2 0\n{}{FACES}", lines(" 0 0 -1")),
+            format!("4OFF\n4 2 0\n{}{FACES}", lines(" 1")),
+            // Colours behind the faces, of any length.
+            format!("OFF\n4 2 0\n{}3 0 1 2 0.5\n3  0 2 3 255 0 0 255\n", lines("")),
+            format!("OFF\n4 2 0\n{}{}", lines(""), FACES.trim_end()),
+            // A polygon instead of two triangles.
+            format!("OFF\n4 1 0\n{}4 0 1 2 3\n", lines("")),
+            format!("OFF\n4 1 0\n{}4 0 1\n2 3\n", lines("")),
+        ] {
+            assert_eq!(read(&text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh, plain, "{text}");
+        }
+    }
+
+    #[test]
+    fn declared_normals_and_texture_coordinates_are_read() {
+        let text = "STCNOFF\n3 1 0\n0 0 0 0 0 2 9 9 9 9 0.5 0.25\n1 0 0 0 0 2 9 9 9 1 0\n0 1 0 0 0 2 9 0 1\n3 0 1 2\n";
+        let mesh = read(text).expect("whole").mesh;
+        assert_eq!(mesh.normals, [Vec3::Z; 3]);
+        assert_eq!(mesh.uvs, [Vec2::new(0.5, 0.25), Vec2::X, Vec2::Y]);
+        let text = "4OFF\n3 1 0\n0 0 0 2\n1 0 0 2\n0 1 0 0.5\n3 0 1 2\n";
+        assert_eq!(read(text).expect("whole").mesh.positions, [Vec3::ZERO, Vec3::X * 0.5, Vec3::Y * 2.0]);
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let start = "OFF\n# comment\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n";
+        assert!(says(&format!("{start}3 0 1 3\n")).starts_with("a.off:7: vertex 3 is out of range"));
+        assert!(says(&format!("{start}3 0 -1 2\n")).starts_with("a.off:7: vertex -1 is out of range"));
+        assert!(says(&format!("{start}3 0 1 x\n")).starts_with("a.off:7: expected a vertex, found \"x\""));
+        assert!(says(&format!("{start}3 0 1  \n\n")).contains("a face of 3 corners ends after 2"));
+        assert!(
+            says("OFF\n2 1 0\n0 0 0\n0 zero 0 0\n3 0 1 2\n").starts_with("a.off:4: expected a coordinate")
+        );
+        assert!(
+            says("OFF\n2 1 0\n0 0 0\n0 0\n30 0 1 2 3\n")
+                .starts_with("a.off:4: expected a coordinate, found the")
+        );
+        assert!(says("OFF\n1 2 0\n0 0 0\n3 0 0 0\n      \n").contains("after 1 of 2 faces"));
+        assert!(says("").contains("empty"));
+        assert!(says("solid\n").starts_with("a.off:1: expected OFF, found \"solid\""));
+        assert!(says("nOFF 3\n").contains("no kind of OFF"));
+        assert!(says("OFF BINARY\n").contains("binary"));
+        assert!(says("OFF\n-1 2 0\n").contains("a.off:2: expected the number of vertices"));
+    }
+
+    #[test]
+    fn lies_cost_nothing() {
+        assert!(says("OFF\n4000000000 4000000000 0\n0 0 0\n").contains("only 6 bytes follow"));
+        assert!(says("OFF\n18446744073709551615 1 0\n").contains("number of vertices"));
+        let text = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n";
+        assert!(says(text).starts_with("a.off:6: a face claims 4000000000 corners"));
+    }
+}

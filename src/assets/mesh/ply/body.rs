@@ -1,0 +1,113 @@
+//! The numbers behind a PLY header, as text or as bytes in either order.
+
+use super::super::text::{Cursor, shown};
+use super::header::Scalar;
+
+/// Numbers in the order of the file. Errors are in words, without the place.
+pub(super) trait Numbers {
+    fn float(&mut self, scalar: Scalar) -> Result<f32, String>;
+    fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
+
+    /// Byte of the file.
+    fn at(&self) -> usize;
+
+    /// Whether so many numbers can follow.
+    fn can_hold(&self, scalar: Scalar, count: u64) -> bool;
+}
+
+/// Words between blanks.
+pub(super) struct Ascii<'a>(pub(super) Cursor<'a>);
+
+impl Ascii<'_> {
+    fn seek_word(&mut self) -> Result<(), String> {
+        if self.0.skip_blank() { Ok(()) } else { Err("the file ends here".to_owned()) }
+    }
+}
+
+impl Numbers for Ascii<'_> {
+    fn float(&mut self, _: Scalar) -> Result<f32, String> {
+        self.seek_word()?;
+        self.0.float().ok_or_else(|| format!("expected a number, found {}", shown(self.0.word())))
+    }
+
+    fn integer(&mut self, _: Scalar) -> Result<i64, String> {
+        self.seek_word()?;
+        self.0.integer().ok_or_else(|| format!("expected a whole number, found {}", shown(self.0.word())))
+    }
+
+    fn skip(&mut self, _: Scalar, count: usize) -> Result<(), String> {
+        for _ in 0..count {
+            self.seek_word()?;
+            self.0.word();
+        }
+        Ok(())
+    }
+
+    fn at(&self) -> usize {
+        self.0.at()
+    }
+
+    fn can_hold(&self, _: Scalar, count: u64) -> bool {
+        count.saturating_mul(2) <= self.0.remaining() as u64 + 1
+    }
+}
+
+/// Bytes, the most significant first or last.
+pub(super) struct Binary<'a, const BIG_ENDIAN: bool> {
+    pub(super) bytes: &'a [u8],
+    pub(super) at: usize,
+}
+
+impl<const BIG_ENDIAN: bool> Binary<'_, BIG_ENDIAN> {
+    #[inline]
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        let found = self.bytes.get(self.at..).and_then(|rest| rest.first_chunk::<N>());
+        let mut found = *found.ok_or_else(|| "the file ends here".to_owned())?;
+        self.at += N;
+        if BIG_ENDIAN {
+            found.reverse();
+        }
+        Ok(found)
+    }
+}
+
+impl<const BIG_ENDIAN: bool> Numbers for Binary<'_, BIG_ENDIAN> {
+    #[inline]
+    fn float(&mut self, scalar: Scalar) -> Result<f32, String> {
+        match scalar {
+            Scalar::F32 => Ok(f32::from_le_bytes(self.take()?)),
+            Scalar::F64 => Ok(f64::from_le_bytes(self.take()?) as f32),
+            _ => Ok(self.integer(scalar)? as f32),
+        }
+    }
+
+    #[inline]
+    fn integer(&mut self, scalar: Scalar) -> Result<i64, String> {
+        Ok(match scalar {
+            Scalar::I8 => i64::from(i8::from_le_bytes(self.take()?)),
+            Scalar::U8 => i64::from(u8::from_le_bytes(self.take()?)),
+            Scalar::I16 => i64::from(i16::from_le_bytes(self.take()?)),
+            Scalar::U16 => i64::from(u16::from_le_bytes(self.take()?)),
+            Scalar::I32 => i64::from(i32::from_le_bytes(self.take()?)),
+            Scalar::U32 => i64::from(u32::from_le_bytes(self.take()?)),
+            Scalar::F32 | Scalar::F64 => self.float(scalar)? as i64,
+        })
+    }
+
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String> {
+        if !self.can_hold(scalar, count as u64) {
+            return Err("the file ends here".to_owned());
+        }
+        self.at += count * scalar.size();
+        Ok(())
+    }
+
+    fn at(&self) -> usize {
+        self.at
+    }
+
+    fn can_hold(&self, scalar: Scalar, count: u64) -> bool {
+        count.saturating_mul(scalar.size() as u64) <= (self.bytes.len() - self.at) as u64
+    }
+}

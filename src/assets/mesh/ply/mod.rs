@@ -1,0 +1,224 @@
+//! PLY (Turk, *The PLY Polygon File Format*, 1994): text and binary in both byte orders, any types, any further
+//! properties and elements.
+
+mod body;
+mod header;
+
+use super::assemble::{Parsed, assemble};
+use super::text::Cursor;
+use super::{AssetError, LoadedMesh, Source};
+use crate::math::{Vec2, Vec3};
+use body::{Ascii, Binary, Numbers};
+use header::{Element, Encoding, Header, Kind, Scalar};
+
+/// Elements between two polls of the token.
+const BATCH: u64 = 1 << 14;
+
+pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
+    source.tick(0)?;
+    let header = header::parse(source)?;
+    let (bytes, at) = (source.bytes, header.body);
+    let parsed = match header.encoding {
+        Encoding::Ascii => read(source, &header, Ascii(Cursor::new(bytes, at))),
+        Encoding::LittleEndian => read(source, &header, Binary::<false> { bytes, at }),
+        Encoding::BigEndian => read(source, &header, Binary::<true> { bytes, at }),
+    }?;
+    assemble(source, parsed)
+}
+
+/// Where in the file something is wrong.
+struct Place<'a> {
+    source: &'a Source<'a>,
+    encoding: Encoding,
+}
+
+impl Place<'_> {
+    /// Text has lines, bytes have numbered elements.
+    fn wrong(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
+        let reason = format!("{} {}: {reason}", element.name, index + 1);
+        match self.encoding {
+            Encoding::Ascii => self.source.wrong_at(at, reason),
+            _ => self.source.wrong(reason),
+        }
+    }
+}
+
+fn read(source: &Source<'_>, header: &Header, mut numbers: impl Numbers) -> Result<Parsed, AssetError> {
+    let place = Place { source, encoding: header.encoding };
+    let count_of =
+        |name: &str| header.elements.iter().filter(|e| e.name == name).map(|e| e.count).sum::<u64>();
+    let vertices = count_of("vertex");
+    if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
+        return Err(source.wrong(format!("{vertices} vertices are too many, or in more than one element")));
+    }
+    if count_of("tristrips") > 0 && count_of("face") == 0 {
+        return Err(source.wrong("triangle strips are not read; write the mesh with faces"));
+    }
+    let mut parsed = Parsed::default();
+    for element in &header.elements {
+        plausible(source, element, header.encoding, numbers.at())?;
+        match element.name.as_str() {
+            "vertex" => read_vertices(&place, element, &mut numbers, &mut parsed)?,
+            "face" => read_faces(&place, element, &mut numbers, vertices, &mut parsed)?,
+            _ if element.properties.is_empty() => {}
+            _ => each(&place, element, &mut numbers, |numbers| {
+                element.properties.iter().try_for_each(|property| skip(numbers, property.kind))
+            })?,
+        }
+    }
+    Ok(parsed)
+}
+
+/// A header that claims more than the file can hold is refused before anything is allocated.
+fn plausible(
+    source: &Source<'_>,
+    element: &Element,
+    encoding: Encoding,
+    at: usize,
+) -> Result<(), AssetError> {
+    let needed = element.count.saturating_mul(element.least_bytes(encoding));
+    let remaining = (source.bytes.len() - at) as u64;
+    if needed > remaining + 1 {
+        let Element { name, count, .. } = element;
+        return Err(
+            source.wrong(format!("the header claims {count} of {name}, and only {remaining} bytes follow"))
+        );
+    }
+    Ok(())
+}
+
+/// Read all of an element.
+fn each<N: Numbers>(
+    place: &Place<'_>,
+    element: &Element,
+    numbers: &mut N,
+    mut one: impl FnMut(&mut N) -> Result<(), String>,
+) -> Result<(), AssetError> {
+    for index in 0..element.count {
+        if index % BATCH == 0 {
+            place.source.tick(numbers.at())?;
+        }
+        one(numbers).map_err(|reason| place.wrong(numbers.at(), element, index, &reason))?;
+    }
+    Ok(())
+}
+
+fn skip(numbers: &mut impl Numbers, kind: Kind) -> Result<(), String> {
+    match kind {
+        Kind::One(scalar) => numbers.skip(scalar, 1),
+        Kind::List { count, item } => {
+            let length = list_length(numbers, count, item)?;
+            numbers.skip(item, length)
+        }
+    }
+}
+
+fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Result<usize, String> {
+    let length = numbers.integer(count)?;
+    match u64::try_from(length) {
+        Ok(fits) if numbers.can_hold(item, fits) => Ok(fits as usize),
+        _ => Err(format!("it claims {length} corners, more than the file can hold")),
+    }
+}
+
+/// Where the values of a vertex go: position, normal, texture coordinates.
+fn slot(name: &str) -> Option<usize> {
+    Some(match name {
+        "x" => 0,
+        "y" => 1,
+        "z" => 2,
+        "nx" => 3,
+        "ny" => 4,
+        "nz" => 5,
+        "u" | "s" | "texture_u" | "texture_s" => 6,
+        "v" | "t" | "texture_v" | "texture_t" => 7,
+        _ => return None,
+    })
+}
+
+fn read_vertices(
+    place: &Place<'_>,
+    element: &Element,
+    numbers: &mut impl Numbers,
+    parsed: &mut Parsed,
+) -> Result<(), AssetError> {
+    let target = |kind: Kind, name: &str| if matches!(kind, Kind::One(_)) { slot(name) } else { None };
+    let layout: Vec<(Kind, Option<usize>)> = element
+        .properties
+        .iter()
+        .map(|property| (property.kind, target(property.kind, &property.name)))
+        .collect();
+    let has = |slots: &[usize]| slots.iter().all(|slot| layout.iter().any(|(_, to)| *to == Some(*slot)));
+    if !has(&[0, 1, 2]) {
+        return Err(place.source.wrong("the vertices have no x, y and z"));
+    }
+    let (has_normals, has_uvs) = (has(&[3, 4, 5]), has(&[6, 7]));
+    let count = element.count as usize;
+    parsed.positions.reserve(count);
+    parsed.normals.reserve(if has_normals { count } else { 0 });
+    parsed.uvs.reserve(if has_uvs { count } else { 0 });
+    each(place, element, numbers, |numbers| {
+        let mut values = [0.0; 8];
+        for &(kind, slot) in &layout {
+            match (kind, slot) {
+                (Kind::One(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
+                _ => skip(numbers, kind)?,
+            }
+        }
+        let [x, y, z, nx, ny, nz, u, v] = values;
+        parsed.positions.push(Vec3::new(x, y, z));
+        if has_normals {
+            parsed.normals.push(Vec3::new(nx, ny, nz));
+        }
+        if has_uvs {
+            parsed.uvs.push(Vec2::new(u, v));
+        }
+        Ok(())
+    })
+}
+
+fn read_faces(
+    place: &Place<'_>,
+    element: &Element,
+    numbers: &mut impl Numbers,
+    vertices: u64,
+    parsed: &mut Parsed,
+) -> Result<(), AssetError> {
+    let corners = element
+        .properties
+        .iter()
+        .position(|property| ["vertex_indices", "vertex_index"].contains(&property.name.as_str()))
+        .filter(
+            |&place| matches!(element.properties[place].kind, Kind::List { item, .. } if item.is_whole()),
+        );
+    let Some(corners) = corners else {
+        return Err(place.source.wrong("the faces have no list of whole numbers `vertex_indices`"));
+    };
+    let faces = &mut parsed.faces;
+    faces.reserve(element.count as usize);
+    each(place, element, numbers, |numbers| {
+        for (index, property) in element.properties.iter().enumerate() {
+            let Kind::List { count, item } = property.kind else {
+                skip(numbers, property.kind)?;
+                continue;
+            };
+            let length = list_length(numbers, count, item)?;
+            if index != corners {
+                numbers.skip(item, length)?;
+                continue;
+            }
+            for _ in 0..length {
+                let vertex = numbers.integer(item)?;
+                if !(0..vertices as i64).contains(&vertex) {
+                    return Err(format!("vertex {vertex} is out of range: there are {vertices}, from 0"));
+                }
+                faces.corner(vertex as u32);
+            }
+            faces.close(length);
+        }
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+use std::path::Path;
+
+use super::*;
+use crate::assets::read::Watch;
+use crate::control::{CancelToken, unwatched};
+
+fn read_bytes(bytes: &[u8]) -> Result<LoadedMesh, AssetError> {
+    let token = CancelToken::new();
+    let watch = Watch { progress: &unwatched, token: &token };
+    parse(&Source { path: Path::new("a.ply"), bytes, watch })
+}
+
+fn says(bytes: &[u8]) -> String {
+    read_bytes(bytes).expect_err("refused").to_string()
+}
+
+const VERTEX: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+const FACE: &str = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+const SQUARE: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+
+fn ascii(body: &str) -> Vec<u8> {
+    format!("ply\nformat ascii 1.0\ncomment made here\n{VERTEX}{FACE}{body}").into_bytes()
+}
+
+#[test]
+fn text_with_either_line_end() {
+    let text = ascii(&format!("{SQUARE}4 0 1 2 3\n"));
+    let mesh = read_bytes(&text).expect("whole").mesh;
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(mesh.positions[2], Vec3::new(1.0, 1.0, 0.0));
+    let windows = String::from_utf8(text).expect("text").replace('\n', "\r\n");
+    assert_eq!(read_bytes(windows.as_bytes()).expect("whole").mesh, mesh);
+}
+
+/// A file with every type, unknown properties and elements, lists in vertices and an element before the vertices.
+fn wild(big_endian: bool) -> Vec<u8> {
+    let order = if big_endian { "big" } else { "little" };
+    let mut file = format!(
+        "ply\nformat binary_{order}_endian 1.0\nobj_info x\nelement camera 2\nproperty short a\nproperty list int \
+         double b\nelement empty 4000000000\nelement vertex 3\nproperty uchar red\nproperty double x\nproperty int16 \
+         y\nproperty float z\nproperty list uchar ushort seen_by\nproperty float nx\nproperty float ny\nproperty \
+         float nz\nproperty float s\nproperty uint8 t\nelement face 1\nproperty char flag\nproperty list uchar float \
+         texcoord\nproperty list uint32 uint16 vertex_index\nend_header\n"
+    )
+    .into_bytes();
+    let mut put = |little: &[u8]| {
+        let mut bytes = little.to_vec();
+        if big_endian {
+            bytes.reverse();
+        }
+        file.extend(bytes);
+    };
+    for length in [0_i32, 2] {
+        put(&7_i16.to_le_bytes());
+        put(&length.to_le_bytes());
+        (0..length).for_each(|_| put(&1.5_f64.to_le_bytes()));
+    }
+    for (x, y) in [(0.0_f64, 0_i16), (2.5, 0), (0.0, -300)] {
+        put(&[200]);
+        put(&x.to_le_bytes());
+        put(&y.to_le_bytes());
+        put(&0.25_f32.to_le_bytes());
+        put(&[1]);
+        put(&513_u16.to_le_bytes());
+        [0.0_f32, 0.0, -3.0, 0.75].iter().for_each(|value| put(&value.to_le_bytes()));
+        put(&[1]);
+    }
+    put(&[255]);
+    put(&[1]);
+    put(&0.5_f32.to_le_bytes());
+    put(&3_u32.to_le_bytes());
+    [0_u16, 2, 1].iter().for_each(|index| put(&index.to_le_bytes()));
+    file
+}
+
+#[test]
+fn binary_of_both_orders_and_all_types() {
+    let mesh = read_bytes(&wild(false)).expect("little").mesh;
+    assert_eq!(
+        mesh.positions,
+        [Vec3::new(0., 0., 0.25), Vec3::new(2.5, 0., 0.25), Vec3::new(0., -300., 0.25)]
+    );
+    assert_eq!(mesh.triangles, [[0, 2, 1]]);
+    assert_eq!(mesh.normals, [Vec3::NEG_Z; 3]);
+    assert_eq!(mesh.uvs, [Vec2::new(0.75, 1.0); 3]);
+    assert_eq!(read_bytes(&wild(true)).expect("big").mesh, mesh);
+}
+
+#[test]
+fn every_truncation_is_an_error() {
+    let whole = wild(true);
+    for length in 0..whole.len() {
+        assert!(read_bytes(&whole[..length]).is_err(), "{length} of {}", whole.len());
+    }
+}
+
+#[test]
+fn faces_may_come_before_vertices() {
+    let text = format!(
+        "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\n{VERTEX}end_header\n3 0 1 \
+         2\n{SQUARE}"
+    );
+    assert_eq!(read_bytes(text.as_bytes()).expect("whole").mesh.triangles, [[0, 1, 2]]);
+}
+
+#[test]
+fn errors_name_line_or_face() {
+    assert!(
+        says(&ascii(&format!("{SQUARE}3 0 1 4\n"))).starts_with("a.ply:15: face 1: vertex 4 is out of range")
+    );
+    assert!(
+        says(&ascii("0 0 0\n1 x 0\n0 0 0\n0 0 0\n3 0 1 2\n"))
+            .contains("a.ply:12: vertex 2: expected a number")
+    );
+    assert!(says(&ascii(&format!("{SQUARE}-3 0 1 2\n"))).contains("it claims -3 corners"));
+    let mut binary = wild(false);
+    let last = binary.len() - 2;
+    binary[last] = 9;
+    assert_eq!(says(&binary), "a.ply: face 1: vertex 9 is out of range: there are 3, from 0");
+    assert!(says(b"plx\n").starts_with("a.ply:1: expected ply, found \"plx\""));
+    assert!(
+        says(b"ply\nformat ascii 1.0\nelement vertex many\n").starts_with("a.ply:3: \"many\" is no number")
+    );
+    assert!(says(b"ply\nproperty float x\n").contains("a.ply:2: a property before"));
+    assert!(says(b"ply\nformat utf8 1.0\n").contains("a.ply:2: the format is ascii"));
+    assert!(says(b"ply\nelement v 1\nproperty half x\n").contains("a.ply:3: \"half\" is no type"));
+    assert!(says(b"ply\nend_header\n").contains("no format"));
+    assert!(says(b"ply\nformat ascii 1.0\n").contains("no end_header"));
+    let flat = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n";
+    assert!(says(flat.as_bytes()).contains("no x, y and z"));
+}
+
+#[test]
+fn lies_cost_nothing() {
+    for encoding in ["ascii", "binary_little_endian"] {
+        let vertices = VERTEX.replace('4', "4000000000");
+        let text = format!("ply\nformat {encoding} 1.0\n{vertices}{FACE}0 0 0\n");
+        assert!(says(text.as_bytes()).contains("claims 4000000000 of vertex, and only 6 bytes follow"));
+        let faces = FACE.replace("face 1", "face 4000000000");
+        let text = format!("ply\nformat {encoding} 1.0\n{faces}");
+        assert!(says(text.as_bytes()).contains("claims 4000000000 of face"));
+    }
+    let list = FACE.replace("uchar int", "uint int");
+    let mut file = format!("ply\nformat binary_little_endian 1.0\n{VERTEX}{list}").into_bytes();
+    file.extend([0; 48]);
+    file.extend(4_000_000_000_u32.to_le_bytes());
+    assert!(says(&file).contains("face 1: it claims 4000000000 corners"));
+}

@@ -1,0 +1,136 @@
+//! Reading files without surprises: only regular files, never more than a limit, watched and stoppable.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+use super::AssetError;
+use crate::control::{CancelToken, Cancelled, Progress};
+
+/// Bytes between two polls of the token.
+const CHUNK: usize = 1 << 20;
+
+/// Who watches the work, and who may stop it.
+#[derive(Clone, Copy)]
+pub(crate) struct Watch<'a> {
+    pub(crate) progress: Progress<'a>,
+    pub(crate) token: &'a CancelToken,
+}
+
+impl Watch<'_> {
+    /// Report, then go on or stop.
+    pub(crate) fn tick(&self, done: usize, total: usize) -> Result<(), Cancelled> {
+        (self.progress)(done as u64, total as u64);
+        self.token.check()
+    }
+}
+
+/// Open a regular file of at most `limit` bytes; gives its length too. Pipes, devices and folders are refused
+/// before they are opened, so that nothing blocks.
+pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
+    let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
+    let found = fs::metadata(path).map_err(unreadable)?;
+    if found.is_dir() {
+        return Err(AssetError::unreadable(path, "it is a folder, not a file"));
+    }
+    if !found.is_file() {
+        return Err(AssetError::unreadable(path, "it is a pipe or a device, not a regular file"));
+    }
+    if found.len() > limit {
+        let reason = format!("it has {} bytes, more than the {limit} that are read", found.len());
+        return Err(AssetError::unreadable(path, reason));
+    }
+    Ok((File::open(path).map_err(unreadable)?, found.len()))
+}
+
+/// All bytes of a regular file. Progress counts bytes out of `2·length`: the second half is the parser's.
+pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
+    let (file, length) = open(path, limit)?;
+    let mut file = file.take(limit);
+    let length = length as usize;
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(length + 1).map_err(|error| AssetError::unreadable(path, error.to_string()))?;
+    loop {
+        watch.tick(bytes.len().min(length), 2 * length)?;
+        let got = (&mut file)
+            .take(CHUNK as u64)
+            .read_to_end(&mut bytes)
+            .map_err(|error| AssetError::unreadable(path, in_words(&error)))?;
+        if got == 0 {
+            return Ok(bytes);
+        }
+    }
+}
+
+/// What went wrong, without the number of the operating system.
+pub(crate) fn in_words(error: &std::io::Error) -> String {
+    use std::io::ErrorKind;
+    match error.kind() {
+        ErrorKind::NotFound => "no such file".to_owned(),
+        ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        _ => {
+            let text = error.to_string();
+            let words = text.split(" (os error").next().unwrap_or(&text);
+            let mut letters = words.chars();
+            letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::unwatched;
+    use std::sync::Mutex;
+
+    fn watch(token: &CancelToken) -> Watch<'_> {
+        Watch { progress: &unwatched, token }
+    }
+
+    #[test]
+    fn what_is_no_file_is_refused_in_words() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let token = CancelToken::new();
+        let says = |path: &Path| bytes(path, 100, watch(&token)).expect_err("refused").to_string();
+        assert!(says(folder.path()).contains("folder"));
+        assert!(says(&folder.path().join("none.obj")).contains("none.obj: no such file"));
+        let long = folder.path().join("long");
+        fs::write(&long, [0; 101]).expect("written");
+        assert!(says(&long).contains("101 bytes"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_and_loops_do_not_block() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let token = CancelToken::new();
+        let says = |path: &Path| bytes(path, 100, watch(&token)).expect_err("refused").to_string();
+        let pipe = folder.path().join("pipe");
+        nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+        assert!(says(&pipe).contains("pipe"));
+        assert!(says(Path::new("/dev/zero")).contains("device"));
+        let turn = folder.path().join("turn");
+        std::os::unix::fs::symlink(&turn, &turn).expect("a link");
+        assert!(says(&turn).contains("symbolic link"), "{}", says(&turn));
+    }
+
+    #[test]
+    fn reading_reports_and_stops() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("some");
+        fs::write(&path, vec![7; 3 * CHUNK]).expect("written");
+        let seen = Mutex::new(Vec::new());
+        let token = CancelToken::new();
+        let note = |done, total| {
+            seen.lock().expect("no panic").push((done, total));
+            if done >= 2 * CHUNK as u64 {
+                token.cancel();
+            }
+        };
+        let result = bytes(&path, u64::MAX, Watch { progress: &note, token: &token });
+        assert!(matches!(result, Err(AssetError::Cancelled(_))));
+        let total = 6 * CHUNK as u64;
+        let expected: Vec<_> = (0..3).map(|chunk| (chunk * CHUNK as u64, total)).collect();
+        assert_eq!(*seen.lock().expect("no panic"), expected);
+    }
+}

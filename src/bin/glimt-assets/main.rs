@@ -1,0 +1,163 @@
+//! Makes what the bundled scenes show: `glimt-assets` writes the stored files of `assets/`, bit for bit the same
+//! on every machine; `glimt-assets million` writes `assets/million.ply`, which is too large to store.
+
+mod noise;
+mod pictures;
+mod room;
+mod shapes;
+mod surface;
+mod vector;
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+const USAGE: &str = "usage: glimt-assets [million]   (in the project's folder; writes into assets/)";
+
+/// A file below `assets/` and its bytes.
+type Asset = (&'static str, Vec<u8>);
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let files = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => stored(),
+        ["million"] => vec![("million.ply", shapes::million().to_ply())],
+        _ => {
+            let _ = writeln!(io::stderr(), "{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    for (name, bytes) in files {
+        let path = Path::new("assets").join(name);
+        if let Err(error) = write(&path, &bytes) {
+            let _ = writeln!(io::stderr(), "cannot write {}: {error}", path.display());
+            return ExitCode::FAILURE;
+        }
+        let _ = writeln!(io::stdout(), "{} ({} bytes)", path.display(), bytes.len());
+    }
+    ExitCode::SUCCESS
+}
+
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    fs::create_dir_all(path.parent().unwrap_or(Path::new("")))?;
+    fs::write(path, bytes)
+}
+
+/// All files that the repository keeps.
+fn stored() -> Vec<Asset> {
+    vec![
+        ("coral.ply", shapes::coral().to_ply()),
+        ("rope.ply", shapes::rope().to_ply()),
+        ("knot.obj", shapes::knot().to_obj("A trefoil knot with texture coordinates and normals")),
+        ("vase.obj", shapes::vase().to_obj("A vase, turned about y, with texture coordinates and normals")),
+        ("gem.off", shapes::dodecahedron().to_off("A dodecahedron: twelve pentagons")),
+        ("room.obj", room::obj()),
+        ("room.mtl", room::mtl()),
+        ("room_orbiter.txt", room::orbiter()),
+        ("textures/bricks.png", pictures::bricks()),
+        ("textures/bumps.png", pictures::bumps()),
+        ("textures/checker.png", pictures::checker()),
+        ("textures/planks.png", pictures::planks()),
+        ("textures/marble.png", pictures::marble()),
+        ("textures/tiles.ppm", pictures::tiles()),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glimt::assets::mesh;
+    use glimt::control::{CancelToken, unwatched};
+    use std::collections::HashMap;
+
+    fn folder() -> &'static Path {
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/assets"))
+    }
+
+    #[test]
+    fn the_stored_files_are_what_is_made_here() {
+        let mut total = 0;
+        for (name, bytes) in stored() {
+            let found = fs::read(folder().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(found == bytes, "{name} is not what glimt-assets makes: run it");
+            total += bytes.len();
+        }
+        assert!(total < 5_000_000, "{total} bytes are too many to store");
+    }
+
+    /// In a closed surface each edge is passed once in each direction.
+    #[test]
+    fn meshes_load_whole_and_closed_ones_are_closed() {
+        let mut together = 0;
+        for (name, closed) in [
+            ("coral.ply", true),
+            ("rope.ply", true),
+            ("knot.obj", true),
+            ("vase.obj", true),
+            ("gem.off", true),
+            ("room.obj", false),
+        ] {
+            let loaded = mesh::load(&folder().join(name), &unwatched, &CancelToken::new()).expect(name);
+            assert_eq!((loaded.dropped, loaded.warnings), Default::default(), "{name}");
+            let mesh = loaded.mesh;
+            together += if name.ends_with("ply") { mesh.triangles.len() } else { 0 };
+            // Places, not indices: seams of texture coordinates have two vertices at one place.
+            let mut edges = HashMap::new();
+            for corners in (0..mesh.triangles.len() as u32).map(|triangle| mesh.corners(triangle)) {
+                let place = corners.map(|corner| (corner + 0.0).to_array().map(f32::to_bits));
+                for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+                    *edges.entry((place[from], place[to])).or_insert(0) += 1;
+                }
+            }
+            let open =
+                edges.iter().filter(|((from, to), count)| edges.get(&(*to, *from)) != Some(count)).count();
+            assert_eq!(open == 0, closed, "{name}: {open} open edges");
+            let volume: f32 = (0..mesh.triangles.len() as u32)
+                .map(|triangle| mesh.corners(triangle))
+                .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+                .sum();
+            assert!(!closed || volume > 0.1, "{name} is inside out: {volume}");
+        }
+        assert!(together >= 100_000, "{together}");
+    }
+
+    #[test]
+    fn stored_normals_point_away_from_the_front() {
+        for name in ["knot.obj", "vase.obj", "room.obj"] {
+            let mesh = mesh::load(&folder().join(name), &unwatched, &CancelToken::new()).expect(name).mesh;
+            let against = (0..mesh.triangles.len() as u32)
+                .filter(|&triangle| {
+                    let [a, b, c] = mesh.corners(triangle);
+                    let face = (b - a).cross(c - a);
+                    mesh.triangles[triangle as usize]
+                        .iter()
+                        .any(|&v| mesh.normals[v as usize].dot(face) < 0.0)
+                })
+                .count();
+            assert_eq!(against, 0, "{name}");
+        }
+    }
+
+    #[test]
+    fn the_scenes_name_files_that_are_made_here() {
+        let scenes = folder().with_file_name("scenes");
+        let mut named = 0;
+        for entry in fs::read_dir(&scenes).expect("the scenes") {
+            let text = fs::read_to_string(entry.expect("an entry").path()).expect("a scene");
+            let files = text
+                .lines()
+                .filter_map(|line| line.strip_prefix("file = ").or(line.strip_prefix("orbiter = ")));
+            for file in files.map(|file| file.trim_matches('"')) {
+                assert!(file == "../assets/million.ply" || scenes.join(file).is_file(), "{file}");
+                named += 1;
+            }
+        }
+        assert!(named >= 10, "{named}");
+    }
+
+    #[test]
+    fn a_million_is_more_than_a_million() {
+        assert!(shapes::million().triangle_count() >= 1_000_000);
+    }
+}

@@ -1,0 +1,140 @@
+//! The textures. All of them repeat without a seam. Coordinates are u to the right and v up, in [0, 1).
+
+use super::noise::{fractal, random, value};
+use super::vector::{Vector, mix, scale, smooth_step, turn, unit};
+
+/// Columns and rows of the larger pictures.
+const SIDE: u32 = 512;
+
+/// Rows of bricks, and bricks in a row.
+const COURSES: f64 = 8.0;
+const BRICKS: f64 = 4.0;
+
+/// sRGB bytes of a picture, rows from the top.
+fn render(side: u32, color: impl Fn(f64, f64) -> Vector) -> Vec<u8> {
+    let middle = |index: u32| (f64::from(index) + 0.5) / f64::from(side);
+    (0..side)
+        .flat_map(|y| (0..side).map(move |x| (x, y)))
+        .flat_map(|(x, y)| color(middle(x), 1.0 - middle(y)).map(|value| (value * 255.0 + 0.5) as u8))
+        .collect()
+}
+
+fn png(side: u32, pixels: &[u8]) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, side, side);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(pixels));
+    written.expect("a picture of a fixed size into memory cannot fail");
+    file
+}
+
+/// Noise in few steps: what cannot be seen costs bytes.
+fn grain(u: f64, v: f64, seed: u64) -> f64 {
+    let fine = fractal([u * 32.0, v * 32.0, 0.5], 3, 32, seed);
+    (fine * 24.0).round() / 24.0
+}
+
+/// The brick at (u, v): which one, and how far inside its mortar (0 in the joint, 1 on the brick).
+fn brick(u: f64, v: f64) -> ([i64; 2], f64) {
+    let course = (v * COURSES).floor();
+    let shift = if course % 2.0 == 0.0 { 0.0 } else { 0.5 };
+    let along = (u * BRICKS + shift).rem_euclid(BRICKS);
+    let (x, y) = (along.fract() * COURSES / BRICKS, (v * COURSES).fract());
+    let wide = COURSES / BRICKS;
+    let wobble = 0.03 * (value([u * 24.0, v * 24.0, 0.5], 24, 5) - 0.5);
+    let border = x.min(wide - x).min(y).min(1.0 - y) + wobble;
+    ([along.floor() as i64, course as i64], smooth_step(0.045, 0.11, border))
+}
+
+/// Red bricks in running bond.
+pub(crate) fn bricks() -> Vec<u8> {
+    let pixels = render(SIDE, |u, v| {
+        let ([x, y], inside) = brick(u, v);
+        let tint = random([x, y, 0], 17);
+        let clay = mix([0.52, 0.21, 0.15], [0.72, 0.37, 0.25], tint);
+        let clay = scale(clay, 0.82 + 0.3 * grain(u, v, 31));
+        let mortar = scale([0.70, 0.67, 0.62], 0.85 + 0.2 * grain(u, v, 47));
+        mix(mortar, clay, inside).map(|value| value.min(1.0))
+    });
+    png(SIDE, &pixels)
+}
+
+/// Height of the bricks over the joints, in the picture's width.
+fn brick_height(u: f64, v: f64) -> f64 {
+    let (_, inside) = brick(u, v);
+    0.006 * inside + 0.002 * fractal([u * 16.0, v * 16.0, 0.5], 3, 16, 31)
+}
+
+/// The normals of the bricks: red along u, green along v, blue out of the wall.
+pub(crate) fn bumps() -> Vec<u8> {
+    let step = 1.0 / f64::from(SIDE);
+    let pixels = render(SIDE, |u, v| {
+        let slope = |du: f64, dv: f64| {
+            let at =
+                |sign: f64| brick_height((u + sign * du).rem_euclid(1.0), (v + sign * dv).rem_euclid(1.0));
+            (at(1.0) - at(-1.0)) / (2.0 * step)
+        };
+        let normal = unit([-slope(step, 0.0), -slope(0.0, step), 1.0]);
+        normal.map(|component| ((component * 0.5 + 0.5) * 96.0).round() / 96.0)
+    });
+    png(SIDE, &pixels)
+}
+
+/// Eight by eight squares, the lower left one dark.
+pub(crate) fn checker() -> Vec<u8> {
+    let pixels = render(64, |u, v| {
+        let dark = ((u * 8.0).floor() + (v * 8.0).floor()) % 2.0 == 0.0;
+        if dark { [0.12, 0.13, 0.16] } else { [0.93, 0.92, 0.88] }
+    });
+    png(64, &pixels)
+}
+
+/// Boards along u with grain and butt joints.
+pub(crate) fn planks() -> Vec<u8> {
+    let pixels = render(SIDE, |u, v| {
+        let board = (v * 8.0).floor();
+        let joint = random([board as i64, 1, 0], 3);
+        let along = (u + joint).rem_euclid(1.0);
+        let tint = random([board as i64, 2, 0], 3);
+        let stretched = value([u * 6.0, v * 96.0, board + 0.5], 0, 9);
+        let edge = value([0.0, v * 96.0, board + 0.5], 0, 9);
+        // Fade to the value at the left edge, so that the grain repeats.
+        let blend = smooth_step(0.9, 1.0, u);
+        let grain = ((stretched * (1.0 - blend) + edge * blend) * 24.0).round() / 24.0;
+        let wood = mix([0.46, 0.30, 0.17], [0.70, 0.50, 0.31], 0.6 * tint + 0.4 * grain);
+        let across = (v * 8.0).fract();
+        let gap = across.min(1.0 - across).min(along.min(1.0 - along) * 8.0);
+        scale(wood, 0.35 + 0.65 * smooth_step(0.0, 0.04, gap))
+    });
+    png(SIDE, &pixels)
+}
+
+/// White marble with dark veins.
+pub(crate) fn marble() -> Vec<u8> {
+    let pixels = render(SIDE, |u, v| {
+        let cloud = fractal([u * 4.0, v * 4.0, 0.5], 5, 4, 61);
+        let (wave, _) = turn(u + v + 1.4 * cloud);
+        let vein = 1.0 - wave.abs();
+        let vein = vein * vein * vein * vein;
+        let color = mix([0.93, 0.92, 0.90], [0.36, 0.38, 0.42], 0.8 * vein + 0.25 * (cloud - 0.4).max(0.0));
+        color.map(|value| (value * 64.0).round() / 64.0)
+    });
+    png(SIDE, &pixels)
+}
+
+/// Four by four glazed tiles, as a PPM with a comment, as paint programs write it.
+pub(crate) fn tiles() -> Vec<u8> {
+    let side = 64;
+    let mut file = format!("P6\n# made by glimt-assets\n{side} {side}\n255\n").into_bytes();
+    file.extend(render(side, |u, v| {
+        let (x, y) = ((u * 4.0).fract(), (v * 4.0).fract());
+        let border = x.min(1.0 - x).min(y).min(1.0 - y);
+        let (dx, dy) = (x - 0.5, y - 0.5);
+        let ring = (dx * dx + dy * dy).sqrt();
+        let glaze = mix([0.20, 0.36, 0.62], [0.90, 0.90, 0.86], smooth_step(0.02, 0.07, (ring - 0.3).abs()));
+        mix([0.55, 0.53, 0.50], glaze, smooth_step(0.02, 0.08, border))
+    }));
+    file
+}

@@ -1,0 +1,190 @@
+//! The meshes.
+
+use std::collections::HashMap;
+
+use super::noise::{fractal, value};
+use super::surface::{Surface, between, icosahedron};
+use super::vector::{Vector, add, cross, dot, scale, smooth_step, subtract, turn, unit};
+
+/// A round lump with ridges that branch, of 81,920 triangles.
+pub(crate) fn coral() -> Surface {
+    displaced_sphere(6, |direction| {
+        let ridge = 1.0 - (2.0 * fractal(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
+        0.72 + 0.34 * smooth_step(0.62, 1.0, ridge) + 0.05 * fractal(scale(direction, 14.0), 2, 0, 21)
+    })
+}
+
+/// A mountainous globe of 1,310,720 triangles.
+pub(crate) fn million() -> Surface {
+    displaced_sphere(8, |direction| {
+        let height = fractal(scale(direction, 2.0), 8, 0, 3);
+        let crater = value(scale(direction, 9.0), 0, 11);
+        0.82 + 0.42 * height - 0.05 * smooth_step(0.68, 0.8, crater)
+    })
+}
+
+/// Three strands that wind about each other along a knot, of 36,864 triangles.
+pub(crate) fn rope() -> Surface {
+    let mut whole = Surface::default();
+    for strand in 0..3 {
+        let phase = f64::from(strand) / 3.0;
+        let middle = |s: f64| {
+            let (center, normal, binormal) = frame(s, trefoil);
+            let (sin, cos) = turn(phase + 22.0 * s);
+            add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
+        };
+        let tube = weld(Surface::grid(512, 12, [1.0, 1.0], |s, t| around(s, t, 0.082, middle)), 512, 12);
+        let base = whole.positions.len() as u32;
+        whole.positions.extend(tube.positions);
+        whole.faces.extend(tube.faces.into_iter().map(|face| face.into_iter().map(|v| v + base).collect()));
+    }
+    whole
+}
+
+/// A tube along a trefoil knot; its texture fits 24 times along and twice around.
+pub(crate) fn knot() -> Surface {
+    Surface::grid(224, 24, [24.0, 2.0], |s, t| around(s, t, 0.24, trefoil))
+}
+
+/// A vase with an inside, turned about y, 1.6 high.
+pub(crate) fn vase() -> Surface {
+    Surface::grid(64, 64, [4.0, 4.0], |s, t| {
+        let [radius, height] = profile(t);
+        let (sin, cos) = turn(s);
+        [radius * cos, height, radius * sin]
+    })
+}
+
+/// Radius and height along the vase, from the middle of its foot over the lip to the middle of its inside: a
+/// Catmull–Rom spline.
+fn profile(t: f64) -> [f64; 2] {
+    const KNOTS: [[f64; 2]; 16] = [
+        [0.0, 0.0],
+        [0.2, 0.0],
+        [0.32, 0.01],
+        [0.4, 0.08],
+        [0.56, 0.4],
+        [0.52, 0.8],
+        [0.3, 1.15],
+        [0.24, 1.35],
+        [0.36, 1.58],
+        [0.34, 1.6],
+        [0.2, 1.35],
+        [0.26, 1.15],
+        [0.47, 0.8],
+        [0.5, 0.4],
+        [0.3, 0.1],
+        [0.0, 0.06],
+    ];
+    let last = KNOTS.len() - 1;
+    let place = (t * last as f64).clamp(0.0, last as f64);
+    let index = (place.floor() as usize).min(last - 1);
+    let x = place - index as f64;
+    let knot = |offset: usize| KNOTS[(index + offset).saturating_sub(1).min(last)];
+    let blend = |axis: usize| {
+        let [a, b, c, d] = [knot(0)[axis], knot(1)[axis], knot(2)[axis], knot(3)[axis]];
+        b + 0.5 * x * (c - a + x * (2.0 * a - 5.0 * b + 4.0 * c - d + x * (3.0 * (b - c) + d - a)))
+    };
+    // The ends are on the axis to the last bit.
+    let radius = if place == 0.0 || place == last as f64 { 0.0 } else { blend(0).max(0.0) };
+    [radius, blend(1)]
+}
+
+/// The dual of the icosahedron: a pentagon about each of its vertices.
+pub(crate) fn dodecahedron() -> Surface {
+    let (corners, triangles) = icosahedron();
+    let center = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|corner| corners[corner as usize]);
+        unit(add(a, add(b, c)))
+    };
+    let positions = triangles.iter().map(center).collect();
+    let faces = (0..corners.len() as u32).map(|corner| pentagon(corner, &triangles)).collect();
+    Surface { positions, faces, ..Surface::default() }
+}
+
+/// The triangles about a corner, in order: each shares its last edge with the next one's first.
+fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
+    let mut next = HashMap::new();
+    for (index, triangle) in triangles.iter().enumerate() {
+        if let Some(place) = triangle.iter().position(|&other| other == corner) {
+            next.insert(triangle[(place + 1) % 3], (triangle[(place + 2) % 3], index as u32));
+        }
+    }
+    let start = next.keys().min().copied().unwrap_or(0);
+    let mut ring = Vec::new();
+    let mut at = start;
+    while let Some(&(to, triangle)) = next.get(&at) {
+        ring.push(triangle);
+        at = to;
+        if at == start {
+            break;
+        }
+    }
+    ring
+}
+
+/// An icosahedron whose edges were halved `times` over, each vertex at the distance that `radius` gives its
+/// direction.
+fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
+    let (mut corners, mut triangles) = icosahedron();
+    for _ in 0..times {
+        let mut middles = HashMap::new();
+        let mut finer = Vec::with_capacity(4 * triangles.len());
+        for [a, b, c] in triangles {
+            let mut middle = |from: u32, to: u32| {
+                *middles.entry((from.min(to), from.max(to))).or_insert_with(|| {
+                    corners.push(between(corners[from.min(to) as usize], corners[from.max(to) as usize]));
+                    corners.len() as u32 - 1
+                })
+            };
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    Surface {
+        positions: corners.into_iter().map(|direction| scale(direction, radius(direction))).collect(),
+        faces: triangles.into_iter().map(|triangle| triangle.to_vec()).collect(),
+        ..Surface::default()
+    }
+}
+
+/// A trefoil knot within about 1 of the origin, in the plane y = 0: twice around, three times through the hole.
+fn trefoil(s: f64) -> Vector {
+    let (sin2, cos2) = turn(2.0 * s);
+    let (sin3, cos3) = turn(3.0 * s);
+    let radius = 0.66 + 0.3 * cos3;
+    [radius * cos2, 0.36 * sin3, radius * sin2]
+}
+
+/// A point of a closed curve with two directions across it that come back after a turn: away from the circle
+/// about which the knot winds.
+fn frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
+    let center = curve(s);
+    let tangent = unit(subtract(curve(s + 1e-4), curve(s - 1e-4)));
+    let (sin, cos) = turn(2.0 * s);
+    let away = subtract(center, [0.66 * cos, 0.0, 0.66 * sin]);
+    let normal = unit(subtract(away, scale(tangent, dot(away, tangent))));
+    (center, normal, cross(tangent, normal))
+}
+
+/// A point of the tube of this radius about a closed curve.
+fn around(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
+    let (center, normal, binormal) = frame(s, curve);
+    let (sin, cos) = turn(t);
+    add(center, add(scale(normal, radius * cos), scale(binormal, radius * sin)))
+}
+
+/// A grid that closes on itself both ways, without its second seam vertices.
+fn weld(grid: Surface, columns: u32, rows: u32) -> Surface {
+    let welded = |vertex: u32| {
+        let (column, row) = (vertex / (rows + 1), vertex % (rows + 1));
+        (column % columns) * rows + row % rows
+    };
+    let kept = (0..columns).flat_map(|column| (0..rows).map(move |row| column * (rows + 1) + row));
+    Surface {
+        positions: kept.map(|vertex| grid.positions[vertex as usize]).collect(),
+        faces: grid.faces.into_iter().map(|face| face.into_iter().map(welded).collect()).collect(),
+        ..Surface::default()
+    }
+}

@@ -1,0 +1,45 @@
+//! Three numbers; sines and the like by `libm`, whose bits do not depend on the machine.
+
+pub(crate) type Vector = [f64; 3];
+
+pub(crate) fn add(a: Vector, b: Vector) -> Vector {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+pub(crate) fn subtract(a: Vector, b: Vector) -> Vector {
+    add(a, scale(b, -1.0))
+}
+
+pub(crate) fn scale(a: Vector, by: f64) -> Vector {
+    a.map(|component| component * by)
+}
+
+pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Unit vector; the argument is not 0.
+pub(crate) fn unit(a: Vector) -> Vector {
+    scale(a, 1.0 / dot(a, a).sqrt())
+}
+
+/// Sine and cosine of so many turns.
+pub(crate) fn turn(turns: f64) -> (f64, f64) {
+    let angle = std::f64::consts::TAU * turns;
+    (libm::sin(angle), libm::cos(angle))
+}
+
+/// 0 below `from`, 1 above `to`, smooth between.
+pub(crate) fn smooth_step(from: f64, to: f64, at: f64) -> f64 {
+    let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// `a` at 0, `b` at 1.
+pub(crate) fn mix(a: Vector, b: Vector, t: f64) -> Vector {
+    add(scale(a, 1.0 - t), scale(b, t))
+}

@@ -1,0 +1,286 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::builder::styling::{AnsiColor, Styles};
+use clap::{Parser, ValueEnum};
+
+use crate::film::Rect;
+
+const EXAMPLES: &str = "\
+Examples:
+  glimt new ball.toml                     write a scene to start from
+  glimt ball.toml                         edit it in an editor and see it here
+  glimt ball.toml --once -o a.png -o a.exr
+  glimt ball.toml --once --samples 16 --time 2 --report report.json
+  glimt check ball.toml                   find errors without rendering
+
+A scene that is named like a command is given with its folder: glimt ./check
+
+Exit codes: 0 done; 1 the work failed; 2 the call or the scene is wrong;
+130, 143, 129 ended by SIGINT, SIGTERM, SIGHUP.";
+
+const STYLES: Styles = Styles::styled()
+    .header(AnsiColor::Green.on_default().bold())
+    .usage(AnsiColor::Green.on_default().bold())
+    .literal(AnsiColor::Cyan.on_default().bold())
+    .placeholder(AnsiColor::Cyan.on_default());
+
+/// A ray tracer that lives in the terminal: edit a scene, save it, see it.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "glimt", version, after_help = EXAMPLES, styles = STYLES)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, max_term_width = 100)]
+pub struct Args {
+    /// A command other than rendering.
+    #[command(subcommand)]
+    pub command: Option<Subcommand>,
+    /// What is rendered and how.
+    #[command(flatten)]
+    pub render: RenderArgs,
+}
+
+impl Args {
+    /// The colours asked for, by whatever command.
+    pub(super) fn color(&self) -> Color {
+        match &self.command {
+            Some(Subcommand::Check { color, .. }) => *color,
+            _ => self.render.color,
+        }
+    }
+}
+
+/// Commands other than rendering.
+#[derive(Clone, Debug, clap::Subcommand)]
+pub enum Subcommand {
+    /// Read and validate a scene and everything that it names; render nothing
+    Check {
+        /// The scene file
+        scene: PathBuf,
+        /// Colours of the messages
+        #[arg(long, value_enum, default_value_t, value_name = "HOW")]
+        color: Color,
+    },
+    /// Write a commented scene to start from; refuses to overwrite
+    New {
+        /// The file to write
+        file: PathBuf,
+    },
+}
+
+/// A render's options; each overrides the scene for this run.
+#[derive(Clone, Debug, clap::Args)]
+pub struct RenderArgs {
+    /// The scene file (TOML)
+    #[arg(required = true, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Render once without the terminal UI, write the picture, exit
+    #[arg(long)]
+    pub once: bool,
+
+    /// Where the picture goes; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
+    /// ppm. [default: the scene's `output`, else the scene's name with .png]
+    #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
+    pub outputs: Vec<PathBuf>,
+    /// Bits per channel of PNG files: 8 or 16
+    #[arg(long, value_name = "BITS", value_parser = bit_depth, help_heading = "Output")]
+    pub bit_depth: Option<u8>,
+    /// Write settings, timings and counters of the render as JSON
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    pub report: Option<PathBuf>,
+
+    /// Pixels across
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    pub width: Option<u32>,
+    /// Pixels down
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    pub height: Option<u32>,
+    /// Samples per pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
+    pub samples: Option<u32>,
+    /// Stop after this long, with the samples that there are
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, help_heading = "Picture")]
+    pub time: Option<f64>,
+    /// Render these pixels only (left, top, width, height); the rest stays black
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop, help_heading = "Picture")]
+    pub crop: Option<Rect>,
+    /// What the picture shows
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Picture")]
+    pub view: Option<View>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", help_heading = "Picture")]
+    pub seed: Option<u32>,
+
+    /// How light is followed
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Method")]
+    pub integrator: Option<Integrator>,
+    /// Scatterings along one path; 0: emitted light only, 1: direct light
+    #[arg(long, value_name = "N", help_heading = "Method")]
+    pub max_depth: Option<u32>,
+    /// Shadows; hard: one ray to the middle of an area light
+    #[arg(long, value_enum, value_name = "HOW", help_heading = "Method")]
+    pub shadows: Option<Shadows>,
+    /// Photon maps; accepted, but not rendered by this version
+    #[arg(long, value_enum, value_name = "on|off", help_heading = "Method")]
+    pub photons: Option<Switch>,
+    /// Depth of field, where the camera has an aperture
+    #[arg(long, value_enum, value_name = "on|off", help_heading = "Method")]
+    pub dof: Option<Switch>,
+    /// Acceleration structure
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Method")]
+    pub accel: Option<Accel>,
+    /// Threads that render; 0: one per core
+    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Method")]
+    pub threads: Option<usize>,
+
+    /// How progress is said on stderr with --once
+    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Terminal")]
+    pub progress: Progress,
+    /// How the preview is drawn
+    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Terminal")]
+    pub preview: Preview,
+    /// Colours of the preview and of messages; auto looks at the terminal and at NO_COLOR
+    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Terminal")]
+    pub color: Color,
+    /// Look at the files several times a second rather than rely on the system's notifications
+    #[arg(long, help_heading = "Terminal")]
+    pub poll: bool,
+}
+
+/// On or off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// Yes
+    On,
+    /// No
+    Off,
+}
+
+/// Methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Integrator {
+    /// Direct light, mirrors and glass
+    Whitted,
+    /// All light paths (not available in this version)
+    Path,
+}
+
+/// Shadows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shadows {
+    /// Nothing stops light
+    Off,
+    /// One ray to the middle of a light
+    Hard,
+    /// The visible part of a light
+    Soft,
+}
+
+/// Acceleration structures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Accel {
+    /// Bounding volume hierarchy
+    Bvh,
+    /// kd-tree (not available in this version)
+    Kdtree,
+}
+
+/// Ways to say progress.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Progress {
+    /// Bars on a terminal, plain lines elsewhere
+    #[default]
+    Auto,
+    /// Lines now and then
+    Plain,
+    /// One JSON object a line: its key "event" is stage, asset, progress, written, done, failed or cancelled
+    Json,
+    /// Nothing but errors and warnings
+    None,
+}
+
+/// Ways to draw the preview.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Preview {
+    /// Half blocks where there is colour, characters elsewhere
+    #[default]
+    Auto,
+    /// Two pixels a cell
+    Halfblock,
+    /// Characters by brightness
+    Ascii,
+    /// None
+    None,
+}
+
+/// Colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Color {
+    /// What the terminal can show
+    #[default]
+    Auto,
+    /// 24 bits
+    Truecolor,
+    /// The palette of 256
+    #[value(name = "256")]
+    Palette256,
+    /// The palette of 16
+    #[value(name = "16")]
+    Palette16,
+    /// None
+    None,
+}
+
+/// What a picture shows; see [`crate::pipeline::settings::View`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct View(pub crate::pipeline::settings::View);
+
+impl ValueEnum for View {
+    fn value_variants<'a>() -> &'a [Self] {
+        use crate::pipeline::settings::View as V;
+        const ALL: [View; V::ALL.len()] = {
+            let mut all = [View(V::Beauty); V::ALL.len()];
+            let mut i = 0;
+            while i < all.len() {
+                all[i] = View(V::ALL[i]);
+                i += 1;
+            }
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+        Some(clap::builder::PossibleValue::new(self.0.name()))
+    }
+}
+
+fn bit_depth(text: &str) -> Result<u8, String> {
+    match text {
+        "8" => Ok(8),
+        "16" => Ok(16),
+        _ => Err("expected 8 or 16".to_owned()),
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
+        _ => Err("expected a number of seconds above 0".to_owned()),
+    }
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    const MOST: usize = 4096;
+    match text.parse::<usize>() {
+        Ok(count) if count <= MOST => Ok(count),
+        _ => Err(format!("expected a number from 0 to {MOST}")),
+    }
+}
+
+fn crop(text: &str) -> Result<Rect, String> {
+    let numbers: Vec<u32> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
+    match (numbers.as_slice(), text.split(',').count()) {
+        (&[x, y, width, height], 4) if width > 0 && height > 0 => Ok(Rect { x, y, width, height }),
+        _ => Err("expected four whole numbers X,Y,W,H with W and H above 0, as in 100,50,64,64".to_owned()),
+    }
+}

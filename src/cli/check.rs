@@ -1,0 +1,55 @@
+//! `glimt check`: is everything right that a scene names?
+
+use std::path::Path;
+
+use super::console::Console;
+use super::exit::Exit;
+use crate::pipeline::protocol::Failure;
+use crate::pipeline::{Checked, check};
+
+pub(super) fn run(scene: &Path, console: &Console) -> Exit {
+    match check(scene) {
+        Ok(checked) => {
+            console.diagnostics(&checked.warnings);
+            console.answer(&summary(scene, &checked));
+            Exit::DONE
+        }
+        Err(Failure::Scene(diagnostics)) => {
+            console.diagnostics(&diagnostics);
+            Exit::WRONG
+        }
+        Err(Failure::Work(message)) => console.fail(Exit::FAILED, &message),
+    }
+}
+
+fn summary(scene: &Path, checked: &Checked) -> String {
+    let parts = [
+        count(checked.objects, "object"),
+        count(checked.triangles, "triangle"),
+        count(checked.textures, "texture"),
+        count(checked.point_lights, "point light"),
+    ];
+    let warnings = match checked.warnings.len() as u64 {
+        0 => String::new(),
+        some => format!("; {}", count(some, "warning")),
+    };
+    format!("ok: {}: {}{warnings}", scene.display(), parts.join(", "))
+}
+
+/// A number with its noun in the right form.
+pub(super) fn count(number: u64, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_summary_counts_in_english() {
+        let checked =
+            Checked { objects: 1, triangles: 0, textures: 2, point_lights: 3, warnings: Vec::new() };
+        let text = summary(Path::new("a.toml"), &checked);
+        assert_eq!(text, "ok: a.toml: 1 object, 0 triangles, 2 textures, 3 point lights");
+    }
+}

@@ -1,0 +1,193 @@
+//! From what was typed to what it means.
+
+use std::path::PathBuf;
+
+use super::args::{Accel, Color, Integrator, Preview, Progress, RenderArgs, Shadows, Switch};
+use crate::output::Format;
+use crate::pipeline::settings::Overrides;
+use crate::scene::description;
+
+/// What is to be done.
+#[derive(Clone, Debug)]
+pub(super) struct Order {
+    pub(super) scene: PathBuf,
+    pub(super) overrides: Overrides,
+    pub(super) is_once: bool,
+    pub(super) report: Option<PathBuf>,
+    pub(super) progress: Progress,
+    pub(super) preview: Preview,
+    pub(super) color: Color,
+    pub(super) poll: bool,
+}
+
+/// The meaning of the arguments.
+///
+/// # Errors
+/// Something that this version does not have, in words with the way out.
+pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
+    let scene = args.scene.ok_or("no scene is given; see glimt --help")?;
+    let integrator = match args.integrator {
+        Some(Integrator::Path) => {
+            return Err(
+                "--integrator path is not available in this version; use --integrator whitted".to_owned()
+            );
+        }
+        other => other.map(|_| description::Integrator::Whitted),
+    };
+    let accel = match args.accel {
+        Some(Accel::Kdtree) => {
+            return Err("--accel kdtree is not available in this version; use --accel bvh".to_owned());
+        }
+        other => other.map(|_| description::Accel::Bvh),
+    };
+    check_outputs(&args.outputs)?;
+    let shadows = args.shadows.map(|how| match how {
+        Shadows::Off => description::Shadows::Off,
+        Shadows::Hard => description::Shadows::Hard,
+        Shadows::Soft => description::Shadows::Soft,
+    });
+    let overrides = Overrides {
+        outputs: args.outputs,
+        width: args.width,
+        height: args.height,
+        samples: args.samples,
+        time_seconds: args.time,
+        max_depth: args.max_depth,
+        integrator,
+        shadows,
+        photons: args.photons.map(is_on),
+        dof: args.dof.map(is_on),
+        accel,
+        view: args.view.map(|view| view.0),
+        seed: args.seed,
+        crop: args.crop,
+        threads: args.threads,
+        bit_depth: args.bit_depth,
+    };
+    Ok(Order {
+        scene,
+        overrides,
+        is_once: args.once,
+        report: args.report,
+        progress: args.progress,
+        preview: args.preview,
+        color: args.color,
+        poll: args.poll,
+    })
+}
+
+fn is_on(switch: Switch) -> bool {
+    switch == Switch::On
+}
+
+/// Every ending must be known, and no file may be named twice.
+fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
+    for (index, path) in outputs.iter().enumerate() {
+        Format::of(path).map_err(|error| error.to_string())?;
+        if outputs[..index].contains(path) {
+            return Err(format!("-o {} is given twice", path.display()));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{CommandFactory, Parser};
+
+    use super::super::args::{Args, Subcommand};
+    use super::*;
+    use crate::film::Rect;
+    use crate::pipeline::settings::View;
+
+    fn lowered(line: &str) -> Result<Order, String> {
+        let words = std::iter::once("glimt").chain(line.split_whitespace());
+        lower(Args::try_parse_from(words).map_err(|error| error.to_string())?.render)
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn nothing_said_changes_nothing() {
+        let order = lowered("a.toml").expect("right");
+        assert_eq!(order.overrides, Overrides::default());
+        assert!(!order.is_once && !order.poll);
+    }
+
+    #[test]
+    fn every_option_arrives() {
+        let order = lowered(
+            "a.toml --once -o a.png --output b.exr --width 3 --height 4 --samples 5 --time 0.5 --max-depth 0 \
+             --integrator whitted --shadows hard --photons on --dof off --accel bvh --view normal --seed 7 \
+             --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --progress json --color 256 --poll",
+        )
+        .expect("right");
+        let expected = Overrides {
+            outputs: vec!["a.png".into(), "b.exr".into()],
+            width: Some(3),
+            height: Some(4),
+            samples: Some(5),
+            time_seconds: Some(0.5),
+            max_depth: Some(0),
+            integrator: Some(description::Integrator::Whitted),
+            shadows: Some(description::Shadows::Hard),
+            photons: Some(true),
+            dof: Some(false),
+            accel: Some(description::Accel::Bvh),
+            view: Some(View::Normal),
+            seed: Some(7),
+            crop: Some(Rect { x: 1, y: 2, width: 3, height: 4 }),
+            threads: Some(2),
+            bit_depth: Some(16),
+        };
+        assert_eq!(order.overrides, expected);
+        assert!(order.is_once && order.poll);
+        assert_eq!(order.report, Some("r.json".into()));
+        assert_eq!((order.progress, order.color), (Progress::Json, Color::Palette256));
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_refused() {
+        for wrong in [
+            "",
+            "a.toml --samples 0",
+            "a.toml --width 65537",
+            "a.toml --time 0",
+            "a.toml --time nan",
+            "a.toml --crop 1,2,3",
+            "a.toml --crop 1,2,3,0",
+            "a.toml --crop 1,2,3,4,x",
+            "a.toml --bit-depth 12",
+            "a.toml --view nothing",
+            "a.toml -o a.xyz",
+            "a.toml -o a.png -o a.png",
+            "a.toml b.toml",
+            "a.toml --threads 5000",
+            "a.toml --integrator path",
+            "a.toml --accel kdtree",
+            "a.toml --seed -1",
+        ] {
+            assert!(lowered(wrong).is_err(), "{wrong}");
+        }
+        let message = lowered("a.toml --integrator path").expect_err("not there yet");
+        assert!(message.contains("not available") && message.contains("whitted"), "{message}");
+    }
+
+    #[test]
+    fn a_command_is_no_scene_unless_it_has_a_folder() {
+        let parsed = |words: &[&str]| Args::try_parse_from([&["glimt"], words].concat()).expect("right");
+        assert!(matches!(parsed(&["check", "a.toml"]).command, Some(Subcommand::Check { .. })));
+        assert_eq!(parsed(&["./check"]).render.scene, Some("./check".into()));
+    }
+
+    #[test]
+    fn every_view_has_its_name() {
+        for view in View::ALL {
+            let order = lowered(&format!("a.toml --view {}", view.name())).expect("right");
+            assert_eq!(order.overrides.view, Some(view));
+        }
+    }
+}

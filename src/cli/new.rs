@@ -1,0 +1,36 @@
+//! `glimt new`: a scene to start from.
+
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+
+use super::console::Console;
+use super::exit::Exit;
+use crate::scene::starter;
+
+pub(super) fn run(file: &Path, console: &Console) -> Exit {
+    let name = file.display();
+    match create(file, starter().as_bytes()) {
+        Ok(()) => {
+            console.say(&format!("wrote {name}"));
+            console
+                .say(&format!("now: glimt {name}    (see it, edit it, save it, see it again; ? for help)"));
+            Exit::DONE
+        }
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            console.fail(Exit::WRONG, &format!("{name} exists already, and is left as it is"))
+        }
+        Err(error) => console.fail(Exit::FAILED, &format!("cannot write {name}: {error}")),
+    }
+}
+
+/// Make the file, never taking the place of another one; no part of it is left where that fails.
+fn create(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
+    let written = file.write_all(bytes).and_then(|()| file.sync_all());
+    if written.is_err() {
+        // It is ours, and what went wrong is said in any case.
+        let _ = std::fs::remove_file(path);
+    }
+    written
+}

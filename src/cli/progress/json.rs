@@ -1,0 +1,99 @@
+//! One JSON object a line. The key `event` says which other keys there are:
+//!
+//! | event | keys |
+//! | --- | --- |
+//! | `stage` | `stage`, `status` (`running`, `done`, `reused`, `skipped`), `seconds`, `why` |
+//! | `asset` | `name`, `fraction` |
+//! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples` |
+//! | `written` | `path`, `bytes` |
+//! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
+//! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
+//! | `cancelled` | |
+//!
+//! A diagnostic has `severity` (`error`, `warning`), `message`, `path`, `line` and `column` (from 1, or null), `help`.
+
+use std::io::Write;
+
+use serde_json::{Value, json};
+
+use super::Reporter;
+use crate::pipeline::protocol::{Event, Failure};
+use crate::scene::diagnostic::{Diagnostic, Place, Severity};
+
+pub(super) struct Json;
+
+impl Reporter for Json {
+    fn event(&mut self, event: &Event) {
+        if let Some(value) = value(event) {
+            // JSON escapes control characters by itself, C1 and the like are not shown by programs that read it.
+            let _ = writeln!(std::io::stderr().lock(), "{value}");
+        }
+    }
+
+    fn says_results(&self) -> bool {
+        false
+    }
+
+    fn says_diagnostics(&self) -> bool {
+        true
+    }
+}
+
+fn value(event: &Event) -> Option<Value> {
+    Some(match event {
+        Event::Stage { stage, .. } => json!({
+            "event": "stage", "stage": stage.name, "status": stage.status, "seconds": stage.seconds,
+            "why": stage.why,
+        }),
+        Event::Asset { progress, .. } => json!({
+            "event": "asset", "name": progress.name,
+            "fraction": progress.done as f64 / progress.total.max(1) as f64,
+        }),
+        Event::Progress { progress, .. } => json!({
+            "event": "progress", "stage": "render", "fraction": progress.fraction,
+            "elapsed_seconds": progress.elapsed_seconds, "eta_seconds": progress.eta_seconds,
+            "samples": progress.samples, "total_samples": progress.total_samples,
+        }),
+        Event::Written { path, bytes, .. } => {
+            json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes })
+        }
+        Event::Done { report, warnings, unchanged, .. } => json!({
+            "event": "done", "unchanged": unchanged, "seconds": report.seconds,
+            "complete": report.image.complete, "diagnostics": diagnostics(warnings),
+        }),
+        Event::Failed { failure, .. } => failed(failure),
+        Event::Cancelled { .. } => json!({ "event": "cancelled" }),
+        _ => return None,
+    })
+}
+
+fn failed(failure: &Failure) -> Value {
+    match failure {
+        Failure::Work(message) => {
+            json!({ "event": "failed", "kind": "work", "message": message, "diagnostics": [] })
+        }
+        Failure::Scene(all) => json!({
+            "event": "failed", "kind": "scene", "message": "the scene is wrong", "diagnostics": diagnostics(all),
+        }),
+    }
+}
+
+fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
+    all.iter()
+        .map(|one| {
+            let place = one.place.as_ref().map(line_and_column);
+            json!({
+                "severity": if one.severity == Severity::Error { "error" } else { "warning" },
+                "message": one.message, "path": one.path.to_string_lossy(),
+                "line": place.map(|(line, _)| line), "column": place.map(|(_, column)| column),
+                "help": one.help,
+            })
+        })
+        .collect()
+}
+
+fn line_and_column(place: &Place) -> (usize, usize) {
+    let before = place.source.get(..place.span.start).unwrap_or("");
+    let line = before.matches('\n').count() + 1;
+    (line, before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1)
+}

@@ -1,0 +1,221 @@
+//! The picture so far, at the size of a screen, many times a second.
+
+use rayon::prelude::*;
+
+use super::resample::Axis;
+use super::{Film, RadianceImage};
+use crate::math::{DVec3, Vec3};
+
+/// Shrinks (or enlarges) a film by area, exactly for any ratio, and remembers what each tile gave, so that a picture
+/// costs what changed since the one before. Pixels without samples have no weight; where a new pixel covers none
+/// that has, the base shows.
+#[derive(Debug)]
+pub struct Previewer {
+    width: u32,
+    height: u32,
+    film_id: Option<u64>,
+    shares: Vec<Share>,
+}
+
+/// What one tile gives to the pixels of the preview that it covers.
+#[derive(Clone, Debug, Default)]
+struct Share {
+    revision: u64,
+    /// First column and row.
+    x: u32,
+    y: u32,
+    /// Columns.
+    width: u32,
+    /// Weighted sums and their weights, in rows.
+    cells: Vec<(DVec3, f64)>,
+}
+
+/// With this many tiles to look at, other threads are worth waking; the first picture of a film, mostly. Later
+/// ones do not wait for a pool that is busy rendering.
+const PARALLEL_TILES: usize = 2048;
+
+impl Previewer {
+    /// For pictures of this size; at least one pixel.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width: width.max(1), height: height.max(1), film_id: None, shares: Vec::new() }
+    }
+
+    /// Columns and rows of its pictures.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// The film as it is now. Any film may be given at any call. `base` shows where there are no samples yet (the
+    /// coarse first picture; of any size); none: black.
+    pub fn picture(&mut self, film: &Film, base: Option<&RadianceImage>) -> RadianceImage {
+        if self.film_id != Some(film.id()) {
+            self.film_id = Some(film.id());
+            self.shares = vec![Share::default(); film.tile_count()];
+        }
+        self.refresh(film);
+        let mut canvas = vec![(DVec3::ZERO, 0.0); self.width as usize * self.height as usize];
+        for share in &self.shares {
+            share.add_to(&mut canvas, self.width);
+        }
+        let base = base.map(|base| base.resized(self.width, self.height));
+        let below =
+            |i: usize| base.as_ref().and_then(|base| base.pixels.get(i)).copied().unwrap_or(Vec3::ZERO);
+        let pixels = canvas
+            .iter()
+            .enumerate()
+            .map(|(i, (sum, weight))| if *weight > 0.0 { (sum / weight).as_vec3() } else { below(i) });
+        RadianceImage { width: self.width, height: self.height, pixels: pixels.collect() }
+    }
+
+    fn refresh(&mut self, film: &Film) {
+        let axes = [Axis::new(film.width(), self.width), Axis::new(film.height(), self.height)];
+        let refresh = |(tile, share): (usize, &mut Share)| share.refresh(film, tile, axes);
+        let changed = |(tile, share): &(usize, &mut Share)| film.tile(*tile).revision != share.revision;
+        let mut stale: Vec<_> = self.shares.iter_mut().enumerate().filter(changed).collect();
+        if stale.len() < PARALLEL_TILES {
+            stale.drain(..).for_each(refresh);
+        } else {
+            stale.into_par_iter().with_min_len(64).for_each(refresh);
+        }
+    }
+}
+
+impl Share {
+    fn refresh(&mut self, film: &Film, tile: usize, [columns, rows]: [Axis; 2]) {
+        let Some(rect) = film.tile_rect(tile) else { return };
+        let first = |axis: Axis, index| axis.covered(index).next().map_or(0, |(new, _)| new);
+        let last = |axis: Axis, index| axis.covered(index).last().map_or(0, |(new, _)| new);
+        (self.x, self.y) = (first(columns, rect.x), first(rows, rect.y));
+        self.width = last(columns, rect.x + rect.width - 1) - self.x + 1;
+        let height = last(rows, rect.y + rect.height - 1) - self.y + 1;
+        self.cells.clear();
+        self.cells.resize(self.width as usize * height as usize, (DVec3::ZERO, 0.0));
+        let across: Vec<Vec<_>> =
+            (rect.x..rect.x + rect.width).map(|x| columns.covered(x).collect()).collect();
+        let tile = film.tile(tile);
+        self.revision = tile.revision;
+        for y in 0..rect.height {
+            let down = rows.covered(rect.y + y);
+            for (x, across) in across.iter().enumerate() {
+                let Some(mean) = tile.mean(y as usize * rect.width as usize + x) else { continue };
+                for (row, row_weight) in down.clone() {
+                    let line = &mut self.cells[(row - self.y) as usize * self.width as usize..];
+                    for &(column, column_weight) in across {
+                        let (sum, weight) = &mut line[(column - self.x) as usize];
+                        *sum += mean * (row_weight * column_weight);
+                        *weight += row_weight * column_weight;
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_to(&self, canvas: &mut [(DVec3, f64)], canvas_width: u32) {
+        for (row, cells) in self.cells.chunks_exact(self.width.max(1) as usize).enumerate() {
+            let start = (self.y as usize + row) * canvas_width as usize + self.x as usize;
+            for (pixel, cell) in canvas[start..].iter_mut().zip(cells) {
+                pixel.0 += cell.0;
+                pixel.1 += cell.1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Rect, TileSamples};
+
+    /// A film whose pixel (x, y) has one sample of `value`, where `value` gives one.
+    fn film(width: u32, height: u32, crop: Option<Rect>, value: impl Fn(u32, u32) -> Option<f32>) -> Film {
+        let film = Film::new(width, height, crop).expect("a small film");
+        for tile in 0..film.tile_count() {
+            let rect = film.tile_rect(tile).expect("a tile");
+            for (x, y) in (0..rect.area() as u32).map(|i| (rect.x + i % rect.width, rect.y + i / rect.width))
+            {
+                if let Some(value) = value(x, y) {
+                    let rect = Rect { x, y, width: 1, height: 1 };
+                    film.add(tile, &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(value)] });
+                }
+            }
+        }
+        film
+    }
+
+    fn pattern(x: u32, y: u32) -> f32 {
+        (x * 7 + y * 13 + x * y) as f32 % 11.0
+    }
+
+    fn mean(image: &RadianceImage) -> f64 {
+        image.pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / image.pixels.len() as f64
+    }
+
+    #[test]
+    fn the_mean_stays_and_the_picture_is_that_of_plain_resizing() {
+        let film = film(77, 45, None, |x, y| Some(pattern(x, y)));
+        let whole = film.radiance();
+        for (width, height) in [(1, 1), (2, 3), (13, 7), (40, 45), (77, 45), (100, 91)] {
+            let picture = film.preview(width, height, None);
+            assert!((mean(&picture) - mean(&whole)).abs() < 1e-5, "{width}×{height}");
+            for (a, b) in picture.pixels.iter().zip(&whole.resized(width, height).pixels) {
+                assert!((a - b).abs().max_element() < 1e-5, "{width}×{height}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_without_samples_have_no_weight_and_the_base_shows_in_their_place() {
+        // The left half is rendered, but for every other row.
+        let film = film(64, 64, None, |x, y| (x < 32 && y % 2 == 0).then_some(5.0));
+        let base = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::splat(2.0)] };
+        let picture = film.preview(8, 8, Some(&base));
+        for (i, pixel) in picture.pixels.iter().enumerate() {
+            assert_eq!(pixel.x, if i % 8 < 4 { 5.0 } else { 2.0 }, "pixel {i}");
+        }
+        assert_eq!(film.preview(8, 8, None).pixels[7], Vec3::ZERO);
+    }
+
+    #[test]
+    fn a_crop_lands_where_it_belongs() {
+        let film = film(100, 60, Some(Rect { x: 50, y: 30, width: 500, height: 500 }), |_, _| Some(1.0));
+        let picture = film.preview(10, 6, None);
+        for (i, pixel) in picture.pixels.iter().enumerate() {
+            let inside = i % 10 >= 5 && i / 10 >= 3;
+            assert_eq!(pixel.x, f32::from(u8::from(inside)), "pixel {i}");
+        }
+    }
+
+    #[test]
+    fn a_used_previewer_sees_changes_and_other_films() {
+        let mut previewer = Previewer::new(9, 5);
+        let first = film(70, 40, None, |x, _| (x < 20).then_some(1.0));
+        assert_eq!(previewer.picture(&first, None), first.preview(9, 5, None));
+        let rect = first.tile_rect(1).expect("a tile");
+        let samples = TileSamples { rect, samples: 2, radiance: vec![Vec3::Y; rect.area() * 2] };
+        first.add(1, &samples);
+        let changed = previewer.picture(&first, None);
+        assert_eq!(changed, first.preview(9, 5, None));
+        assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile shows");
+        let second = film(30, 50, None, |x, y| Some(pattern(x, y)));
+        assert_eq!(previewer.picture(&second, None), second.preview(9, 5, None));
+    }
+
+    #[test]
+    fn many_tiles_are_the_same_in_parallel() {
+        let side = 32 * 46;
+        let film = Film::new(side, side, None).expect("a film");
+        assert!(film.tile_count() > PARALLEL_TILES);
+        for tile in 0..film.tile_count() {
+            let rect = film.tile_rect(tile).expect("a tile");
+            let value = Vec3::splat(tile as f32);
+            film.add(tile, &TileSamples { rect, samples: 1, radiance: vec![value; rect.area()] });
+        }
+        let picture = film.preview(23, 23, None);
+        // Each new pixel covers 2×2 tiles of consecutive numbers in two rows.
+        for (i, pixel) in picture.pixels.iter().enumerate() {
+            let (column, row) = (2 * (i % 23), 2 * (i / 23));
+            let expected = (row * 46 + column) as f32 + 23.5;
+            assert!((pixel.x - expected).abs() < 1e-3, "{i}: {} {expected}", pixel.x);
+        }
+    }
+}

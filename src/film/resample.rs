@@ -1,0 +1,97 @@
+//! Box resampling by area, exact for any ratio.
+
+use rayon::prelude::*;
+
+use super::RadianceImage;
+use crate::math::DVec3;
+
+/// How the pixels of one axis fall into those of another length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Axis {
+    from: u64,
+    to: u64,
+}
+
+impl Axis {
+    /// From a length to another one, both ≥ 1 pixels.
+    pub(super) fn new(from: u32, to: u32) -> Self {
+        Self { from: u64::from(from.max(1)), to: u64::from(to.max(1)) }
+    }
+
+    /// The new pixels that the old pixel `index` covers, and how much of each. Both axes are measured in units of
+    /// 1/(from·to) of the whole, so that every overlap is a whole number and nothing is rounded.
+    pub(super) fn covered(self, index: u32) -> impl Iterator<Item = (u32, f64)> + Clone {
+        let (start, end) = (u64::from(index) * self.to, (u64::from(index) + 1) * self.to);
+        (start / self.from..end.div_ceil(self.from)).map(move |new| {
+            let overlap = end.min((new + 1) * self.from) - start.max(new * self.from);
+            (new as u32, overlap as f64)
+        })
+    }
+
+    fn inverse(self) -> Self {
+        Self { from: self.to, to: self.from }
+    }
+}
+
+pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> RadianceImage {
+    if (width, height) == (image.width, image.height) || image.pixels.is_empty() {
+        return image.clone();
+    }
+    let (width, height) = (width.max(1), height.max(1));
+    // Each new pixel gathers the old ones that it covers: the same overlaps, seen from the other side.
+    let columns = Axis::new(image.width, width).inverse();
+    let rows = Axis::new(image.height, height).inverse();
+    let pixels = (0..width as usize * height as usize)
+        .into_par_iter()
+        .with_min_len(256)
+        .map(|i| {
+            let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+            for (y, row_weight) in rows.covered((i / width as usize) as u32) {
+                let row = &image.pixels[y as usize * image.width as usize..][..image.width as usize];
+                for (x, column_weight) in columns.covered((i % width as usize) as u32) {
+                    sum += row[x as usize].as_dvec3() * (row_weight * column_weight);
+                    weights += row_weight * column_weight;
+                }
+            }
+            (sum / weights).as_vec3()
+        })
+        .collect();
+    RadianceImage { width, height, pixels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use proptest::prelude::*;
+
+    #[test]
+    fn three_pixels_into_two() {
+        let image =
+            RadianceImage { width: 3, height: 1, pixels: vec![Vec3::X, Vec3::splat(3.0), Vec3::splat(6.0)] };
+        let smaller = image.resized(2, 1);
+        // The middle pixel belongs to both by half: (2·a + 1·b)/3.
+        assert!((smaller.pixels[0] - Vec3::new(5.0, 3.0, 3.0) / 3.0).abs().max_element() < 1e-6);
+        assert!((smaller.pixels[1] - Vec3::splat(5.0)).abs().max_element() < 1e-6);
+        let larger = image.resized(9, 4);
+        assert_eq!(larger.pixels[0..3], [Vec3::X; 3]);
+        assert_eq!(larger.pixels[33..36], [Vec3::splat(6.0); 3]);
+    }
+
+    proptest! {
+        #[test]
+        fn every_pixel_is_given_away_whole_and_every_new_one_is_filled(from in 1_u32..70, to in 1_u32..70) {
+            let axis = Axis::new(from, to);
+            let mut filled = vec![0.0; to as usize];
+            for old in 0..from {
+                let parts: Vec<_> = axis.covered(old).collect();
+                prop_assert_eq!(parts.iter().map(|part| part.1).sum::<f64>(), f64::from(to));
+                for (new, weight) in parts {
+                    prop_assert!(weight > 0.0);
+                    filled[new as usize] += weight;
+                }
+            }
+            prop_assert!(filled.iter().all(|&sum| sum == f64::from(from)));
+        }
+    }
+}

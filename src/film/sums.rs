@@ -1,0 +1,308 @@
+//! The film: f64 sums of every pixel's samples, in tiles that many threads fill without sharing.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::{RadianceImage, Rect, TileSamples};
+use crate::math::{DVec3, Vec3};
+
+/// Pixels along a tile's side: 1024 pixels of 28 bytes stay in a core's second-level cache.
+pub const TILE_SIZE: u32 = 32;
+
+/// Why there is no film.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FilmError {
+    /// Its memory cannot be had.
+    #[error(
+        "a picture of {width}×{height} pixels needs {:.1} GB of memory, which this machine does not give; \
+         make it smaller, or render a part of it by a crop", *.bytes as f64 / 1e9
+    )]
+    Memory {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// For the sums and the finished picture.
+        bytes: u64,
+    },
+    /// It would have no pixels.
+    #[error("there are no pixels to render: the picture is {width}×{height} and the crop lies outside of it")]
+    Empty {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+}
+
+/// Samples per pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleStats {
+    /// Of the pixel with the fewest.
+    pub min: u32,
+    /// Over all pixels.
+    pub mean: f64,
+    /// Of the pixel with the most.
+    pub max: u32,
+}
+
+/// Sums of samples for the pixels of a picture, or of a crop of it. Tiles are numbered in rows from the top left
+/// of the crop. Any thread may add to any tile and take a snapshot at any time; the sums of a tile have the same
+/// bits whenever its samples come in the same order, however they are grouped.
+#[derive(Debug)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    crop: Rect,
+    tiles: Vec<Mutex<Tile>>,
+    non_finite_samples: AtomicU64,
+    complete: AtomicBool,
+    id: u64,
+}
+
+/// Sums of one tile, in rows; empty until its first samples come, so that the memory is first touched by the thread
+/// that renders the tile.
+#[derive(Debug, Default)]
+pub(super) struct Tile {
+    pub(super) sums: Vec<DVec3>,
+    pub(super) counts: Vec<u32>,
+    /// Grows whenever the tile changes.
+    pub(super) revision: u64,
+}
+
+impl Tile {
+    /// Mean of a pixel, if it has samples.
+    pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
+        let count = self.count(index);
+        (count > 0).then(|| self.sums[index] / f64::from(count))
+    }
+
+    fn count(&self, index: usize) -> u32 {
+        self.counts.get(index).copied().unwrap_or(0)
+    }
+
+    /// Cannot fail: the memory was reserved when the film was made.
+    fn fill(&mut self, area: usize) {
+        self.sums.resize(area, DVec3::ZERO);
+        self.counts.resize(area, 0);
+    }
+}
+
+impl Film {
+    /// A film without samples for a picture of this size, or for the part of it that `crop` covers.
+    ///
+    /// # Errors
+    /// [`FilmError`] where the crop lies outside of the picture or memory does not suffice for the sums and the
+    /// finished picture.
+    pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
+        let whole = Rect { x: 0, y: 0, width, height };
+        let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
+        let no_memory = FilmError::Memory { width, height, bytes: bytes_needed(width, height, crop) };
+        let tiles = allocate(width, height, crop).ok_or(no_memory)?;
+        static IDS: AtomicU64 = AtomicU64::new(0);
+        Ok(Self {
+            width,
+            height,
+            crop,
+            tiles,
+            non_finite_samples: AtomicU64::new(0),
+            complete: AtomicBool::new(false),
+            id: IDS.fetch_add(1, Ordering::Relaxed),
+        })
+    }
+
+    /// Columns of the whole picture.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows of the whole picture.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The pixels that are rendered.
+    pub fn crop(&self) -> Rect {
+        self.crop
+    }
+
+    /// Tiles of the crop.
+    pub fn tile_count(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// The pixels of a tile, in the whole picture; none beyond the last tile.
+    pub fn tile_rect(&self, tile: usize) -> Option<Rect> {
+        (tile < self.tiles.len()).then(|| tile_rect(self.crop, tile))
+    }
+
+    /// Every tile once, from the middle of the crop outwards in rings.
+    pub fn tile_order(&self) -> Vec<usize> {
+        let (columns, rows) = tile_grid(self.crop);
+        // Twice the distance from the middle, so that it is a whole number.
+        let offset = |index: usize, length: usize| 2 * index as i64 - (length as i64 - 1);
+        let mut order: Vec<usize> = (0..self.tiles.len()).collect();
+        order.sort_by(|&a, &b| {
+            let key = |tile: usize| {
+                let (x, y) = (offset(tile % columns, columns), offset(tile / columns, rows));
+                (x.abs().max(y.abs()) / 2, (y as f64).atan2(x as f64))
+            };
+            let (a, b) = (key(a), key(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        order
+    }
+
+    /// Add samples to a tile, each for itself and in their order. A sample with a NaN or an infinity counts as
+    /// black and in [`Film::non_finite_samples`]. Pixels outside of the tile are left out.
+    pub fn add(&self, tile: usize, samples: &TileSamples) {
+        let Some(rect) = self.tile_rect(tile) else { return };
+        if samples.samples == 0 || samples.rect.width == 0 {
+            return;
+        }
+        let mut non_finite = 0;
+        let mut guard = self.tile(tile);
+        let tile = &mut *guard;
+        tile.fill(rect.area());
+        for (i, pixel) in samples.radiance.chunks_exact(samples.samples as usize).enumerate() {
+            let (x, y) = (i as u32 % samples.rect.width, i as u32 / samples.rect.width);
+            let Some(index) = index_in(rect, samples.rect.x + x, samples.rect.y + y) else { continue };
+            for &radiance in pixel {
+                if radiance.is_finite() {
+                    tile.sums[index] += radiance.as_dvec3();
+                } else {
+                    non_finite += 1;
+                }
+            }
+            tile.counts[index] += samples.samples;
+        }
+        tile.revision += 1;
+        drop(guard);
+        self.non_finite_samples.fetch_add(non_finite, Ordering::Relaxed);
+    }
+
+    /// The picture so far: the mean of every pixel's samples; black where there are none, and outside the crop.
+    pub fn radiance(&self) -> RadianceImage {
+        let mut image = RadianceImage::black(self.width, self.height);
+        for (i, tile) in self.tiles.iter().enumerate() {
+            let rect = tile_rect(self.crop, i);
+            let tile = lock(tile);
+            for row in 0..rect.height {
+                let start = (rect.y + row) as usize * self.width as usize + rect.x as usize;
+                let line = &mut image.pixels[start..][..rect.width as usize];
+                for (x, pixel) in line.iter_mut().enumerate() {
+                    let mean = tile.mean(row as usize * rect.width as usize + x);
+                    *pixel = mean.map_or(Vec3::ZERO, DVec3::as_vec3);
+                }
+            }
+        }
+        image
+    }
+
+    /// Samples of the crop's pixels.
+    pub fn samples(&self) -> SampleStats {
+        let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
+        for tile in &self.tiles {
+            let tile = lock(tile);
+            if tile.counts.is_empty() {
+                min = 0;
+            }
+            for &count in &tile.counts {
+                min = min.min(count);
+                max = max.max(count);
+                total += u64::from(count);
+            }
+        }
+        SampleStats { min, mean: total as f64 / self.crop.area() as f64, max }
+    }
+
+    /// Samples of one pixel of the whole picture; 0 outside the crop.
+    pub fn pixel_samples(&self, x: u32, y: u32) -> u32 {
+        let columns = tile_grid(self.crop).0;
+        index_in(self.crop, x, y).map_or(0, |_| {
+            let (column, row) = ((x - self.crop.x) / TILE_SIZE, (y - self.crop.y) / TILE_SIZE);
+            let tile = row as usize * columns + column as usize;
+            index_in(tile_rect(self.crop, tile), x, y).map_or(0, |index| self.tile(tile).count(index))
+        })
+    }
+
+    /// Samples with a NaN or an infinity, which counted as black.
+    pub fn non_finite_samples(&self) -> u64 {
+        self.non_finite_samples.load(Ordering::Relaxed)
+    }
+
+    /// Whether every sample that was asked for is in.
+    pub fn is_complete(&self) -> bool {
+        self.complete.load(Ordering::Acquire)
+    }
+
+    /// Said by whoever renders, once every sample is in (or no longer, when more are asked for).
+    pub fn set_complete(&self, complete: bool) {
+        self.complete.store(complete, Ordering::Release);
+    }
+
+    /// The picture so far at another size; see [`Previewer`](super::Previewer), which is what to use when it is
+    /// wanted again and again.
+    pub fn preview(&self, width: u32, height: u32, base: Option<&RadianceImage>) -> RadianceImage {
+        super::Previewer::new(width, height).picture(self, base)
+    }
+
+    /// Tells films apart.
+    pub(super) fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// One tile; nobody else adds to it meanwhile. A thread that panicked leaves sums that are whole.
+    pub(super) fn tile(&self, tile: usize) -> MutexGuard<'_, Tile> {
+        lock(&self.tiles[tile])
+    }
+}
+
+fn lock(tile: &Mutex<Tile>) -> MutexGuard<'_, Tile> {
+    tile.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn index_in(rect: Rect, x: u32, y: u32) -> Option<usize> {
+    let (x, y) = (x.checked_sub(rect.x)?, y.checked_sub(rect.y)?);
+    (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
+}
+
+fn tile_grid(crop: Rect) -> (usize, usize) {
+    (crop.width.div_ceil(TILE_SIZE) as usize, crop.height.div_ceil(TILE_SIZE) as usize)
+}
+
+fn tile_rect(crop: Rect, tile: usize) -> Rect {
+    let columns = tile_grid(crop).0;
+    let (x, y) = ((tile % columns) as u32 * TILE_SIZE, (tile / columns) as u32 * TILE_SIZE);
+    let side = |start: u32, length: u32| TILE_SIZE.min(length - start);
+    Rect { x: crop.x + x, y: crop.y + y, width: side(x, crop.width), height: side(y, crop.height) }
+}
+
+/// For the sums of the crop, and for the whole picture as radiance and as sRGB.
+fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
+    let sum = size_of::<DVec3>() + size_of::<u32>();
+    let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
+    crop.area() as u64 * sum as u64 + u64::from(width) * u64::from(height) * pixel as u64
+}
+
+/// Asks for all the memory at once first, as a system that promises more than it has refuses only that.
+fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
+    let bytes = usize::try_from(bytes_needed(width, height, crop)).ok()?;
+    Vec::<u8>::new().try_reserve_exact(bytes).ok()?;
+    let (columns, rows) = tile_grid(crop);
+    let mut tiles = Vec::new();
+    tiles.try_reserve_exact(columns * rows).ok()?;
+    for tile in 0..columns * rows {
+        let area = tile_rect(crop, tile).area();
+        let mut sums = Vec::new();
+        let mut counts = Vec::new();
+        sums.try_reserve_exact(area).ok()?;
+        counts.try_reserve_exact(area).ok()?;
+        tiles.push(Mutex::new(Tile { sums, counts, revision: 0 }));
+    }
+    Some(tiles)
+}
+
+#[cfg(test)]
+#[path = "sums_tests.rs"]
+mod tests;

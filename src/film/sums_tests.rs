@@ -1,0 +1,194 @@
+use std::collections::HashSet;
+use std::sync::atomic::AtomicBool;
+
+use super::*;
+
+/// Samples `first..first + count` of every pixel, of very different sizes so that the order of sums matters.
+fn samples(rect: Rect, first: u32, count: u32) -> TileSamples {
+    let value = |x: u32, y: u32, sample: u32| {
+        let mixed = (x.wrapping_mul(73) ^ y.wrapping_mul(19) ^ sample.wrapping_mul(2_654_435_761)) % 1000;
+        Vec3::new(mixed as f32 * 0.1, 1.0 / (mixed + 1) as f32, 10_f32.powi(mixed as i32 % 30 - 10))
+    };
+    let pixel = |i: u32| {
+        let (x, y) = (rect.x + i % rect.width, rect.y + i / rect.width);
+        (first..first + count).map(move |sample| value(x, y, sample))
+    };
+    TileSamples { rect, samples: count, radiance: (0..rect.area() as u32).flat_map(pixel).collect() }
+}
+
+fn bits(image: &RadianceImage) -> Vec<[u32; 3]> {
+    image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
+}
+
+fn filled(passes: &[u32]) -> Film {
+    let film = Film::new(50, 41, None).expect("a film");
+    for tile in film.tile_order() {
+        let mut first = 0;
+        for &count in passes {
+            film.add(tile, &samples(film.tile_rect(tile).expect("a tile"), first, count));
+            first += count;
+        }
+    }
+    film
+}
+
+fn sum_bits(film: &Film) -> Vec<[u64; 3]> {
+    let tile_sums = |tile| film.tile(tile).sums.clone();
+    (0..film.tile_count()).flat_map(tile_sums).map(|sum| sum.to_array().map(f64::to_bits)).collect()
+}
+
+#[test]
+fn any_grouping_of_samples_gives_the_same_bits() {
+    let at_once = filled(&[24]);
+    for passes in [&[1; 24][..], &[1, 2, 4, 8, 9], &[23, 1]] {
+        let film = filled(passes);
+        assert_eq!(sum_bits(&film), sum_bits(&at_once), "{passes:?}");
+        assert_eq!(bits(&film.radiance()), bits(&at_once.radiance()), "{passes:?}");
+        assert_eq!(film.samples(), SampleStats { min: 24, mean: 24.0, max: 24 });
+    }
+}
+
+#[test]
+fn tiles_cover_the_crop_once() {
+    let crop = Rect { x: 5, y: 7, width: 70, height: 1000 };
+    let film = Film::new(100, 60, Some(crop)).expect("a film");
+    assert_eq!(film.crop(), Rect { height: 53, ..crop });
+    let order = film.tile_order();
+    assert_eq!(order.iter().copied().collect::<HashSet<_>>(), (0..film.tile_count()).collect());
+    assert_eq!(order.len(), film.tile_count());
+    let mut seen = HashSet::new();
+    for rect in order.iter().map(|&tile| film.tile_rect(tile).expect("a tile")) {
+        assert!(rect.width <= TILE_SIZE && rect.height <= TILE_SIZE);
+        for i in 0..rect.area() as u32 {
+            assert!(seen.insert((rect.x + i % rect.width, rect.y + i / rect.width)), "covered twice");
+        }
+    }
+    assert_eq!(seen.len(), film.crop().area());
+    assert!(seen.iter().all(|&(x, y)| (5..75).contains(&x) && (7..60).contains(&y)));
+    assert_eq!(film.tile_rect(film.tile_count()), None);
+}
+
+#[test]
+fn rings_grow_from_the_middle() {
+    let film = Film::new(32 * 9, 32 * 6, None).expect("a film");
+    let rings: Vec<_> = film.tile_order().iter().map(|tile| (tile % 9).abs_diff(4)).collect();
+    assert!(rings[..2].iter().all(|&ring| ring == 0), "{rings:?}");
+    assert!(rings[rings.len() - 12..].iter().all(|&ring| ring == 4), "{rings:?}");
+}
+
+#[test]
+fn the_mean_of_each_pixel_and_how_many() {
+    let film = Film::new(40, 2, None).expect("a film");
+    let add = |x: u32, values: &[f32]| {
+        let radiance = values.iter().map(|&v| Vec3::splat(v)).collect();
+        let rect = Rect { x, y: 1, width: 1, height: 1 };
+        film.add((x / 32) as usize, &TileSamples { rect, samples: values.len() as u32, radiance });
+    };
+    add(3, &[1.0, 2.0, 6.0]);
+    add(39, &[0.5]);
+    let image = film.radiance();
+    assert_eq!(image.pixels[40 + 3], Vec3::splat(3.0));
+    assert_eq!(image.pixels[40 + 39], Vec3::splat(0.5));
+    assert_eq!(image.pixels.iter().filter(|p| **p != Vec3::ZERO).count(), 2);
+    assert_eq!((film.pixel_samples(3, 1), film.pixel_samples(39, 1)), (3, 1));
+    assert_eq!((film.pixel_samples(3, 0), film.pixel_samples(40, 1)), (0, 0));
+    assert_eq!(film.samples(), SampleStats { min: 0, mean: 4.0 / 80.0, max: 3 });
+}
+
+#[test]
+fn what_is_not_finite_is_black_and_counted() {
+    let film = Film::new(1, 1, None).expect("a film");
+    let radiance = vec![
+        Vec3::splat(4.0),
+        Vec3::new(1.0, f32::NAN, 1.0),
+        Vec3::new(-f32::NAN, 1.0, 1.0),
+        Vec3::new(1.0, 1.0, f32::INFINITY),
+    ];
+    film.add(0, &TileSamples { rect: film.crop(), samples: 4, radiance });
+    assert_eq!(film.non_finite_samples(), 3);
+    assert_eq!(film.radiance().pixels, [Vec3::ONE]);
+    assert_eq!(film.pixel_samples(0, 0), 4);
+}
+
+#[test]
+fn samples_that_do_not_fit_the_tile_do_no_harm() {
+    let film = Film::new(33, 1, None).expect("a film");
+    let wide = Rect { x: 30, y: 0, width: 9, height: 3 };
+    film.add(1, &TileSamples { rect: wide, samples: 1, radiance: vec![Vec3::ONE; 20] });
+    film.add(0, &TileSamples { rect: wide, samples: 2, radiance: vec![Vec3::ONE; 3] });
+    film.add(7, &TileSamples { rect: wide, samples: 1, radiance: vec![Vec3::ONE; 27] });
+    film.add(0, &TileSamples { rect: wide, samples: 0, radiance: Vec::new() });
+    assert_eq!([29, 30, 31, 32].map(|x| film.pixel_samples(x, 0)), [0, 2, 0, 1]);
+}
+
+#[test]
+fn a_panic_in_a_thread_that_holds_a_tile_costs_nothing() {
+    let film = filled(&[3]);
+    let before = bits(&film.radiance());
+    std::thread::scope(|scope| {
+        let holder = scope.spawn(|| {
+            let _guard = film.tile(0);
+            panic!("while holding a tile");
+        });
+        assert!(holder.join().is_err());
+    });
+    assert!(film.tiles[0].is_poisoned());
+    assert_eq!(bits(&film.radiance()), before);
+    film.add(0, &samples(film.tile_rect(0).expect("a tile"), 3, 1));
+    assert_eq!(film.pixel_samples(0, 0), 4);
+}
+
+#[test]
+fn snapshots_while_threads_add() {
+    let film = Film::new(200, 100, None).expect("a film");
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let writers: Vec<_> = (0..3)
+            .map(|worker| {
+                let film = &film;
+                scope.spawn(move || {
+                    for pass in 0..8 {
+                        for tile in (worker..film.tile_count()).step_by(3) {
+                            let rect = film.tile_rect(tile).expect("a tile");
+                            let radiance = vec![Vec3::splat(2.0); rect.area()];
+                            film.add(tile, &TileSamples { rect, samples: 1, radiance });
+                            assert!(film.samples().max <= pass + 9);
+                        }
+                    }
+                })
+            })
+            .collect();
+        scope.spawn(|| {
+            let mut previewer = crate::film::Previewer::new(20, 10);
+            while !done.load(Ordering::Acquire) {
+                let whole = film.radiance();
+                assert!(whole.pixels.iter().all(|p| *p == Vec3::ZERO || *p == Vec3::splat(2.0)));
+                let small = previewer.picture(&film, None);
+                assert!(small.pixels.iter().all(|p| *p == Vec3::ZERO || (p.x - 2.0).abs() < 1e-5));
+            }
+        });
+        for writer in writers {
+            writer.join().expect("a writer does not panic");
+        }
+        done.store(true, Ordering::Release);
+    });
+    assert_eq!(film.samples(), SampleStats { min: 8, mean: 8.0, max: 8 });
+}
+
+#[test]
+fn a_film_that_does_not_fit_is_an_error_that_says_what_to_do() {
+    let error = Film::new(u32::MAX, u32::MAX, None).expect_err("no machine has this");
+    assert!(error.to_string().contains("4294967295×4294967295"), "{error}");
+    assert!(error.to_string().contains("smaller"), "{error}");
+    assert_eq!(Film::new(0, 5, None).expect_err("no pixels"), FilmError::Empty { width: 0, height: 5 });
+    let outside = Rect { x: 10, y: 0, width: 1, height: 1 };
+    assert!(Film::new(10, 5, Some(outside)).is_err());
+}
+
+#[test]
+fn completeness_is_what_was_said() {
+    let film = Film::new(1, 1, None).expect("a film");
+    assert!(!film.is_complete());
+    film.set_complete(true);
+    assert!(film.is_complete());
+}

@@ -1,0 +1,102 @@
+//! Why a picture could not be written, and the way out.
+
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use super::Format;
+
+/// Why a picture could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// The path has no ending.
+    #[error("cannot write {}: it has no ending that says its format; use one of {}", path.display(), Format::known_endings())]
+    NoEnding {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The ending names no format.
+    #[error("cannot write {}: .{ending} is not a format that glimt writes; use one of {}", path.display(), Format::known_endings())]
+    UnknownEnding {
+        /// The path.
+        path: PathBuf,
+        /// Its ending, in small letters.
+        ending: String,
+    },
+    /// The format is planned.
+    #[error("cannot write {}: WebP is not available in this version; use one of {}", path.display(), Format::known_endings())]
+    NotAvailable {
+        /// The path.
+        path: PathBuf,
+    },
+    /// Neither 8 nor 16.
+    #[error("{bits} bits a channel are not possible; use 8 or 16")]
+    BitDepth {
+        /// What was asked for.
+        bits: u8,
+    },
+    /// The format cannot hold the picture.
+    #[error("a {format} file cannot {why}; use .png or .exr")]
+    Unsuitable {
+        /// The format.
+        format: Format,
+        /// What it cannot.
+        why: String,
+    },
+    /// The encoder failed.
+    #[error("the picture could not be encoded as {format}: {why}")]
+    Encoder {
+        /// The format.
+        format: Format,
+        /// What it said.
+        why: String,
+    },
+    /// The target is nothing that a picture can be written to.
+    #[error("cannot write {}: {why}; {way_out}", path.display())]
+    Target {
+        /// The path as given.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+        /// What to do.
+        way_out: &'static str,
+    },
+    /// The system refused.
+    #[error("cannot write {}: {}; {}", path.display(), words(source), way_out(source))]
+    File {
+        /// The path as given.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+}
+
+impl OutputError {
+    pub(super) fn encoder(format: Format, why: &impl ToString) -> Self {
+        Self::Encoder { format, why: why.to_string() }
+    }
+
+    pub(super) fn file(path: &Path, source: impl Into<io::Error>) -> Self {
+        Self::File { path: path.to_owned(), source: source.into() }
+    }
+}
+
+/// The system's words without its number.
+fn words(error: &io::Error) -> String {
+    let text = error.to_string();
+    text.split(" (os error").next().unwrap_or(&text).to_owned()
+}
+
+fn way_out(error: &io::Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "free some space or choose another place",
+        ErrorKind::FileTooLarge => {
+            "raise the limit on the size of files (ulimit -f), choose another place or a smaller picture"
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "allow writing there or choose another place"
+        }
+        ErrorKind::InvalidFilename => "choose a shorter name",
+        ErrorKind::BrokenPipe => "whoever read it has ended; choose a file",
+        _ => "choose another place",
+    }
+}

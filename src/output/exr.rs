@@ -1,0 +1,47 @@
+//! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP.
+
+use std::io::Cursor;
+
+use ::exr::meta::attribute::{Chromaticities, Text};
+use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage};
+
+use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_light, one_line};
+use crate::film::RadianceImage;
+
+pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, OutputError> {
+    let size = (image.width as usize, image.height as usize);
+    let pixel = |position: Vec2<usize>| {
+        let color = image.pixels[position.y() * size.0 + position.x()];
+        (as_light(color.x), as_light(color.y), as_light(color.z))
+    };
+    let channels = SpecificChannels::rgb(pixel);
+    let layer = Layer::new(size, attributes(options), Encoding::SMALL_LOSSLESS, channels);
+    let mut file = Image::from_layer(layer);
+    file.attributes.chromaticities = Some(REC_709);
+    let mut bytes = Vec::new();
+    let written = file.write().to_buffered(Cursor::new(&mut bytes));
+    written.map_err(|error| OutputError::encoder(Format::Exr, &error))?;
+    Ok(bytes)
+}
+
+/// ITU-R BT.709 primaries, D65 white.
+const REC_709: Chromaticities = Chromaticities {
+    red: Vec2(0.64, 0.33),
+    green: Vec2(0.30, 0.60),
+    blue: Vec2(0.15, 0.06),
+    white: Vec2(0.3127, 0.3290),
+};
+
+/// All metadata go into the standard `comments`, a line each: attributes of their own would come in the random order of
+/// the encoder's hash map, and the same picture would give different files.
+fn attributes(options: &EncodeOptions) -> LayerAttributes {
+    let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
+    let lines: Vec<_> = options.metadata.iter().map(line).collect();
+    let comments = (!lines.is_empty()).then(|| text(&lines.join("\n")));
+    LayerAttributes { software_name: Some(text(SOFTWARE)), comments, ..Default::default() }
+}
+
+/// The bytes of UTF-8, as other programs write and read them.
+fn text(value: &str) -> Text {
+    Text::from_slice_unchecked(value.as_bytes())
+}

@@ -1,0 +1,114 @@
+//! File formats and what they can hold.
+
+use std::fmt;
+use std::path::Path;
+
+use super::OutputError;
+
+/// A file format of pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// 8 or 16 bit sRGB.
+    Png,
+    /// 32 bit float, linear.
+    Exr,
+    /// Radiance RGBE, linear.
+    Hdr,
+    /// 8 bit sRGB, lossy.
+    Jpeg,
+    /// 8 or 16 bit sRGB, binary.
+    Ppm,
+}
+
+/// Bits per channel of integer formats.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum BitDepth {
+    /// 8.
+    #[default]
+    Eight,
+    /// 16.
+    Sixteen,
+}
+
+impl TryFrom<u8> for BitDepth {
+    type Error = OutputError;
+
+    fn try_from(bits: u8) -> Result<Self, OutputError> {
+        match bits {
+            8 => Ok(Self::Eight),
+            16 => Ok(Self::Sixteen),
+            _ => Err(OutputError::BitDepth { bits }),
+        }
+    }
+}
+
+impl Format {
+    /// Endings, without the dot, and what they name.
+    const ENDINGS: [(&'static str, Self); 6] = [
+        ("png", Self::Png),
+        ("exr", Self::Exr),
+        ("hdr", Self::Hdr),
+        ("jpg", Self::Jpeg),
+        ("jpeg", Self::Jpeg),
+        ("ppm", Self::Ppm),
+    ];
+
+    /// The known endings, as a message lists them.
+    pub(super) fn known_endings() -> String {
+        Self::ENDINGS.map(|(ending, _)| format!(".{ending}")).join(", ")
+    }
+
+    /// The format that a path's ending names, in small letters or capitals.
+    ///
+    /// # Errors
+    /// No ending, or one that names no format.
+    pub fn of(path: &Path) -> Result<Self, OutputError> {
+        let Some(ending) = path.extension() else {
+            return Err(OutputError::NoEnding { path: path.to_owned() });
+        };
+        let ending = ending.to_string_lossy().to_lowercase();
+        let known = Self::ENDINGS.iter().find(|(known, _)| *known == ending).map(|&(_, format)| format);
+        known.ok_or_else(|| match ending.as_str() {
+            "webp" => OutputError::NotAvailable { path: path.to_owned() },
+            _ => OutputError::UnknownEnding { path: path.to_owned(), ending },
+        })
+    }
+
+    /// Whether it holds linear radiance rather than a picture for eyes.
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::Exr | Self::Hdr)
+    }
+
+    /// Whether a file of this format can hold such a picture.
+    ///
+    /// # Errors
+    /// [`OutputError::Unsuitable`], saying why not.
+    pub fn check_picture(self, width: u32, height: u32, bit_depth: BitDepth) -> Result<(), OutputError> {
+        let unsuitable = |why: String| Err(OutputError::Unsuitable { format: self, why });
+        if width == 0 || height == 0 {
+            return unsuitable(format!("hold a picture without pixels ({width}×{height})"));
+        }
+        if self != Self::Jpeg {
+            return Ok(());
+        }
+        if width > 65535 || height > 65535 {
+            return unsuitable(format!("hold {width}×{height} pixels, at most 65535×65535"));
+        }
+        match bit_depth {
+            BitDepth::Eight => Ok(()),
+            BitDepth::Sixteen => unsuitable("hold 16 bits a channel".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Png => "PNG",
+            Self::Exr => "EXR",
+            Self::Hdr => "HDR",
+            Self::Jpeg => "JPEG",
+            Self::Ppm => "PPM",
+        })
+    }
+}

@@ -1,0 +1,79 @@
+//! Radiance HDR: G. Ward, "Real Pixels" (Graphics Gems II, 1991): three mantissas and a shared exponent, lines
+//! compressed by runs.
+
+use super::{EncodeOptions, SOFTWARE, as_light, one_line};
+use crate::film::RadianceImage;
+use crate::math::Vec3;
+
+/// Widths whose lines may be compressed; readers take others as plain pixels.
+const COMPRESSED_WIDTHS: std::ops::Range<usize> = 8..32768;
+const LONGEST_RUN: usize = 127;
+const LONGEST_LITERAL: usize = 128;
+/// Shorter runs cost as much as literals.
+const SHORTEST_RUN: usize = 4;
+
+pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Vec<u8> {
+    let mut header = format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\n");
+    for (name, value) in &options.metadata {
+        header += &format!("# {}: {}\n", one_line(name), one_line(value));
+    }
+    header += &format!("FORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", image.height, image.width);
+    let mut bytes = header.into_bytes();
+    for line in image.pixels.chunks_exact(image.width as usize) {
+        write_line(line, &mut bytes);
+    }
+    bytes
+}
+
+fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
+    let pixels: Vec<[u8; 4]> = line.iter().map(|&color| rgbe(color)).collect();
+    if !COMPRESSED_WIDTHS.contains(&line.len()) {
+        bytes.extend_from_slice(pixels.as_flattened());
+        return;
+    }
+    bytes.extend([2, 2, (line.len() >> 8) as u8, line.len() as u8]);
+    for component in 0..4 {
+        let plane: Vec<u8> = pixels.iter().map(|pixel| pixel[component]).collect();
+        compress(&plane, bytes);
+    }
+}
+
+/// Mantissas rounded to the nearest, so that what is read is as often brighter as darker.
+fn rgbe(color: Vec3) -> [u8; 4] {
+    let color = color.to_array().map(|component| f64::from(as_light(component)));
+    let brightest = color[0].max(color[1]).max(color[2]);
+    // 2^(exponent − 1) ≤ brightest < 2^exponent, one more where the mantissa would be rounded up to 256.
+    let mut exponent = brightest.log2().floor() + 1.0;
+    if (brightest / exponent.exp2() * 256.0).round() >= 256.0 {
+        exponent += 1.0;
+    }
+    // The exponent byte is 1 … 255; a zero stands for black.
+    if brightest == 0.0 || exponent < -127.0 {
+        return [0; 4];
+    }
+    let exponent = exponent.min(127.0);
+    let mantissa = |component: f64| (component / exponent.exp2() * 256.0).round().min(255.0) as u8;
+    [mantissa(color[0]), mantissa(color[1]), mantissa(color[2]), (exponent as i32 + 128) as u8]
+}
+
+/// Runs as (128 + length, byte), everything else as (length, bytes).
+fn compress(mut plane: &[u8], bytes: &mut Vec<u8>) {
+    let run_length = |plane: &[u8]| {
+        let same = plane.iter().take_while(|&&byte| byte == plane[0]).count();
+        same.min(LONGEST_RUN)
+    };
+    while !plane.is_empty() {
+        let run = run_length(plane);
+        let taken = if run >= SHORTEST_RUN {
+            bytes.extend([128 + run as u8, plane[0]]);
+            run
+        } else {
+            let longest = plane.len().min(LONGEST_LITERAL);
+            let literal = (1..longest).find(|&i| run_length(&plane[i..]) >= SHORTEST_RUN).unwrap_or(longest);
+            bytes.push(literal as u8);
+            bytes.extend_from_slice(&plane[..literal]);
+            literal
+        };
+        plane = &plane[taken..];
+    }
+}

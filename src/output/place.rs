@@ -1,0 +1,121 @@
+//! Where bytes really go: links followed, special files and what may not be written told apart.
+
+use std::fs::{self, Metadata};
+use std::io::{self, ErrorKind};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::FileTypeExt;
+use std::path::{Path, PathBuf};
+
+use nix::errno::Errno;
+use nix::unistd::{AccessFlags, access};
+
+use super::OutputError;
+
+/// As many links as Linux follows.
+const LINKS: usize = 40;
+
+/// Where the bytes for a path go.
+#[derive(Debug)]
+pub(super) enum Place {
+    /// A regular file, there or not, to be replaced as a whole.
+    File(Target),
+    /// A device, a pipe or an open descriptor, to be written as it is.
+    InPlace(PathBuf),
+}
+
+/// A regular file behind all links.
+#[derive(Debug)]
+pub(super) struct Target {
+    pub(super) path: PathBuf,
+    /// Of the file that is there now.
+    pub(super) existing: Option<Metadata>,
+}
+
+impl Target {
+    /// The directory that the file is in.
+    pub(super) fn directory(&self) -> &Path {
+        directory_of(&self.path)
+    }
+}
+
+/// Finds the place and whether it can be written, as far as can be told without writing.
+pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
+    if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
+        return Err(is_directory(path));
+    }
+    let mut target = path.to_owned();
+    for _ in 0..LINKS {
+        let metadata = match fs::symlink_metadata(&target) {
+            Ok(metadata) => metadata,
+            Err(error) if error.kind() == ErrorKind::NotFound => return new_file(path, target),
+            Err(error) => return Err(OutputError::file(path, error)),
+        };
+        let kind = metadata.file_type();
+        if !kind.is_symlink() {
+            return existing(path, target, metadata);
+        }
+        if target.starts_with("/proc") {
+            // An open descriptor (/dev/stdout is a link to one), whose name may be no path at all.
+            return Ok(Place::InPlace(path.to_owned()));
+        }
+        let link = fs::read_link(&target).map_err(|error| OutputError::file(path, error))?;
+        target = directory_of(&target).join(link);
+    }
+    Err(OutputError::file(path, Errno::ELOOP))
+}
+
+fn new_file(path: &Path, target: PathBuf) -> Result<Place, OutputError> {
+    check_directory(path, directory_of(&target))?;
+    Ok(Place::File(Target { path: target, existing: None }))
+}
+
+fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<Place, OutputError> {
+    let kind = metadata.file_type();
+    if kind.is_dir() {
+        return Err(is_directory(path));
+    }
+    if kind.is_block_device() || kind.is_socket() {
+        let what = if kind.is_socket() { "a socket" } else { "a block device" };
+        let why = format!("it is {what}");
+        return Err(OutputError::Target { path: path.to_owned(), why, way_out: "name a file" });
+    }
+    // Also of a file, although its directory decides whether it can be replaced: it may be protected on purpose.
+    may_write(path, &target, AccessFlags::W_OK)?;
+    if !kind.is_file() {
+        return Ok(Place::InPlace(target));
+    }
+    check_directory(path, directory_of(&target))?;
+    Ok(Place::File(Target { path: target, existing: Some(metadata) }))
+}
+
+fn check_directory(path: &Path, directory: &Path) -> Result<(), OutputError> {
+    match fs::metadata(directory) {
+        Ok(metadata) if metadata.is_dir() => {
+            may_write(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)
+        }
+        Ok(_) => Err(OutputError::file(path, io::Error::from(Errno::ENOTDIR))),
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(OutputError::Target {
+            path: path.to_owned(),
+            why: format!("the directory {} does not exist", directory.display()),
+            way_out: "create it or choose another place",
+        }),
+        Err(error) => Err(OutputError::file(path, error)),
+    }
+}
+
+fn may_write(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputError> {
+    access(what, how).map_err(|errno| OutputError::file(path, errno))
+}
+
+fn is_directory(path: &Path) -> OutputError {
+    let why = "it is a directory".to_owned();
+    OutputError::Target { path: path.to_owned(), why, way_out: "name a file in it" }
+}
+
+/// The directory that a path is in; the working directory for a mere name.
+fn directory_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(directory) if !directory.as_os_str().is_empty() => directory,
+        _ => Path::new("."),
+    }
+}

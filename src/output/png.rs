@@ -1,0 +1,54 @@
+//! PNG: 8 or 16 bit sRGB, with text chunks.
+
+use ::png::{ColorType, Encoder, EncodingError, SrgbRenderingIntent};
+
+use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE};
+use crate::film::RadianceImage;
+use crate::film::tone::{develop, develop16};
+
+/// Length of a keyword (PNG specification, 11.3.3.1).
+const KEYWORD_BYTES: usize = 79;
+
+pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, OutputError> {
+    try_encode(image, options).map_err(|error| OutputError::encoder(Format::Png, &error))
+}
+
+fn try_encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, image.width, image.height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    encoder.set_depth(match options.bit_depth {
+        BitDepth::Eight => ::png::BitDepth::Eight,
+        BitDepth::Sixteen => ::png::BitDepth::Sixteen,
+    });
+    add_text(&mut encoder, "Software", SOFTWARE)?;
+    for (name, value) in &options.metadata {
+        add_text(&mut encoder, name, value)?;
+    }
+    let mut writer = encoder.write_header()?;
+    match options.bit_depth {
+        BitDepth::Eight => writer.write_image_data(develop(image, &options.tone).pixels.as_flattened())?,
+        BitDepth::Sixteen => writer.write_image_data(&big_endian(image, options))?,
+    }
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// 16-bit components, the high byte first, as PNG and PPM hold them.
+pub(super) fn big_endian(image: &RadianceImage, options: &EncodeOptions) -> Vec<u8> {
+    let picture = develop16(image, &options.tone);
+    picture.pixels.as_flattened().iter().flat_map(|component| component.to_be_bytes()).collect()
+}
+
+/// tEXt holds Latin-1 and is read by everything; iTXt holds the rest.
+fn add_text(encoder: &mut Encoder<'_, &mut Vec<u8>>, name: &str, value: &str) -> Result<(), EncodingError> {
+    let name: String =
+        name.chars().filter(|c| c.is_ascii_graphic() || *c == ' ').take(KEYWORD_BYTES).collect();
+    let name = name.trim().to_owned();
+    if name.is_empty() {
+        return Ok(());
+    }
+    let value = value.replace('\0', "");
+    if value.is_ascii() { encoder.add_text_chunk(name, value) } else { encoder.add_itxt_chunk(name, value) }
+}

@@ -1,0 +1,175 @@
+//! Temporary files beside a target: named after their writer, locked while it lives, removed when it does not.
+
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, ErrorKind};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use nix::fcntl::OFlag;
+
+/// Longest file name of nearly every file system.
+const NAME_BYTES: usize = 255;
+/// Names to try before giving up; a second one is needed only if another program clears up at the wrong moment.
+const ATTEMPTS: usize = 64;
+
+/// A file that goes away unless it is given its final name.
+#[derive(Debug)]
+pub(super) struct Temporary {
+    pub(super) file: File,
+    path: PathBuf,
+    kept: bool,
+}
+
+impl Temporary {
+    /// A new, empty, locked file `.NAME.glimt-<process>-<number>.tmp` for a target called `name`.
+    pub(super) fn create(directory: &Path, name: &OsStr, mode: u32) -> io::Result<Self> {
+        for _ in 0..ATTEMPTS {
+            let path = directory.join(next_name(name));
+            match OpenOptions::new().write(true).create_new(true).mode(mode).open(&path) {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+                Ok(file) => {
+                    let temporary = Self { file, path, kept: false };
+                    if temporary.claim()? {
+                        return Ok(temporary);
+                    }
+                }
+            }
+        }
+        Err(io::Error::new(ErrorKind::AlreadyExists, "no free name for a temporary file"))
+    }
+
+    /// Locks it. False if another writer took it for a stale one before that.
+    fn claim(&self) -> io::Result<bool> {
+        match self.file.try_lock() {
+            Err(TryLockError::WouldBlock) => Ok(false),
+            // A file system without locks: nobody can take it for stale there.
+            Err(TryLockError::Error(_)) => Ok(true),
+            Ok(()) => is_same(&self.file, &self.path),
+        }
+    }
+
+    /// Gives it its final name, in place of whatever had that.
+    pub(super) fn rename_to(mut self, target: &Path) -> io::Result<()> {
+        fs::rename(&self.path, target)?;
+        self.kept = true;
+        Ok(())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if !self.kept {
+            // Nothing is left to do if this fails; the next write tries again.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Removes the temporary files that writers left in a directory when they were killed. Files of living writers are
+/// locked and stay. What cannot be removed stays too: it is no reason not to write.
+pub(super) fn remove_stale(directory: &Path) {
+    let Ok(entries) = fs::read_dir(directory) else { return };
+    for entry in entries.flatten() {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_file && is_temporary(&entry.file_name()) {
+            let _ = remove_if_stale(&entry.path());
+        }
+    }
+}
+
+fn remove_if_stale(path: &Path) -> io::Result<()> {
+    // Between the look and the opening it may have become a link or a pipe.
+    let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
+    let file = OpenOptions::new().read(true).custom_flags(flags.bits()).open(path)?;
+    if file.try_lock().is_ok() && is_same(&file, path)? {
+        fs::remove_file(path)?;
+    }
+    Ok(())
+}
+
+/// Whether the open file is the one that has this name now.
+fn is_same(file: &File, path: &Path) -> io::Result<bool> {
+    let opened = file.metadata()?;
+    match fs::symlink_metadata(path) {
+        Ok(named) => Ok((opened.dev(), opened.ino()) == (named.dev(), named.ino())),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+fn next_name(name: &OsStr) -> OsString {
+    static NUMBER: AtomicU64 = AtomicU64::new(0);
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    let ending = format!(".glimt-{}-{number}.tmp", std::process::id());
+    let kept = name.len().min(NAME_BYTES - 1 - ending.len());
+    let mut result = OsString::from(".");
+    result.push(OsStr::from_bytes(&name.as_bytes()[..kept]));
+    result.push(ending);
+    result
+}
+
+/// Whether a name is one of [`next_name`]'s.
+fn is_temporary(name: &OsStr) -> bool {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let name = name.to_string_lossy();
+    name.strip_prefix('.')
+        .and_then(|rest| rest.strip_suffix(".tmp"))
+        .and_then(|rest| rest.rsplit_once(".glimt-"))
+        .and_then(|(_, numbers)| numbers.split_once('-'))
+        .is_some_and(|(process, number)| is_number(process) && is_number(number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names() {
+        for name in ["out.png", "a.glimt-b.png", &"ä".repeat(127)] {
+            let temporary = next_name(OsStr::new(name));
+            assert!(is_temporary(&temporary), "{temporary:?}");
+            assert!(temporary.len() <= NAME_BYTES);
+        }
+        for other in ["out.png", ".out.png.tmp", ".a.glimt-1.tmp", ".a.glimt-1-x.tmp", "a.glimt-1-2.tmp"] {
+            assert!(!is_temporary(OsStr::new(other)), "{other}");
+        }
+    }
+
+    #[test]
+    fn a_stale_file_is_removed_and_a_living_one_is_not() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let living = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+        let stale = directory.path().join(".b.png.glimt-123-4.tmp");
+        fs::write(&stale, "half").expect("a file");
+        let other = directory.path().join(".b.png.tmp");
+        fs::write(&other, "not ours").expect("a file");
+        remove_stale(directory.path());
+        assert!(living.path.exists() && other.exists());
+        assert!(!stale.exists());
+    }
+
+    #[test]
+    fn a_panic_leaves_nothing() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let result = std::panic::catch_unwind(|| {
+            let _file = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+            panic!("while writing");
+        });
+        assert!(result.is_err());
+        assert_eq!(fs::read_dir(directory.path()).expect("a directory").count(), 0);
+    }
+
+    #[test]
+    fn a_file_that_was_cleared_away_is_not_claimed() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+        fs::remove_file(&file.path).expect("removed");
+        assert!(!file.claim().expect("no error"));
+        fs::write(&file.path, "another").expect("a file");
+        assert!(!file.claim().expect("no error"));
+    }
+}

@@ -1,0 +1,248 @@
+use std::io::Cursor;
+
+use super::*;
+use crate::film::tone::{Curve, develop, develop16};
+use crate::math::Vec3;
+
+/// Dark to bright, coloured, with flat parts.
+fn picture(width: u32, height: u32) -> RadianceImage {
+    let pixel = |i: u32| {
+        let (x, y) = (i % width, i / width);
+        let steps = (x / 5) as f32 / (width as f32 / 5.0);
+        Vec3::new(steps, y as f32 / height as f32, ((x * 31 + y * 17) % 64) as f32 / 64.0) * 1.5
+    };
+    RadianceImage { width, height, pixels: (0..width * height).map(pixel).collect() }
+}
+
+fn options(bit_depth: BitDepth) -> EncodeOptions {
+    let metadata = vec![
+        ("Scene".to_owned(), "scenes/cornell.toml".to_owned()),
+        ("Source".to_owned(), "Grüße, 日本\nsecond line".to_owned()),
+    ];
+    let tone = ToneMapping { exposure_stops: -0.5, curve: Curve::Reinhard };
+    EncodeOptions { tone, bit_depth, metadata }
+}
+
+fn decode(bytes: &[u8], format: image::ImageFormat) -> image::DynamicImage {
+    image::load_from_memory_with_format(bytes, format).expect("what was encoded is decoded")
+}
+
+#[test]
+fn png_holds_the_developed_picture_at_both_depths() {
+    let image = picture(37, 23);
+    for (depth, color) in
+        [(BitDepth::Eight, image::ColorType::Rgb8), (BitDepth::Sixteen, image::ColorType::Rgb16)]
+    {
+        let options = options(depth);
+        let decoded = decode(&encode(&image, &options, Format::Png).expect("a PNG"), image::ImageFormat::Png);
+        assert_eq!((decoded.width(), decoded.height(), decoded.color()), (37, 23, color));
+        match depth {
+            BitDepth::Eight => {
+                assert_eq!(decoded.as_bytes(), develop(&image, &options.tone).pixels.as_flattened());
+            }
+            BitDepth::Sixteen => {
+                let expected = develop16(&image, &options.tone);
+                let decoded = decoded.into_rgb16().into_raw();
+                assert_eq!(decoded, expected.pixels.as_flattened());
+            }
+        }
+    }
+}
+
+#[test]
+fn png_tells_its_colour_space_and_texts() {
+    let bytes = encode(&picture(8, 8), &options(BitDepth::Eight), Format::Png).expect("a PNG");
+    let reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().expect("a header");
+    let info = reader.info();
+    assert!(info.srgb.is_some());
+    let texts: Vec<_> = info.uncompressed_latin1_text.iter().map(|c| (&*c.keyword, &*c.text)).collect();
+    assert_eq!(texts, [("Software", SOFTWARE), ("Scene", "scenes/cornell.toml")]);
+    let unicode: Vec<_> = info.utf8_text.iter().map(|c| (&*c.keyword, c.get_text())).collect();
+    assert_eq!(unicode.len(), 1);
+    assert_eq!(unicode[0].0, "Source");
+    assert_eq!(unicode[0].1.as_ref().expect("text"), "Grüße, 日本\nsecond line");
+}
+
+#[test]
+fn png_texts_that_cannot_be_are_made_so() {
+    let name = format!("é{}", "n".repeat(200));
+    let metadata = vec![(name, "a\0b".to_owned()), ("\u{1b}".to_owned(), "dropped".to_owned())];
+    let bytes = encode(&picture(1, 1), &EncodeOptions { metadata, ..Default::default() }, Format::Png);
+    let reader = ::png::Decoder::new(Cursor::new(bytes.expect("a PNG"))).read_info().expect("a header");
+    let texts = &reader.info().uncompressed_latin1_text;
+    assert_eq!(texts.len(), 2);
+    assert_eq!((texts[1].keyword.as_str(), texts[1].text.as_str()), ("n".repeat(79).as_str(), "ab"));
+}
+
+#[test]
+fn exr_holds_every_bit_unexposed() {
+    let mut image = picture(50, 40);
+    let special = [-0.0, 1e-45, f32::MIN_POSITIVE, 1.000_000_1, 65505.0, 1e30, f32::MAX];
+    for (pixel, value) in image.pixels.iter_mut().zip(special) {
+        pixel.y = value;
+    }
+    let bytes = encode(&image, &options(BitDepth::Eight), Format::Exr).expect("an EXR");
+    let file = read_exr(&bytes);
+    assert_eq!(file.0, (50, 40));
+    let bits = |v: &Vec3| v.to_array().map(f32::to_bits);
+    for (decoded, expected) in file.1.iter().zip(&image.pixels) {
+        assert_eq!(bits(decoded), bits(expected));
+    }
+    assert_eq!(file.1.len(), image.pixels.len());
+}
+
+fn read_exr(bytes: &[u8]) -> ((usize, usize), Vec<Vec3>) {
+    use ::exr::prelude::*;
+    let file = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            |size, _| (size, vec![Vec3::ZERO; size.area()]),
+            |(size, pixels), at, (r, g, b, _): (f32, f32, f32, f32)| {
+                pixels[at.y() * size.width() + at.x()] = Vec3::new(r, g, b);
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .expect("an EXR");
+    let (size, pixels) = file.layer_data.channel_data.pixels;
+    ((size.width(), size.height()), pixels)
+}
+
+#[test]
+fn exr_tells_its_primaries_and_attributes() {
+    let bytes = encode(&picture(4, 4), &options(BitDepth::Sixteen), Format::Exr).expect("an EXR");
+    let meta = ::exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), true).expect("a header");
+    let header = &meta.headers[0];
+    assert_eq!(header.shared_attributes.chromaticities.expect("primaries").green.x(), 0.30);
+    let own = &header.own_attributes;
+    assert_eq!(own.software_name.as_ref().expect("software").as_slice(), SOFTWARE.as_bytes());
+    let comments = own.comments.as_ref().expect("comments").as_slice();
+    assert_eq!(comments, "Scene: scenes/cornell.toml\nSource: Grüße, 日本 second line".as_bytes());
+}
+
+#[test]
+fn what_is_no_light_never_reaches_a_float_file() {
+    let pixels = vec![Vec3::new(f32::NAN, -1.0, f32::NEG_INFINITY), Vec3::new(f32::INFINITY, 1.0, -1e-45)];
+    let image = RadianceImage { width: 2, height: 1, pixels };
+    let bytes = encode(&image, &EncodeOptions::default(), Format::Exr).expect("an EXR");
+    assert_eq!(read_exr(&bytes).1, [Vec3::ZERO, Vec3::new(f32::MAX, 1.0, 0.0)]);
+    let bytes = encode(&image, &EncodeOptions::default(), Format::Hdr).expect("an HDR");
+    let decoded = decode(&bytes, image::ImageFormat::Hdr).into_rgb32f().into_raw();
+    assert_eq!(decoded[..3], [0.0; 3]);
+    assert!(decoded[3] > 1e38 && decoded.iter().all(|v| v.is_finite() && *v >= 0.0), "{decoded:?}");
+}
+
+#[test]
+fn hdr_is_within_half_a_step_at_any_width_and_size_of_value() {
+    for (width, height) in [(1, 5), (7, 3), (8, 3), (300, 40), (32767, 1), (32768, 1), (40000, 1)] {
+        let mut image = picture(width, height);
+        for (i, pixel) in image.pixels.iter_mut().enumerate() {
+            *pixel *= 10_f32.powi((i / 50) as i32 % 60 - 30);
+        }
+        let bytes = encode(&image, &options(BitDepth::Eight), Format::Hdr).expect("an HDR");
+        let decoded = decode(&bytes, image::ImageFormat::Hdr).into_rgb32f();
+        assert_eq!((decoded.width(), decoded.height()), (width, height));
+        for (decoded, expected) in decoded.pixels().zip(&image.pixels) {
+            let error = (Vec3::from_array(decoded.0) - *expected).abs().max_element();
+            assert!(error <= expected.max_element() / 255.0, "{decoded:?} {expected} at {width}");
+        }
+        assert!(
+            String::from_utf8_lossy(&bytes[..200.min(bytes.len())]).contains("# Scene: scenes/cornell.toml")
+        );
+    }
+}
+
+#[test]
+fn hdr_neither_wraps_nor_loses_the_smallest_and_largest() {
+    let values = [1e-45, 1e-39, 1e-37, 0.999, 0.998, 255.5, 1e38, f32::MAX];
+    let pixels: Vec<_> = values.iter().map(|&v| Vec3::splat(v)).collect();
+    let image = RadianceImage { width: 8, height: 1, pixels };
+    let bytes = encode(&image, &EncodeOptions::default(), Format::Hdr).expect("an HDR");
+    let decoded = decode(&bytes, image::ImageFormat::Hdr).into_rgb32f();
+    for (decoded, expected) in decoded.pixels().zip(values) {
+        let bound = if expected > 1.6e38 { 0.51 * expected } else { expected / 255.0 + 1e-38 };
+        assert!((decoded.0[0] - expected).abs() <= bound, "{expected:e} became {:e}", decoded.0[0]);
+    }
+}
+
+#[test]
+fn hdr_compresses_flat_lines() {
+    let image = RadianceImage::black(1000, 10);
+    let bytes = encode(&image, &EncodeOptions::default(), Format::Hdr).expect("an HDR");
+    assert!(bytes.len() < 1000, "{} bytes", bytes.len());
+}
+
+#[test]
+fn ppm_holds_the_developed_picture_at_both_depths() {
+    let image = picture(37, 23);
+    let eight = encode(&image, &options(BitDepth::Eight), Format::Ppm).expect("a PPM");
+    let tone = options(BitDepth::Eight).tone;
+    let decoded = decode(&eight, image::ImageFormat::Pnm).into_rgb8().into_raw();
+    assert_eq!(decoded, develop(&image, &tone).pixels.as_flattened());
+    let sixteen = encode(&image, &options(BitDepth::Sixteen), Format::Ppm).expect("a PPM");
+    let decoded = decode(&sixteen, image::ImageFormat::Pnm).into_rgb16().into_raw();
+    assert_eq!(decoded, develop16(&image, &tone).pixels.as_flattened());
+}
+
+#[test]
+fn jpeg_is_near_the_developed_picture_in_colour_too() {
+    // Smooth, with a sharp edge between saturated colours, which subsampled chroma would smear.
+    let pixel = |i: u32| if i % 64 < 31 { Vec3::new(0.8, 0.05, 0.05) } else { Vec3::new(0.05, 0.05, 0.8) };
+    let image = RadianceImage { width: 64, height: 64, pixels: (0..64 * 64).map(pixel).collect() };
+    let options = EncodeOptions::default();
+    let bytes = encode(&image, &options, Format::Jpeg).expect("a JPEG");
+    let decoded = decode(&bytes, image::ImageFormat::Jpeg).into_rgb8();
+    for (decoded, expected) in decoded.pixels().zip(develop(&image, &options.tone).pixels) {
+        for (a, b) in decoded.0.iter().zip(expected) {
+            assert!(a.abs_diff(b) <= 16, "{decoded:?} {expected:?}");
+        }
+    }
+}
+
+#[test]
+fn the_same_picture_gives_the_same_bytes() {
+    let image = picture(200, 150);
+    for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm] {
+        let once = encode(&image, &options(BitDepth::Eight), format).expect("bytes");
+        assert!(once == encode(&image, &options(BitDepth::Eight), format).expect("bytes"), "{format}");
+    }
+}
+
+#[test]
+fn endings() {
+    let format = |path: &str| Format::of(Path::new(path)).map_err(|error| error.to_string());
+    assert_eq!(format("a/b.c/out.png"), Ok(Format::Png));
+    assert_eq!(format("OUT.JPEG"), Ok(Format::Jpeg));
+    assert_eq!(format("x.jpg"), Ok(Format::Jpeg));
+    assert_eq!(format("x.exr"), Ok(Format::Exr));
+    assert_eq!(format("x.Hdr"), Ok(Format::Hdr));
+    assert_eq!(format("x.ppm"), Ok(Format::Ppm));
+    for (path, words) in [
+        ("x.webp", "WebP is not available in this version"),
+        ("x.tiff", ".tiff is not a format that glimt writes"),
+        ("x", "no ending"),
+        (".png", "no ending"),
+        ("", "no ending"),
+    ] {
+        let message = format(path).expect_err(path);
+        assert!(message.contains(words), "{message}");
+        assert!(message.contains(".png, .exr, .hdr, .jpg, .jpeg, .ppm"), "{message}");
+    }
+}
+
+#[test]
+fn what_a_format_cannot_hold_is_said() {
+    let deep = encode(&picture(2, 2), &options(BitDepth::Sixteen), Format::Jpeg).expect_err("8 bits only");
+    assert_eq!(deep.to_string(), "a JPEG file cannot hold 16 bits a channel; use .png or .exr");
+    let wide = encode(&picture(65536, 1), &EncodeOptions::default(), Format::Jpeg).expect_err("too wide");
+    assert!(wide.to_string().contains("65536×1"), "{wide}");
+    assert!(encode(&picture(65535, 1), &EncodeOptions::default(), Format::Jpeg).is_ok());
+    assert!(encode(&RadianceImage::black(0, 3), &EncodeOptions::default(), Format::Png).is_err());
+    let torn = RadianceImage { pixels: Vec::new(), ..picture(3, 3) };
+    assert!(encode(&torn, &EncodeOptions::default(), Format::Jpeg).is_err());
+    assert!(BitDepth::try_from(12).is_err());
+    assert_eq!(BitDepth::try_from(16).expect("known"), BitDepth::Sixteen);
+}

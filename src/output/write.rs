@@ -1,0 +1,101 @@
+//! Atomic writes: the file that was there stays until the new one is whole.
+
+use std::ffi::OsStr;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Once};
+
+use nix::errno::Errno;
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+
+use super::OutputError;
+use super::place::{self, Place, Target};
+use super::temporary::{self, Temporary};
+
+/// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At
+/// any moment, whatever ends the process, the file is the old one or the new one. Its permissions stay; a link
+/// stays and what it points to is replaced. Temporary files of killed writers in the same directory are removed.
+///
+/// Devices, pipes and open descriptors (`/dev/stdout`) are written in place.
+///
+/// # Errors
+/// Names the path, what the system said and the way out; the old file is untouched then, and no temporary file is
+/// left.
+pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    prepare_process();
+    match place::find(path)? {
+        Place::File(target) => replace(&target, bytes),
+        Place::InPlace(place) => in_place(&place, bytes),
+    }
+    .map_err(|error| OutputError::file(path, error))
+}
+
+/// Makes a file that would grow beyond `ulimit -f` an error instead of the end of the process (SIGXFSZ). [`atomic`]
+/// does it by itself; it is needed once for files written in other ways.
+pub fn prepare_process() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // Any handler will do, as the write then fails. Without one, the signal ends the process as it did before.
+        let unused = Arc::new(AtomicBool::new(false));
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, unused);
+    });
+}
+
+fn replace(target: &Target, bytes: &[u8]) -> io::Result<()> {
+    let directory = target.directory();
+    temporary::remove_stale(directory);
+    let mode = target.existing.as_ref().map_or(0o666, |existing| existing.mode() & 0o777);
+    let name = target.path.file_name().unwrap_or(OsStr::new("file"));
+    let mut new = Temporary::create(directory, name, mode)?;
+    new.file.write_all(bytes)?;
+    if let Some(existing) = &target.existing {
+        keep_owner(&new.file, existing);
+        new.file.set_permissions(fs::Permissions::from_mode(existing.mode() & 0o7777))?;
+    }
+    new.file.sync_all()?;
+    new.rename_to(&target.path)?;
+    sync_directory(directory)
+}
+
+/// As far as this process may: root writes other people's files.
+fn keep_owner(file: &File, existing: &fs::Metadata) {
+    let same = |new: fs::Metadata| (new.uid(), new.gid()) == (existing.uid(), existing.gid());
+    if !file.metadata().is_ok_and(same) {
+        let _ = std::os::unix::fs::fchown(file, Some(existing.uid()), Some(existing.gid()));
+    }
+}
+
+/// So that the rename survives a loss of power. File systems and directories that do not let themselves be synchronised are
+/// left alone: the file is there.
+fn sync_directory(directory: &Path) -> io::Result<()> {
+    use ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
+    match File::open(directory).and_then(|directory| directory.sync_all()) {
+        Err(error) if !matches!(error.kind(), InvalidInput | PermissionDenied | Unsupported) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Appends, so that a descriptor that is a file keeps what it has.
+fn in_place(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut options = OpenOptions::new();
+    options.append(true);
+    // A pipe that nobody reads would hold the process for ever: not waiting makes that an error.
+    let is_pipe = fs::metadata(path)?.file_type().is_fifo();
+    if is_pipe {
+        options.custom_flags(OFlag::O_NONBLOCK.bits());
+    }
+    let mut file = options.open(path).map_err(|error| match error.raw_os_error() {
+        Some(number) if is_pipe && number == Errno::ENXIO as i32 => {
+            io::Error::new(ErrorKind::NotConnected, "nobody reads this pipe")
+        }
+        _ => error,
+    })?;
+    if is_pipe {
+        fcntl(&file, FcntlArg::F_SETFL(OFlag::O_APPEND))?;
+    }
+    file.write_all(bytes)?;
+    file.flush()
+}

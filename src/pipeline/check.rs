@@ -1,0 +1,73 @@
+//! Reading and validating everything that a scene names, without rendering.
+
+use std::path::Path;
+use std::sync::mpsc;
+
+use super::engine::Engine;
+use super::protocol::{Failure, PreviewSlot};
+use super::sink::Sink;
+use super::stages::parse::Parsed;
+use super::trace::Kernel;
+use crate::scene::description::{Encoding, Shape};
+use crate::scene::diagnostic::Diagnostic;
+use crate::world::{NeededTexture, SourceEncoding, TextureSource};
+
+/// What a scene that is right consists of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checked {
+    /// Shapes of any kind; a mesh instance counts as one.
+    pub objects: u64,
+    /// Triangles over all mesh instances and single triangles.
+    pub triangles: u64,
+    /// Image files read, each reading of its numbers counted.
+    pub textures: u64,
+    /// Lights without extent.
+    pub point_lights: u64,
+    /// What is probably not meant.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// Check a scene with all files that it names, used or not.
+///
+/// # Errors
+/// All errors and warnings of the scene and its files.
+pub fn check(path: &Path) -> Result<Checked, Failure> {
+    let (events, _) = mpsc::channel();
+    let sink = Sink { generation: 0, events, previews: PreviewSlot::default() };
+    let kernel: Kernel = super::worker::KERNEL;
+    let (parsed, meshes, textures, warnings) = Engine::new(kernel).read_all(path, &sink, add_declared)?;
+    let scene = &parsed.loaded.scene;
+    let triangles = |shape: &Shape| match shape {
+        Shape::Mesh { file, .. } => meshes[*file].mesh.mesh.triangles.len() as u64,
+        Shape::Triangle { .. } => 1,
+        _ => 0,
+    };
+    Ok(Checked {
+        objects: scene.objects.len() as u64,
+        triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
+        textures: textures.texels.len() as u64,
+        point_lights: scene.lights.len() as u64,
+        warnings,
+    })
+}
+
+/// The textures of the scene file that no visible material names.
+fn add_declared(parsed: &Parsed, wanted: &mut Vec<NeededTexture>) {
+    for (index, texture) in parsed.loaded.scene.textures.iter().enumerate() {
+        if wanted.iter().any(|one| one.source.path == texture.file.value) {
+            continue;
+        }
+        let encoding = match texture.encoding {
+            Encoding::Auto => SourceEncoding::Color,
+            Encoding::Srgb => SourceEncoding::Srgb,
+            Encoding::Linear => SourceEncoding::Linear,
+        };
+        let source = TextureSource { path: texture.file.value.clone(), encoding };
+        wanted.push(NeededTexture {
+            source,
+            name: texture.name.clone(),
+            declared: Some(index),
+            mesh_file: None,
+        });
+    }
+}

@@ -1,0 +1,75 @@
+//! The report of a finished request.
+
+use std::path::{Path, PathBuf};
+
+use super::plan::Plan;
+use super::protocol::{Counters, ImageReport, Report, SampleCounts, StageReport};
+use super::stages::render::Canvas;
+use crate::integrators::RayCounters;
+use crate::world::World;
+
+/// What a request came to.
+pub(super) struct Outcome<'a> {
+    pub(super) scene: &'a Path,
+    pub(super) plan: &'a Plan,
+    pub(super) world: &'a World,
+    pub(super) canvas: &'a Canvas,
+    pub(super) rays: RayCounters,
+    pub(super) texels_loaded: u64,
+    pub(super) is_written: bool,
+}
+
+pub(super) fn report(outcome: &Outcome<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
+    Report {
+        glimt: env!("CARGO_PKG_VERSION"),
+        scene: outcome.scene.to_string_lossy().into_owned(),
+        image: image(outcome),
+        settings: outcome.plan.effective.clone(),
+        stages,
+        counters: counters(outcome),
+        seconds,
+        peak_memory_bytes: peak_memory_bytes(),
+    }
+}
+
+fn image(outcome: &Outcome<'_>) -> ImageReport {
+    let plan = outcome.plan;
+    let samples = outcome.canvas.film.samples();
+    let outputs: &[PathBuf] = if outcome.is_written { &plan.outputs } else { &[] };
+    let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
+    ImageReport {
+        path: paths.first().cloned(),
+        paths,
+        width: plan.settings.width,
+        height: plan.settings.height,
+        samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
+        complete: outcome.canvas.is_complete(plan.samples),
+    }
+}
+
+fn counters(outcome: &Outcome<'_>) -> Counters {
+    let (world, rays) = (outcome.world, outcome.rays);
+    Counters {
+        triangles: world.triangle_count(),
+        objects: world.object_count(),
+        camera_rays: rays.camera_rays,
+        shadow_rays: rays.shadow_rays,
+        reflected_rays: rays.reflected_rays,
+        refracted_rays: rays.refracted_rays,
+        photons_emitted: 0,
+        photons_stored: 0,
+        texels_loaded: outcome.texels_loaded,
+        texture_lookups: rays.texture_lookups,
+        non_finite_samples: outcome.canvas.film.non_finite_samples(),
+        accel_memory_bytes: world.accel_memory_bytes() as u64,
+    }
+}
+
+/// Highest resident memory of the process so far; 0 where it cannot be told.
+fn peak_memory_bytes() -> u64 {
+    use nix::sys::resource::{UsageWho, getrusage};
+    // Bytes on macOS, kibibytes elsewhere (getrusage(2)).
+    let unit = if cfg!(target_os = "macos") { 1 } else { 1024 };
+    let highest = getrusage(UsageWho::RUSAGE_SELF).map_or(0, |usage| usage.max_rss());
+    u64::try_from(highest).unwrap_or(0) * unit
+}

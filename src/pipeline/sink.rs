@@ -1,0 +1,99 @@
+//! Where a request's events go: every one carries its generation.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, PoisonError};
+
+use super::protocol::{AssetProgress, Event, LatestPreview, PreviewSlot, RenderProgress, StageReport};
+use super::watch::content::FileRead;
+use crate::film::Picture;
+
+/// Sends the events of one request. A front end that is gone is no error.
+#[derive(Clone, Debug)]
+pub(super) struct Sink {
+    pub(super) generation: u64,
+    pub(super) events: Sender<Event>,
+    pub(super) previews: PreviewSlot,
+}
+
+impl Sink {
+    pub(super) fn send(&self, event: Event) {
+        let _ = self.events.send(event);
+    }
+
+    pub(super) fn stage(&self, stage: StageReport) {
+        self.send(Event::Stage { generation: self.generation, stage });
+    }
+
+    pub(super) fn progress(&self, progress: RenderProgress) {
+        self.send(Event::Progress { generation: self.generation, progress });
+    }
+
+    pub(super) fn files(&self, files: Vec<FileRead>) {
+        self.send(Event::Files { generation: self.generation, files });
+    }
+
+    pub(super) fn written(&self, path: &Path, bytes: u64) {
+        self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes });
+    }
+
+    pub(super) fn preview(&self, picture: Picture) {
+        let latest = LatestPreview { generation: self.generation, picture: Arc::new(picture) };
+        *self.previews.lock().unwrap_or_else(PoisonError::into_inner) = Some(latest);
+        self.send(Event::Preview { generation: self.generation });
+    }
+
+    /// Watch the loading of one asset: `load` gets the progress sink to report to; its end is said whatever
+    /// `load` reports.
+    pub(super) fn asset<T>(&self, name: &str, load: impl FnOnce(&(dyn Fn(u64, u64) + Sync)) -> T) -> T {
+        let shown = AtomicU64::new(0);
+        let say = |done, total| {
+            let progress = AssetProgress { name: name.to_owned(), done, total };
+            self.send(Event::Asset { generation: self.generation, progress });
+        };
+        say(0, PARTS);
+        let result = load(&|done: u64, total: u64| {
+            let part = u128::from(done.min(total)) * u128::from(PARTS) / u128::from(total.max(1));
+            let part = part as u64;
+            if part < PARTS && shown.fetch_max(part, Ordering::Relaxed) < part {
+                say(part, PARTS);
+            }
+        });
+        say(PARTS, PARTS);
+        result
+    }
+}
+
+/// Steps of an asset's bar: no more events than that.
+const PARTS: u64 = 100;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc;
+
+    #[test]
+    fn an_asset_is_said_at_most_a_hundred_times_and_ends() {
+        let (events, received) = mpsc::channel();
+        let sink = Sink { generation: 3, events, previews: PreviewSlot::default() };
+        sink.asset("bricks", |progress| {
+            for done in 0..10_000 {
+                progress(done, 10_000);
+            }
+        });
+        drop(sink);
+        let seen: Vec<(u64, u64)> = received
+            .into_iter()
+            .map(|event| match event {
+                Event::Asset { generation: 3, progress } if progress.name == "bricks" => {
+                    (progress.done, progress.total)
+                }
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert_eq!(seen.len(), 101);
+        assert!(seen.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        assert_eq!(seen.last(), Some(&(100, 100)));
+    }
+}

@@ -1,0 +1,205 @@
+//! What the later stages read of a scene. Places in the file and names are not among it, so that comments, order of
+//! keys and unused tables change nothing.
+
+use super::super::fingerprint::{Fingerprint, Key};
+use crate::film::Rect;
+use crate::integrators::RenderSettings;
+use crate::math::DVec3;
+use crate::scene::description::{Camera, ColorSource, MaterialKind, Scene, Shape};
+
+/// What trees are built over.
+pub(in crate::pipeline) fn geometry(scene: &Scene, meshes: &[Key]) -> Key {
+    let mut key = Fingerprint::new("geometry");
+    for object in &scene.objects {
+        shape(&mut key, &object.shape, meshes);
+    }
+    key.finish()
+}
+
+/// What gives light, and where it is.
+pub(in crate::pipeline) fn lights(scene: &Scene, meshes: &[Key]) -> Key {
+    let mut key = Fingerprint::new("lights");
+    for light in &scene.lights {
+        key.dvec3(light.position).vec3(light.intensity).index(light.falloff as usize);
+    }
+    for object in &scene.objects {
+        match object.material.map(|index| &scene.materials[index].kind) {
+            Some(MaterialKind::Phong { emission, .. }) if emission.max_element() > 0.0 => {
+                shape(&mut key, &object.shape, meshes);
+                key.vec3(*emission);
+            }
+            Some(_) => {}
+            // The file's own materials may emit.
+            None => shape(&mut key, &object.shape, meshes),
+        }
+    }
+    key.finish()
+}
+
+/// Everything that a world is made of.
+pub(in crate::pipeline) fn world(
+    scene: &Scene,
+    meshes: &[Key],
+    textures: &[Key],
+    orbiter: Option<&str>,
+) -> Key {
+    let mut key = Fingerprint::new("world");
+    key.key(&geometry(scene, meshes)).key(&lights(scene, meshes));
+    for object in &scene.objects {
+        match object.material {
+            Some(index) => material(&mut key, &scene.materials[index].kind, scene),
+            None => {
+                key.text("own");
+            }
+        }
+    }
+    for texture in textures {
+        key.key(texture);
+    }
+    camera(&mut key, &scene.camera, orbiter);
+    let render = &scene.render;
+    key.vec3(render.ambient).vec3(render.background).index(render.accel as usize);
+    key.u64(render.width.into()).u64(render.height.into());
+    key.finish()
+}
+
+/// Everything that a film's sums depend on, apart from the number of samples.
+pub(in crate::pipeline) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
+    let mut key = Fingerprint::new("render");
+    key.key(&world).u64(settings.width.into()).u64(settings.height.into()).u64(settings.max_depth.into());
+    key.index(settings.shadows as usize).u64(settings.shadow_samples.into()).index(settings.filter as usize);
+    key.index(settings.dof.into()).u64(settings.seed.into()).index(settings.view as usize);
+    if let Some(rect) = crop {
+        key.u64(rect.x.into()).u64(rect.y.into()).u64(rect.width.into()).u64(rect.height.into());
+    }
+    key.finish()
+}
+
+fn shape(key: &mut Fingerprint, shape: &Shape, meshes: &[Key]) {
+    let mut numbers = |number: usize, vectors: &[DVec3], scalar: f64| {
+        key.index(number).f64(scalar);
+        for vector in vectors {
+            key.dvec3(*vector);
+        }
+    };
+    match shape {
+        Shape::Sphere { center, radius } => numbers(0, &[*center], *radius),
+        Shape::Quad { corner, u, v } => numbers(1, &[*corner, *u, *v], 0.0),
+        Shape::Plane { point, normal } => numbers(2, &[*point, *normal], 0.0),
+        Shape::Box { center, size, rotate } => numbers(3, &[*center, *size, *rotate], 0.0),
+        Shape::Triangle { a, b, c } => numbers(4, &[*a, *b, *c], 0.0),
+        Shape::Mesh { file, scale, rotate, translate, smooth } => {
+            numbers(5, &[*scale, *rotate, *translate], f64::from(u8::from(*smooth)));
+            key.key(&meshes[*file]);
+        }
+    }
+}
+
+fn material(key: &mut Fingerprint, kind: &MaterialKind, scene: &Scene) {
+    match kind {
+        MaterialKind::Phong { diffuse, specular, shininess, ambient, emission, normal_map } => {
+            key.index(0).f32(*shininess).vec3(*emission);
+            color(key, diffuse, scene);
+            color(key, specular, scene);
+            key.index(ambient.is_some().into());
+            if let Some(source) = ambient {
+                color(key, source, scene);
+            }
+            key.index(normal_map.is_some().into());
+            if let Some((index, strength)) = normal_map {
+                key.f32(*strength);
+                texture(key, *index, scene);
+            }
+        }
+        MaterialKind::Mirror { reflectance } => {
+            key.index(1).vec3(*reflectance);
+        }
+        MaterialKind::Glass { ior, tint } => {
+            key.index(2).f32(*ior).vec3(*tint);
+        }
+    }
+}
+
+fn color(key: &mut Fingerprint, source: &ColorSource, scene: &Scene) {
+    match source {
+        ColorSource::Constant(value) => {
+            key.index(0).vec3(*value);
+        }
+        ColorSource::Texture(index) => {
+            key.index(1);
+            texture(key, *index, scene);
+        }
+    }
+}
+
+/// How a texture is looked up; its texels have keys of their own.
+fn texture(key: &mut Fingerprint, index: usize, scene: &Scene) {
+    let texture = &scene.textures[index];
+    key.path(&texture.file.value).index(texture.filter as usize).index(texture.wrap as usize);
+    key.f32(texture.repeat.x).f32(texture.repeat.y).index(texture.encoding as usize);
+}
+
+fn camera(key: &mut Fingerprint, camera: &Camera, orbiter: Option<&str>) {
+    match camera {
+        Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
+            key.index(0).dvec3(*position).dvec3(*look_at).dvec3(*up).f64(*fov).f64(*aperture).f64(*focus);
+        }
+        Camera::Orbiter { file: _, fov, aperture, focus } => {
+            // 0 is no valid angle and no valid distance.
+            key.index(1).f64(*aperture).f64(fov.unwrap_or(0.0)).f64(focus.unwrap_or(0.0));
+            key.text(orbiter.unwrap_or(""));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::tests::scene_of;
+
+    const BALL: &str = "[materials.m]\ntype = \"phong\"\ndiffuse = [1, 0, 0]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
+
+    fn keys(text: &str) -> (Key, Key, Key) {
+        let scene = scene_of(text);
+        (geometry(&scene, &[]), lights(&scene, &[]), world(&scene, &[], &[], None))
+    }
+
+    #[test]
+    fn comments_and_unused_tables_change_no_key() {
+        assert_eq!(keys(BALL), keys(&format!("# hello\n[materials.a]\ntype = \"phong\"\n{BALL}")));
+    }
+
+    #[test]
+    fn a_colour_changes_the_world_but_no_tree() {
+        let (before, after) = (keys(BALL), keys(&BALL.replace("[1, 0, 0]", "[0, 1, 0]")));
+        assert_eq!((before.0, before.1), (after.0, after.1));
+        assert_ne!(before.2, after.2);
+    }
+
+    #[test]
+    fn an_emission_changes_the_lights_and_a_place_the_trees() {
+        let lit = keys(&BALL.replace("diffuse", "emission"));
+        assert_eq!(lit.0, keys(BALL).0);
+        assert_ne!(lit.1, keys(BALL).1);
+        assert_ne!(keys(&BALL.replace("center = [0", "center = [1")).0, keys(BALL).0);
+    }
+
+    #[test]
+    fn every_setting_of_a_render_is_part_of_its_key() {
+        let scene = scene_of(BALL);
+        let plan = crate::pipeline::plan::plan(scene, std::path::Path::new("a.toml"), &Default::default());
+        let settings = plan.expect("a plan").settings;
+        let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
+        let others = [
+            RenderSettings { max_depth: 77, ..settings },
+            RenderSettings { seed: 77, ..settings },
+            RenderSettings { dof: true, ..settings },
+            RenderSettings { width: 77, ..settings },
+            RenderSettings { shadow_samples: 77, ..settings },
+            RenderSettings { view: crate::integrators::View::Uv, ..settings },
+        ];
+        assert!(others.iter().all(|other| of(other) != of(&settings)));
+        let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
+        assert_ne!(render(Fingerprint::new("w").finish(), &settings, Some(crop)), of(&settings));
+    }
+}

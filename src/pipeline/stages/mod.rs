@@ -1,0 +1,129 @@
+//! The stages, one file each: a function of its inputs and of what is kept from before.
+
+pub(super) mod accel;
+pub(super) mod keys;
+pub(super) mod lights;
+pub(super) mod meshes;
+pub(super) mod parse;
+pub(super) mod photons;
+pub(super) mod render;
+pub(super) mod textures;
+pub(super) mod write;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::ThreadPool;
+
+use super::protocol::{Failure, Status};
+use super::sink::Sink;
+use super::watch::content::{Contents, FileRead};
+use crate::assets::AssetError;
+use crate::control::{CancelToken, Cancelled};
+use crate::scene::Loaded;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+
+/// Why a request went no further.
+#[derive(Debug)]
+pub(super) enum Stop {
+    Cancelled,
+    Failed(Failure),
+}
+
+impl From<Cancelled> for Stop {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}
+
+impl Stop {
+    #[allow(clippy::needless_pass_by_value, reason = "it is handed to `map_err`")]
+    pub(super) fn work(message: impl ToString) -> Self {
+        Self::Failed(Failure::Work(message.to_string()))
+    }
+}
+
+/// What a stage made, and how.
+#[derive(Debug)]
+pub(super) struct Staged<T> {
+    pub(super) value: T,
+    pub(super) status: Status,
+    pub(super) why: String,
+}
+
+impl<T> Staged<T> {
+    pub(super) fn done(value: T, why: impl Into<String>) -> Self {
+        Self { value, status: Status::Done, why: why.into() }
+    }
+
+    pub(super) fn reused(value: T, why: impl Into<String>) -> Self {
+        Self { value, status: Status::Reused, why: why.into() }
+    }
+
+    pub(super) fn skipped(value: T, why: impl Into<String>) -> Self {
+        Self { value, status: Status::Skipped, why: why.into() }
+    }
+}
+
+/// What stages that read files share.
+pub(super) struct Reading<'a> {
+    pub(super) sink: &'a Sink,
+    pub(super) token: &'a CancelToken,
+    pub(super) contents: &'a Contents,
+    pub(super) pool: &'a ThreadPool,
+}
+
+/// What a request found out about files on its way.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    /// Everything that was read or tried.
+    pub(super) files: Vec<FileRead>,
+    pub(super) errors: Vec<Diagnostic>,
+    pub(super) warnings: Vec<Diagnostic>,
+}
+
+impl Findings {
+    pub(super) fn read(&mut self, file: FileRead) {
+        if !self.files.contains(&file) {
+            self.files.push(file);
+        }
+    }
+
+    /// An asset could not be used; the error stands where the scene names it.
+    pub(super) fn asset_error(&mut self, loaded: &Loaded, span: Range<usize>, error: &AssetError) {
+        self.errors.push(at(loaded, span, Severity::Error, error.to_string()));
+    }
+
+    pub(super) fn warn(&mut self, loaded: &Loaded, span: Range<usize>, message: String) {
+        self.warnings.push(at(loaded, span, Severity::Warning, message));
+    }
+
+    /// All errors and warnings, errors first.
+    pub(super) fn take_failure(&mut self) -> Failure {
+        let mut all = std::mem::take(&mut self.errors);
+        all.append(&mut self.warnings);
+        Failure::Scene(all)
+    }
+}
+
+/// A diagnostic at a place of the scene file.
+fn at(loaded: &Loaded, span: Range<usize>, severity: Severity, message: String) -> Diagnostic {
+    loaded.diagnostic_at(span, severity, message, None)
+}
+
+/// One asset, as a parallel load gives it back.
+pub(super) struct Asset<T> {
+    /// The file first, then those that it names.
+    pub(super) files: Vec<FileRead>,
+    /// The value and whether it was kept from before.
+    pub(super) result: Result<(Arc<T>, bool), AssetError>,
+}
+
+/// The words for how many of some assets were loaded and how many kept.
+pub(super) fn loaded_and_kept<T>(value: T, loaded: usize, kept: usize) -> Staged<T> {
+    match (loaded, kept) {
+        (0, _) => Staged::reused(value, "the files did not change"),
+        (_, 0) => Staged::done(value, format!("{loaded} loaded")),
+        _ => Staged::done(value, format!("{loaded} loaded, {kept} kept")),
+    }
+}

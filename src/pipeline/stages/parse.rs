@@ -1,0 +1,81 @@
+//! The scene file, and the orbiter file that holds its camera.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::super::cache::Memo;
+use super::super::fingerprint::Fingerprint;
+use super::super::protocol::Failure;
+use super::super::watch::content::{Content, Contents, FileRead};
+use super::{Findings, Staged, Stop};
+use crate::assets::OrbiterCamera;
+use crate::assets::orbiter::load as load_orbiter;
+use crate::control::CancelToken;
+use crate::scene;
+use crate::scene::description::Camera;
+
+/// A scene that was understood.
+#[derive(Debug)]
+pub(in crate::pipeline) struct Parsed {
+    pub(in crate::pipeline) loaded: scene::Loaded,
+    pub(in crate::pipeline) orbiter: Option<OrbiterCamera>,
+    orbiter_content: Option<Content>,
+}
+
+/// Read and validate the scene.
+///
+/// # Errors
+/// All errors of the scene file.
+pub(in crate::pipeline) fn parse(
+    path: &Path,
+    contents: &Contents,
+    memo: &mut Memo<Arc<Parsed>>,
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<Staged<Arc<Parsed>>, Stop> {
+    let content = contents.read(path, token)?;
+    findings.read(FileRead { path: path.to_owned(), content });
+    let mut key = Fingerprint::new("parse");
+    let key = key.path(path).content(content).finish();
+    let known = memo.get(key).cloned();
+    let loaded = match &known {
+        Some(parsed) => parsed.loaded.clone(),
+        None => scene::load(path).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?,
+    };
+    let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
+    findings.warnings.extend(loaded.warnings.iter().cloned());
+    if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
+        return Ok(Staged::reused(parsed, "the file did not change"));
+    }
+    let parsed = Arc::new(Parsed { loaded, orbiter, orbiter_content });
+    // A camera that could not be read is tried again by the next request.
+    if parsed.orbiter.is_some() == orbiter_content.is_some() {
+        memo.set(key, parsed.clone());
+    }
+    Ok(Staged::done(parsed, ""))
+}
+
+type Orbiter = (Option<OrbiterCamera>, Option<Content>);
+
+/// The orbiter file of a camera that has one; its errors go to the findings.
+fn orbiter(
+    loaded: &scene::Loaded,
+    known: Option<&Parsed>,
+    contents: &Contents,
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<Orbiter, Stop> {
+    let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
+    let content = contents.read(&file.value, token)?;
+    findings.read(FileRead { path: file.value.clone(), content });
+    if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
+        return Ok((parsed.orbiter, Some(content)));
+    }
+    match load_orbiter(&file.value) {
+        Ok(camera) => Ok((Some(camera), Some(content))),
+        Err(error) => {
+            findings.asset_error(loaded, file.span.clone(), &error);
+            Ok((None, Some(content)))
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Encoding and writing pictures, each only when it would differ from what was written.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use super::super::fingerprint::{Fingerprint, Key};
+use super::super::plan::Plan;
+use super::super::sink::Sink;
+use super::super::watch::content::{Content, Contents};
+use super::render::Canvas;
+use super::{Staged, Stop};
+use crate::control::CancelToken;
+use crate::film::RadianceImage;
+use crate::film::SampleStats;
+use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
+
+/// What was written where, and what the file held then.
+#[derive(Debug, Default)]
+pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
+
+/// Look at all targets before work is put into a picture for them.
+///
+/// # Errors
+/// The first that cannot be written.
+pub(in crate::pipeline) fn check_targets(plan: &Plan) -> Result<(), Stop> {
+    let check = |path: &PathBuf| {
+        let format = output::check_target(path)?;
+        format.check_picture(plan.settings.width, plan.settings.height, BitDepth::try_from(plan.bit_depth)?)
+    };
+    plan.outputs.iter().try_for_each(check).map_err(|error: OutputError| Stop::work(error))
+}
+
+/// Write the film as it is to every output that does not hold it already. All outputs are tried.
+///
+/// # Errors
+/// What went wrong, a line each.
+pub(in crate::pipeline) fn write(
+    canvas: &Canvas,
+    plan: &Plan,
+    written: &mut Written,
+    contents: &Contents,
+    sink: &Sink,
+) -> Result<Staged<()>, String> {
+    let mut radiance: Option<RadianceImage> = None;
+    let (mut count, mut errors) = (0, Vec::new());
+    for path in &plan.outputs {
+        let key = key(canvas, plan, path);
+        if let Some((known, content)) = written.0.get(path)
+            && *known == key
+            && now(contents, path) == *content
+        {
+            continue;
+        }
+        let image = radiance.get_or_insert_with(|| canvas.film.radiance());
+        match write_one(image, canvas, plan, path) {
+            Ok(bytes) => {
+                count += 1;
+                written.0.insert(path.clone(), (key, now(contents, path)));
+                sink.written(path, bytes);
+            }
+            Err(error) => errors.push(error.to_string()),
+        }
+    }
+    written.0.retain(|path, _| plan.outputs.contains(path));
+    match (errors.is_empty(), count) {
+        (false, _) => Err(errors.join("\n")),
+        (true, 0) => Ok(Staged::reused((), "the picture is on disk")),
+        (true, 1) => Ok(Staged::done((), "")),
+        (true, _) => Ok(Staged::done((), format!("{count} files"))),
+    }
+}
+
+fn write_one(image: &RadianceImage, canvas: &Canvas, plan: &Plan, path: &Path) -> Result<u64, OutputError> {
+    let options = EncodeOptions {
+        tone: plan.tone,
+        bit_depth: BitDepth::try_from(plan.bit_depth)?,
+        metadata: metadata(canvas, plan),
+    };
+    let bytes = output::encode(image, &options, Format::of(path)?)?;
+    output::write::atomic(path, &bytes)?;
+    Ok(bytes.len() as u64)
+}
+
+/// What a picture says of itself: enough to make it again.
+fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
+    let settings = &plan.effective;
+    let SampleStats { min, mean, max } = canvas.film.samples();
+    let samples = if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
+    let pairs = [
+        ("glimt:scene", plan.name.clone()),
+        ("glimt:samples", samples),
+        ("glimt:integrator", settings.integrator.to_owned()),
+        ("glimt:shadows", settings.shadows.to_owned()),
+        ("glimt:max_depth", plan.settings.max_depth.to_string()),
+        ("glimt:dof", settings.dof.to_string()),
+        ("glimt:view", settings.view.to_owned()),
+        ("glimt:seed", settings.seed.to_string()),
+        ("glimt:exposure", plan.tone.exposure_stops.to_string()),
+    ];
+    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
+    let SampleStats { min, mean, max } = canvas.film.samples();
+    let mut key = Fingerprint::new("write");
+    key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());
+    key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize).u64(plan.bit_depth.into());
+    key.path(path).finish()
+}
+
+fn now(contents: &Contents, path: &Path) -> Content {
+    // A token that nobody cancels: what is being looked at was just written.
+    contents.read(path, &CancelToken::new()).unwrap_or(Content::Unusable)
+}

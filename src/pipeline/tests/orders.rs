@@ -1,0 +1,196 @@
+//! Cancelling, holding, writing, failing.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::*;
+use crate::control::{CancelToken, Cancelled};
+use crate::film::{Rect, TileSamples};
+use crate::integrators::{RayCounters, RenderSettings};
+use crate::world::World;
+
+/// As the real one, and slowly: a tile takes until it is told to stop.
+fn endless(
+    _: &World,
+    _: &RenderSettings,
+    _: Rect,
+    _: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    loop {
+        token.check()?;
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn cancel_stops_a_render() {
+    let mut bench = Bench::with(SCENE, endless);
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Cancel);
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { .. })));
+    assert!(!bench.path("out.ppm").exists());
+}
+
+#[test]
+fn a_held_render_can_be_cancelled() {
+    let mut bench = Bench::with(SCENE, endless);
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Pause(true));
+    bench.worker.send(Command::Cancel);
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { .. })));
+}
+
+#[test]
+fn the_newest_request_wins_and_every_other_one_is_said_to_be_cancelled() {
+    let mut bench = Bench::with(SCENE, endless);
+    let ends: Vec<u64> = (0..4).map(|_| bench.send()).collect();
+    bench.worker.send(Command::Cancel);
+    let mut cancelled = Vec::new();
+    while cancelled.len() < ends.len() {
+        if let Event::Cancelled { generation } = bench.next() {
+            cancelled.push(generation);
+        }
+    }
+    cancelled.sort_unstable();
+    assert_eq!(cancelled, ends);
+}
+
+#[test]
+fn an_older_request_that_comes_late_is_dropped() {
+    let mut bench = Bench::new(SCENE);
+    bench.generation = 10;
+    bench.done();
+    bench.generation = 3;
+    let of = bench.send();
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { generation: 4 })));
+}
+
+static BREAKS: AtomicBool = AtomicBool::new(true);
+
+fn breaks_once(
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    assert!(!BREAKS.swap(false, Ordering::SeqCst), "a tile broke");
+    KERNEL(world, settings, tile, samples, token)
+}
+
+#[test]
+fn the_worker_survives_a_panic() {
+    let mut bench = Bench::with(SCENE, breaks_once);
+    let Failure::Work(message) = bench.failed() else { panic!("a failure of the work") };
+    assert!(message.contains("internal error"), "{message}");
+    assert!(bench.done().0.image.complete);
+}
+
+#[test]
+fn a_film_that_does_not_fit_is_an_error() {
+    let mut bench =
+        Bench::new(&SCENE.replace("width = 40", "width = 32768").replace("height = 30", "height = 32768"));
+    // 2³⁰ pixels need 28 GiB; a machine that may have them is let off.
+    bench.overrides.time_seconds = Some(0.01);
+    bench.overrides.outputs = vec![bench.path("out.png")];
+    if let Some(available) = available_memory_bytes()
+        && available < 26 << 30
+    {
+        assert!(matches!(bench.failed(), Failure::Work(_)));
+        bench.edit("32768", "16");
+        bench.overrides = Overrides { outputs: vec![bench.path("out.ppm")], ..Default::default() };
+        bench.done();
+    }
+}
+
+fn available_memory_bytes() -> Option<u64> {
+    let text = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? << 10)
+}
+
+#[test]
+fn previews_fit_their_bounds_and_a_new_size_renders_nothing() {
+    let mut bench = Bench::new(SCENE);
+    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    let generation = bench.send();
+    assert!(bench.until_end(generation).iter().any(|event| matches!(event, Event::Preview { .. })));
+    let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
+    assert_eq!((latest.generation, latest.picture.width, latest.picture.height), (generation, 12, 9));
+    bench.preview = Some(PreviewSize { width: 20, height: 30 });
+    assert_statuses(&bench.done().0, "rrrrsrr");
+    let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
+    assert_eq!((latest.picture.width, latest.picture.height), (20, 15));
+}
+
+/// Slow enough that orders arrive during the render.
+fn slow(
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    std::thread::sleep(Duration::from_millis(2));
+    KERNEL(world, settings, tile, samples, token)
+}
+
+#[test]
+fn write_during_a_render_writes_what_there_is() {
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::Written { .. }) {}
+    assert!(!bench.picture().is_empty());
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+    // The film stays, and can be written again.
+    fs::remove_file(bench.path("out.ppm")).expect("removed");
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::Written { .. }) {}
+}
+
+#[test]
+fn write_without_a_picture_says_so() {
+    let bench = Bench::new(SCENE);
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::WriteFailed { .. }));
+}
+
+#[test]
+fn time_ends_a_render_and_the_counts_say_so() {
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    bench.overrides.time_seconds = Some(0.3);
+    let begin = Instant::now();
+    let (report, _) = bench.done();
+    assert!(begin.elapsed() < Duration::from_secs(30));
+    assert!(!report.image.complete);
+    assert!(report.image.samples.max < 1_000_000 && report.image.samples.max > 0);
+    assert!(bench.path("out.ppm").exists());
+    let (again, unchanged) = bench.done();
+    assert_eq!(again.stages[Stage::Render as usize].status, Status::Reused);
+    assert!(unchanged);
+}
+
+#[test]
+fn a_target_that_cannot_be_written_fails_before_the_render() {
+    let mut bench = Bench::with(SCENE, endless);
+    bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
+    assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("nowhere")));
+}
+
+#[test]
+fn a_crop_outside_the_picture_is_a_wrong_call() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.crop = Some(Rect { x: 39, y: 0, width: 2, height: 1 });
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+    bench.overrides.crop = Some(Rect { x: 38, y: 3, width: 2, height: 5 });
+    let report = bench.done().0;
+    assert_eq!(report.counters.camera_rays, 2 * 5 * 4);
+    assert!(report.image.complete);
+}

@@ -1,0 +1,187 @@
+//! What each edit redoes, and what is said of files.
+
+use super::*;
+
+#[test]
+fn each_edit_redoes_only_what_reads_it() {
+    let mut bench = Bench::new(SCENE);
+    assert_statuses(&bench.done().0, "ddddsdd");
+
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "rrrrsrr");
+    assert!(unchanged, "the same file again");
+
+    bench.edit("[camera]", "# a comment\n[camera]");
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "drrrsrr");
+    assert!(unchanged, "a comment");
+
+    bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "drrrsdd");
+    assert!(!unchanged, "a material");
+
+    bench.edit("position = [0, 1, 4]", "position = [0, 1, 5]");
+    assert_statuses(&bench.done().0, "drrrsdd");
+
+    bench.edit("exposure = 0.0", "exposure = 1.0");
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "drrrsrd");
+    assert!(!unchanged, "the exposure");
+
+    bench.edit("translate = [0, 0, 0]", "translate = [1, 0, 0]");
+    let report = bench.done().0;
+    assert_statuses(&report, "drrdsdd");
+    assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree is kept");
+
+    bench.write("skin.ppm", "P6\n1 1\n255\nxyz");
+    let report = bench.done().0;
+    assert_statuses(&report, "rrdrsdd");
+    assert!(report.counters.texels_loaded > 0);
+
+    bench.write("one.obj", &format!("{OBJ}f 1 3 2\n"));
+    assert_statuses(&bench.done().0, "rdrdsdd");
+}
+
+#[test]
+fn files_that_a_mesh_names_are_part_of_it() {
+    let mut bench = Bench::new(SCENE);
+    bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");
+    bench.write("one.obj", &format!("mtllib one.mtl\n{OBJ}"));
+    bench.done();
+    assert_statuses(&bench.done().0, "rrrrsrr");
+    bench.write("one.mtl", "newmtl a\nKd 0 1 0\n");
+    let report = bench.done().0;
+    assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Done);
+}
+
+#[test]
+fn a_picture_that_was_deleted_is_written_again() {
+    let mut bench = Bench::new(SCENE);
+    bench.done();
+    fs::remove_file(bench.path("out.ppm")).expect("removed");
+    assert_statuses(&bench.done().0, "rrrrsrd");
+    assert!(bench.path("out.ppm").exists());
+}
+
+#[test]
+fn a_scene_without_files_says_why_stages_are_skipped() {
+    let text = SCENE.replace("{ texture = \"skin\" }", "[1, 1, 1]");
+    let text = text.replace("[textures.skin]\nfile = \"skin.ppm\"\n", "");
+    let text = text.replace("[[mesh]]\nfile = \"one.obj\"\nmaterial = \"wall\"\ntranslate = [0, 0, 0]\n", "");
+    let report = Bench::new(&text).done().0;
+    assert_statuses(&report, "dssdsdd");
+    let why = |stage: Stage| report.stages[stage as usize].why.clone();
+    assert_eq!(why(Stage::Meshes), "the scene has no mesh");
+    assert_eq!(why(Stage::Textures), "no visible material names a texture");
+    assert_eq!(why(Stage::Photons), "the scene does not enable photons");
+}
+
+#[test]
+fn all_assets_that_cannot_be_used_are_said_and_watched_and_mending_them_helps() {
+    let mut bench = Bench::new(SCENE);
+    bench.write("one.obj", "");
+    bench.write("skin.ppm", "");
+    let of = bench.send();
+    let mut events = bench.until_end(of);
+    let Some(Event::Failed { failure: Failure::Scene(errors), .. }) = events.pop() else {
+        panic!("no failure")
+    };
+    for name in ["one.obj", "skin.ppm"] {
+        let error = errors.iter().find(|error| error.message.contains(name)).expect("an error that names it");
+        let place = error.place.as_ref().expect("a place in the scene");
+        assert!(place.source[place.span.clone()].contains(name), "the place that names the file");
+        assert_eq!(error.path, bench.path("scene.toml"));
+    }
+    let Some(Event::Files { files, .. }) = events.pop() else { panic!("no files") };
+    for name in ["scene.toml", "one.obj", "skin.ppm"] {
+        assert!(files.iter().any(|file| file.path == bench.path(name)), "{name}");
+    }
+    assert!(!bench.path("out.ppm").exists());
+    bench.write("one.obj", OBJ);
+    bench.write("skin.ppm", "P6\n1 1\n255\nabc");
+    bench.done();
+}
+
+#[test]
+fn a_broken_scene_keeps_its_assets_watched_and_loaded() {
+    let mut bench = Bench::new(SCENE);
+    bench.done();
+    let before = bench.picture();
+    bench.edit("width = 40", "width = = 40");
+    let of = bench.send();
+    let events = bench.until_end(of);
+    assert!(matches!(events.last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
+    let files = events.iter().rev().find_map(|event| match event {
+        Event::Files { files, .. } => Some(files),
+        _ => None,
+    });
+    assert!(files.expect("files").iter().any(|file| file.path == bench.path("one.obj")));
+    assert_eq!(bench.picture(), before, "the picture stays");
+    bench.edit("width = = 40", "width = 40");
+    // A scene that was not understood is no value: it is parsed again, but nothing else is done.
+    let (report, unchanged) = bench.done();
+    assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Reused);
+    assert!(unchanged);
+}
+
+#[test]
+fn a_missing_file_that_a_broken_scene_names_is_watched() {
+    let mut bench = Bench::new(&SCENE.replace("one.obj", "later.obj"));
+    let of = bench.send();
+    let files: Vec<PathBuf> = bench
+        .until_end(of)
+        .into_iter()
+        .filter_map(|event| match event {
+            Event::Files { files, .. } => Some(files),
+            _ => None,
+        })
+        .flatten()
+        .map(|file| file.path)
+        .collect();
+    assert!(files.contains(&bench.path("later.obj")), "{files:?}");
+}
+
+#[test]
+fn progress_never_falls_and_ends_at_one() {
+    let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 40"));
+    let of = bench.send();
+    let mut fractions = Vec::new();
+    for event in bench.until_end(of) {
+        if let Event::Progress { progress, .. } = event {
+            fractions.push(progress.fraction);
+            assert!(progress.total_samples == 40 && progress.samples <= 40);
+        }
+    }
+    assert_eq!(fractions.first(), Some(&0.0));
+    assert!(fractions.windows(2).all(|pair| pair[0] <= pair[1]), "{fractions:?}");
+    assert_eq!(fractions.last(), Some(&1.0));
+}
+
+#[test]
+fn threads_do_not_change_the_picture() {
+    let picture = |threads| {
+        let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 7"));
+        bench.overrides.threads = Some(threads);
+        assert_eq!(bench.done().0.settings.threads, threads);
+        bench.picture()
+    };
+    let one = picture(1);
+    assert!(one == picture(2) && one == picture(7));
+}
+
+#[test]
+fn more_samples_go_on_from_those_that_are_there_to_the_same_picture() {
+    let mut bench = Bench::new(SCENE);
+    let rays = |samples: u64| 40 * 30 * samples;
+    bench.done();
+    bench.overrides.samples = Some(9);
+    let report = bench.done().0;
+    assert_eq!(report.image.samples.min, 9);
+    assert!(report.image.complete);
+    let went_on = bench.picture();
+    bench.force = true;
+    let again = bench.done().0;
+    assert_eq!(bench.picture(), went_on);
+    assert_eq!(again.counters.camera_rays - report.counters.camera_rays, rays(4));
+}

@@ -1,0 +1,118 @@
+//! Tiles on a pool: claimed one by one in the order given, handed back to the thread that asked.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
+
+use rayon::ThreadPool;
+
+use crate::control::{CancelToken, Cancelled};
+use crate::film::{Rect, TileSamples};
+use crate::integrators::{RayCounters, RenderSettings};
+use crate::world::World;
+
+/// What renders a tile: see [`crate::integrators::render_tile`].
+pub(super) type Kernel = fn(
+    &World,
+    &RenderSettings,
+    Rect,
+    Range<u32>,
+    &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled>;
+
+/// The longest time without a tick.
+const TICK: Duration = Duration::from_millis(20);
+
+/// Everything that is the same for all tiles.
+#[derive(Clone, Copy)]
+pub(super) struct Tracer<'a> {
+    pub(super) kernel: Kernel,
+    pub(super) pool: &'a ThreadPool,
+    pub(super) world: &'a World,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) token: &'a CancelToken,
+}
+
+/// Samples of one tile that are to be made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Job {
+    pub(super) tile: usize,
+    pub(super) rect: Rect,
+    pub(super) samples: Range<u32>,
+}
+
+impl Tracer<'_> {
+    /// Do the jobs. `each` gets every result, in the order in which they end, and every now and then nothing; it
+    /// says whether to go on. Jobs that have begun are finished.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) fn run(
+        &self,
+        jobs: &[Job],
+        mut each: impl FnMut(Option<(&Job, TileSamples, RayCounters)>) -> bool,
+    ) -> Result<(), Cancelled> {
+        let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let threads = self.pool.current_num_threads();
+        // Bounded, so that results do not pile up while a preview is made.
+        let (sender, results) = mpsc::sync_channel(2 * threads);
+        let (next, stopped) = (&next, &stopped);
+        self.pool.in_place_scope(move |scope| {
+            for _ in 0..threads.min(jobs.len()) {
+                let sender = sender.clone();
+                scope.spawn(move |_| {
+                    while !stopped.load(Ordering::Relaxed)
+                        && let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed))
+                        && let Ok((samples, rays)) = (self.kernel)(
+                            self.world,
+                            self.settings,
+                            job.rect,
+                            job.samples.clone(),
+                            self.token,
+                        )
+                        && sender.send((job, samples, rays)).is_ok()
+                    {}
+                });
+            }
+            drop(sender);
+            loop {
+                let go_on = match results.recv_timeout(TICK) {
+                    Ok((job, samples, rays)) => each(Some((job, samples, rays))),
+                    Err(RecvTimeoutError::Timeout) => each(None),
+                    Err(RecvTimeoutError::Disconnected) => break,
+                };
+                stopped.fetch_or(!go_on, Ordering::Relaxed);
+            }
+        });
+        self.token.check()
+    }
+}
+
+/// Samples that every pixel has after the next pass: 1, 2, 4, … so that pictures come early, then in steps that
+/// keep a tile short.
+pub(super) fn next_pass(done: u32, total: u32) -> u32 {
+    const LONGEST: u32 = 32;
+    done.saturating_add(done.clamp(1, LONGEST)).min(total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_double_and_then_stay_short() {
+        let passes = |total| {
+            let mut ends = vec![0];
+            while let Some(&last) = ends.last()
+                && last < total
+            {
+                ends.push(next_pass(last, total));
+            }
+            ends
+        };
+        assert_eq!(passes(1), [0, 1]);
+        assert_eq!(passes(100), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
+        assert_eq!(next_pass(u32::MAX - 1, u32::MAX), u32::MAX);
+    }
+}

@@ -1,0 +1,162 @@
+//! What a file holds, cheap to ask again: a hash that is taken anew only when the file may have changed.
+
+use std::collections::HashMap;
+use std::fs::{self, File, Metadata};
+use std::io::Read;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime};
+
+use crate::control::{CancelToken, Cancelled};
+
+/// A file that a request read or tried to read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileRead {
+    /// Its name.
+    pub path: PathBuf,
+    /// What it held just before it was read.
+    pub content: Content,
+}
+
+/// What a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Content {
+    /// There is no such file.
+    Missing,
+    /// It is no regular file, or may not be read.
+    Unusable,
+    /// A regular file with this hash.
+    Hash([u8; 32]),
+}
+
+/// Younger changes than this are not told apart by every file system's time stamps.
+const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
+/// Bytes between two looks at the token.
+const CHUNK: usize = 1 << 20;
+
+/// Hashes of files, each taken once per change.
+#[derive(Debug, Default)]
+pub struct Contents {
+    known: Mutex<HashMap<PathBuf, (Stamp, Content)>>,
+}
+
+/// What changes with every change of a file, given some time between changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stamp {
+    device: u64,
+    inode: u64,
+    len: u64,
+    modified: (i64, i64),
+    changed: (i64, i64),
+}
+
+impl Stamp {
+    fn of(metadata: &Metadata) -> Self {
+        Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+            len: metadata.len(),
+            modified: (metadata.mtime(), metadata.mtime_nsec()),
+            changed: (metadata.ctime(), metadata.ctime_nsec()),
+        }
+    }
+
+    /// Whether a change after `now` is sure to show in the stamp.
+    fn is_settled(&self, now: SystemTime) -> bool {
+        let latest = self.modified.0.max(self.changed.0).max(0).unsigned_abs();
+        let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);
+        now.duration_since(latest).is_ok_and(|age| age > STAMP_RESOLUTION)
+    }
+}
+
+impl Contents {
+    /// What the file holds now.
+    ///
+    /// # Errors
+    /// [`Cancelled`], looked for once per mebibyte.
+    pub fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
+        token.check()?;
+        let now = SystemTime::now();
+        let metadata = match fs::metadata(path) {
+            Ok(metadata) => metadata,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Content::Missing),
+            Err(_) => return Ok(Content::Unusable),
+        };
+        if !metadata.is_file() {
+            return Ok(Content::Unusable);
+        }
+        let stamp = Stamp::of(&metadata);
+        let known = self.known().get(path).filter(|(known, _)| *known == stamp).map(|(_, content)| *content);
+        if let Some(content) = known {
+            return Ok(content);
+        }
+        let content = hash(path, token)?;
+        if stamp.is_settled(now) {
+            self.known().insert(path.to_owned(), (stamp, content));
+        } else {
+            self.known().remove(path);
+        }
+        Ok(content)
+    }
+
+    /// Forget all files but these.
+    pub fn retain(&self, mut keep: impl FnMut(&Path) -> bool) {
+        self.known().retain(|path, _| keep(path));
+    }
+
+    fn known(&self) -> MutexGuard<'_, HashMap<PathBuf, (Stamp, Content)>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
+    let Ok(mut file) = File::open(path) else { return Ok(Content::Unusable) };
+    let mut hasher = blake3::Hasher::new();
+    let mut buffer = vec![0; CHUNK];
+    loop {
+        token.check()?;
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok(Content::Hash(*hasher.finalize().as_bytes())),
+            Ok(count) => hasher.update(&buffer[..count]),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(_) => return Ok(Content::Unusable),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_counts_and_not_the_time_stamp() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("file");
+        let token = CancelToken::new();
+        let contents = Contents::default();
+        assert_eq!(contents.read(&path, &token), Ok(Content::Missing));
+        fs::write(&path, "a").expect("written");
+        let first = contents.read(&path, &token).expect("not cancelled");
+        fs::write(&path, "b").expect("written");
+        let second = contents.read(&path, &token).expect("not cancelled");
+        assert_ne!(first, second, "the same length within one tick of the clock");
+        fs::write(&path, "a").expect("written");
+        assert_eq!(contents.read(&path, &token), Ok(first));
+        assert_eq!(contents.read(folder.path(), &token), Ok(Content::Unusable));
+    }
+
+    #[test]
+    fn an_old_file_is_hashed_once() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("file");
+        fs::write(&path, "a").expect("written");
+        let stamp = Stamp::of(&fs::metadata(&path).expect("metadata"));
+        assert!(!stamp.is_settled(SystemTime::now()));
+        assert!(stamp.is_settled(SystemTime::now() + Duration::from_secs(4)));
+        let contents = Contents::default();
+        contents.known().insert(path.clone(), (stamp, Content::Unusable));
+        let read = contents.read(&path, &CancelToken::new());
+        assert_eq!(read, Ok(Content::Unusable), "the known answer stands while the stamp is the same");
+    }
+}

@@ -1,0 +1,90 @@
+//! `[camera]`.
+
+use super::super::description::Camera;
+use super::context::Issue;
+use super::limits::Limits;
+use super::table::Table;
+use crate::math::DVec3;
+
+const FOV_DEGREES: f64 = 40.0;
+
+/// Below this sine of the angle between them, `up` and the view count as parallel.
+const PARALLEL: f64 = 1e-6;
+
+pub(super) fn read(root: &Table<'_>) -> Option<Camera> {
+    if !root.optional("camera").is_given() {
+        let issue = Issue::error(0..0, "the scene has no [camera]")
+            .help("add a table [camera] with `position = [0, 1, 4]` and `look_at = [0, 1, 0]`, or with `orbiter = \"FILE\"`");
+        root.context.report(issue.absence());
+        return None;
+    }
+    let table = root.table("camera")?;
+    let camera = if table.optional("orbiter").is_given() { orbiter(&table) } else { look_at(&table) };
+    table.finish();
+    camera
+}
+
+fn aperture(table: &Table<'_>) -> f64 {
+    table.optional("aperture").number(Limits::AtLeast(0.0)).unwrap_or(0.0)
+}
+
+fn fov(table: &Table<'_>) -> Option<f64> {
+    table.optional("fov").number(Limits::Inside(0.0, 180.0))
+}
+
+fn look_at(table: &Table<'_>) -> Option<Camera> {
+    let position = table.required("position", "[0, 1, 4]");
+    let look_at = table.required("look_at", "[0, 1, 0]");
+    let (eye, target) = (position.vector(Limits::Any), look_at.vector(Limits::Any));
+    let up = table.optional("up");
+    let up_vector = if up.is_given() { up.vector(Limits::Any) } else { Some(DVec3::Y) };
+    let fov = fov(table).unwrap_or(FOV_DEGREES);
+    let aperture = aperture(table);
+    let focus = table.optional("focus").number(Limits::Length);
+
+    let (position, look_at) = (eye?, target?);
+    let view = look_at - position;
+    let Some(direction) = view.try_normalize() else {
+        let span = table.optional("look_at").span()?;
+        let issue = Issue::error(span, "the camera has no direction")
+            .label("the same point as `position`")
+            .help("`look_at` is the point in the middle of the picture");
+        table.context.report(issue);
+        return None;
+    };
+    let up = upright(table, direction, up_vector?)?;
+    Some(Camera::LookAt { position, look_at, up, fov, aperture, focus: focus.unwrap_or(view.length()) })
+}
+
+/// `up`, if it is a direction of its own.
+fn upright(table: &Table<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
+    let span = table.optional("up").span().or(table.optional("look_at").span())?;
+    let Some(direction) = up.try_normalize() else {
+        let issue = Issue::error(span, "`up` has no direction").label("its length is 0");
+        table.context.report(issue.help("the default is [0, 1, 0]"));
+        return None;
+    };
+    if view.cross(direction).length() < PARALLEL {
+        let given = table.optional("up").is_given();
+        let label =
+            if given { "parallel to the view" } else { "the view is parallel to the default [0, 1, 0]" };
+        let issue = Issue::error(span, "`up` must not be parallel to the view")
+            .label(label)
+            .help("for a view straight up or down, `up = [0, 0, -1]` will do");
+        table.context.report(issue);
+        return None;
+    }
+    Some(up)
+}
+
+fn orbiter(table: &Table<'_>) -> Option<Camera> {
+    let file = table.optional("orbiter").file(&[], &[]);
+    let (fov, aperture) = (fov(table), aperture(table));
+    let focus = table.optional("focus").number(Limits::Length);
+    for name in ["position", "look_at", "up"] {
+        let message = format!("`{name}` and `orbiter` exclude each other");
+        let help = "the orbiter file says where the camera is: remove one of the two";
+        table.unavailable(name, &message, Some(help));
+    }
+    Some(Camera::Orbiter { file: file?, fov, aperture, focus })
+}

@@ -1,0 +1,176 @@
+//! What all readers of one file share: its text, its place, and the list of what is wrong.
+
+use std::cell::{Cell, OnceCell, RefCell};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::super::diagnostic::{Diagnostic, Place, Severity};
+use super::super::report::LineIndex;
+
+/// A file that is being read.
+pub(super) struct Context<'a> {
+    source: Arc<str>,
+    path: &'a Path,
+    lines: OnceCell<LineIndex>,
+    issues: RefCell<Vec<Issue>>,
+    uncollected: Cell<usize>,
+}
+
+/// A diagnostic before it has its file.
+pub(super) struct Issue {
+    severity: Severity,
+    span: Range<usize>,
+    message: String,
+    label: String,
+    help: Option<String>,
+    cause: Cause,
+}
+
+/// What an issue follows from: this decides whether it is worth showing beside errors of syntax.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cause {
+    /// The TOML is broken.
+    Syntax,
+    /// What stands at the place.
+    Value,
+    /// What stands elsewhere, or nowhere: perhaps in a line that is broken.
+    Absence,
+}
+
+impl Issue {
+    /// The scene cannot be rendered because of what is at `span`.
+    pub(super) fn error(span: Range<usize>, message: impl Into<String>) -> Self {
+        let message = message.into();
+        Self {
+            severity: Severity::Error,
+            span,
+            message,
+            label: String::new(),
+            help: None,
+            cause: Cause::Value,
+        }
+    }
+
+    /// What is at `span` is probably not meant.
+    pub(super) fn warning(span: Range<usize>, message: impl Into<String>) -> Self {
+        Self { severity: Severity::Warning, cause: Cause::Absence, ..Self::error(span, message) }
+    }
+
+    /// A few words under the underline.
+    pub(super) fn label(self, label: impl Into<String>) -> Self {
+        Self { label: label.into(), ..self }
+    }
+
+    /// The way out.
+    pub(super) fn help(self, help: impl Into<String>) -> Self {
+        Self { help: Some(help.into()), ..self }
+    }
+
+    /// The way out, if there is one to offer.
+    pub(super) fn maybe_help(self, help: Option<String>) -> Self {
+        Self { help, ..self }
+    }
+
+    /// This is about something that is not there.
+    pub(super) fn absence(self) -> Self {
+        Self { cause: Cause::Absence, ..self }
+    }
+
+    /// This is about the TOML itself.
+    pub(super) fn syntax(self) -> Self {
+        Self { cause: Cause::Syntax, ..self }
+    }
+}
+
+impl<'a> Context<'a> {
+    pub(super) fn new(source: Arc<str>, path: &'a Path) -> Self {
+        Self { source, path, lines: OnceCell::new(), issues: RefCell::default(), uncollected: Cell::new(0) }
+    }
+
+    /// Adds to the list.
+    pub(super) fn report(&self, issue: Issue) {
+        self.report_with(|| issue);
+    }
+
+    /// Adds to the list; where it is too long already, the issue is counted and not made.
+    pub(super) fn report_with(&self, make: impl FnOnce() -> Issue) {
+        if self.issues.borrow().len() < MOST_COLLECTED {
+            let issue = make();
+            self.issues.borrow_mut().push(issue);
+        } else {
+            self.uncollected.set(self.uncollected.get() + 1);
+        }
+    }
+
+    pub(super) fn has_errors(&self) -> bool {
+        self.issues.borrow().iter().any(|issue| issue.severity == Severity::Error)
+    }
+
+    /// The text at a place; empty where the place is not in the text.
+    pub(super) fn text(&self, span: &Range<usize>) -> &str {
+        self.source.get(span.clone()).unwrap_or_default()
+    }
+
+    /// The line of a byte of the text, from 1.
+    pub(super) fn line(&self, offset: usize) -> usize {
+        self.lines().locate(&self.source, offset).0
+    }
+
+    /// The text of a line, counted from 1.
+    pub(super) fn line_text(&self, line: usize) -> Option<&str> {
+        let span = self.lines().span(line.checked_sub(1)?, &self.source)?;
+        self.source.get(span)
+    }
+
+    fn lines(&self) -> &LineIndex {
+        self.lines.get_or_init(|| LineIndex::new(&self.source))
+    }
+
+    /// A path in the scene, seen from the scene's folder.
+    pub(super) fn resolve(&self, file: &str) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(file)
+    }
+
+    /// Everything reported, in the order of the file. Where TOML is broken, what may only follow from that is
+    /// left out: the lines named, and what is said to be missing.
+    pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
+        let mut issues = self.issues.take();
+        if !broken_lines.is_empty() {
+            issues.retain(|issue| match issue.cause {
+                Cause::Syntax => true,
+                Cause::Absence => false,
+                Cause::Value => {
+                    let line = self.line(issue.span.start);
+                    let before = broken_lines.partition_point(|lines| lines.start <= line);
+                    !before.checked_sub(1).is_some_and(|last| broken_lines[last].contains(&line))
+                }
+            });
+        }
+        issues.sort_by_key(|issue| (issue.span.start, issue.severity == Severity::Warning));
+        let unshown = issues.len().saturating_sub(MOST_ISSUES) + self.uncollected.get();
+        issues.truncate(MOST_ISSUES);
+        if unshown > 0 {
+            let message = format!("and {unshown} more like these");
+            issues.push(Issue::error(self.source.len()..self.source.len(), message));
+        }
+        let (path, source) = (self.path, self.source);
+        issues.into_iter().map(|issue| issue.into_diagnostic(path, &source)).collect()
+    }
+}
+
+/// Nobody reads on from here.
+const MOST_ISSUES: usize = 500;
+
+/// Enough to find the first of them in the order of the file, in all files but monstrous ones.
+const MOST_COLLECTED: usize = 10_000;
+
+impl Issue {
+    fn into_diagnostic(self, path: &Path, source: &Arc<str>) -> Diagnostic {
+        let inside = source.get(self.span.clone()).is_some();
+        let span = if inside { self.span } else { 0..0 };
+        let place = Place { source: Arc::clone(source), span, label: self.label };
+        let (severity, message, help) = (self.severity, self.message, self.help);
+        Diagnostic { severity, message, path: path.to_owned(), place: Some(place), help }
+    }
+}

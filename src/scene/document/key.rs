@@ -1,0 +1,172 @@
+//! One key of a table, read as what it should be. Each reader gives nothing where the key is absent, and
+//! reports and gives nothing where it is wrong.
+
+mod color;
+mod file;
+
+use std::ops::{Range, RangeInclusive};
+
+use toml::de::DeValue;
+
+use super::super::nearest::nearest;
+use super::super::sanitize::shortened;
+use super::context::{Context, Issue};
+use super::limits::Limits;
+use super::names::Names;
+use super::table::Table;
+use super::value::{Value, found, limited, whole, wrong_type};
+use crate::math::{DVec3, Vec2};
+
+/// A key that was asked for.
+pub(super) struct Key<'a> {
+    pub(super) context: &'a Context<'a>,
+    pub(super) name: &'static str,
+    pub(super) value: Option<Value<'a>>,
+    key_span: Option<Range<usize>>,
+}
+
+impl<'a> Key<'a> {
+    pub(super) fn new(
+        context: &'a Context<'a>,
+        name: &'static str,
+        key_span: Option<Range<usize>>,
+        value: Option<Value<'a>>,
+    ) -> Self {
+        Self { context, name, value, key_span }
+    }
+
+    /// Whether the file has it.
+    pub(super) fn is_given(&self) -> bool {
+        self.value.is_some()
+    }
+
+    /// The place of the key itself.
+    pub(super) fn key_span(&self) -> Option<Range<usize>> {
+        self.key_span.clone()
+    }
+
+    /// The place of its value.
+    pub(super) fn span(&self) -> Option<Range<usize>> {
+        self.value.map(|value| value.span())
+    }
+
+    /// A number; integers will do.
+    pub(super) fn number(&self, limits: Limits) -> Option<f64> {
+        limited(self.context, self.name, self.value?, limits, "a number")
+    }
+
+    /// A number in single precision.
+    pub(super) fn number32(&self, limits: Limits) -> Option<f32> {
+        self.number(limits).map(|number| number as f32)
+    }
+
+    /// A whole number. `N` holds every number of the range.
+    pub(super) fn whole<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
+        let value = self.value?;
+        let DeValue::Integer(integer) = value.get_ref() else {
+            wrong_type(self.context, self.name, value, "a whole number");
+            return None;
+        };
+        let number = whole(integer).filter(|number| range.contains(number));
+        if number.is_none() {
+            let (name, low, high) = (self.name, range.start(), range.end());
+            let message = format!("`{name}` must be a whole number between {low} and {high}");
+            let label = format!("found {}", found(self.context, value));
+            self.context.report(Issue::error(value.span(), message).label(label));
+        }
+        number.and_then(|number| number.try_into().ok())
+    }
+
+    /// `true` or `false`.
+    pub(super) fn flag(&self) -> Option<bool> {
+        let value = self.value?;
+        let flag = value.get_ref().as_bool();
+        if flag.is_none() {
+            wrong_type(self.context, self.name, value, "true or false");
+        }
+        flag
+    }
+
+    /// A string; `expected` says of what.
+    pub(super) fn text(&self, expected: &str) -> Option<&'a str> {
+        let value = self.value?;
+        let text = value.get_ref().as_str();
+        if text.is_none() {
+            wrong_type(self.context, self.name, value, expected);
+        }
+        text
+    }
+
+    /// One of some words. `unavailable` are words that other versions know.
+    pub(super) fn choice<T: Copy>(
+        &self,
+        words: &[(&'static str, T)],
+        unavailable: &[&'static str],
+    ) -> Option<T> {
+        let list = words.iter().map(|(word, _)| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
+        let list = if words.len() == 1 { list } else { format!("one of {list}") };
+        let text = self.text(&list)?;
+        if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == text) {
+            return Some(*meaning);
+        }
+        let (span, name, shown) = (self.span()?, self.name, shortened(text, 32));
+        let mut issue = if unavailable.contains(&text) {
+            let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
+            Issue::error(span, message)
+        } else {
+            Issue::error(span, format!("`{name}` cannot be \"{shown}\"")).help(format!("expected {list}"))
+        };
+        if let Some(near) = nearest(text, words.iter().map(|(word, _)| *word)) {
+            issue = issue.label(format!("did you mean \"{near}\"?"));
+        }
+        self.context.report(issue);
+        None
+    }
+
+    /// Three numbers.
+    pub(super) fn vector(&self, limits: Limits) -> Option<DVec3> {
+        self.numbers(limits, "three numbers, [x, y, z]").map(DVec3::from_array)
+    }
+
+    /// Two numbers.
+    pub(super) fn pair(&self, limits: Limits) -> Option<Vec2> {
+        self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
+    }
+
+    /// As many numbers as the array has room for; every wrong one is reported.
+    fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
+        let value = self.value?;
+        let Some(array) = value.get_ref().as_array().filter(|array| array.len() == N) else {
+            wrong_type(self.context, self.name, value, expected);
+            return None;
+        };
+        let read = |one| limited(self.context, self.name, one, limits, expected);
+        let components: Vec<Option<f64>> = array.iter().map(read).collect();
+        components.into_iter().collect::<Option<Vec<_>>>()?.try_into().ok()
+    }
+
+    /// A number for all three axes, or three.
+    pub(super) fn scale(&self, limits: Limits) -> Option<DVec3> {
+        match self.value?.get_ref() {
+            DeValue::Integer(_) | DeValue::Float(_) => self.number(limits).map(DVec3::splat),
+            _ => self.numbers(limits, "a number or three, [x, y, z]").map(DVec3::from_array),
+        }
+    }
+
+    /// The index of a thing that is named elsewhere in the file.
+    pub(super) fn name_in(&self, names: &Names) -> Option<usize> {
+        let text = self.text(&format!("the name of a {}", names.kind))?;
+        let index = names.find(text);
+        if index.is_none() {
+            let message = format!("there is no {} \"{}\"", names.kind, shortened(text, 40));
+            let issue = Issue::error(self.span()?, message).absence();
+            self.context.report(names.advise(issue, text));
+        }
+        index
+    }
+
+    /// The value as a table of its own, `{ … }`.
+    pub(super) fn inline_table(&self) -> Option<Table<'a>> {
+        Table::of(self.context, self.value?, format!("`{}`", self.name))
+    }
+}

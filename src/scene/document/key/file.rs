@@ -1,0 +1,84 @@
+//! Files that the scene names.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::super::super::description::Located;
+use super::super::super::nearest::nearest;
+use super::super::super::read::{neighbour, reason};
+use super::super::super::sanitize::{shortened, visible};
+use super::super::context::Issue;
+use super::Key;
+
+impl Key<'_> {
+    /// An existing file with one of these endings (none given: any), resolved against the scene's folder.
+    /// `unavailable` are endings that other versions read.
+    pub(in super::super) fn file(&self, endings: &[&str], unavailable: &[&str]) -> Option<Located<PathBuf>> {
+        let text = self.text("the path of a file")?;
+        let span = self.span()?;
+        if text.is_empty() {
+            self.context.report(Issue::error(
+                span,
+                format!("`{}` is empty: it must be the path of a file", self.name),
+            ));
+            return None;
+        }
+        if !endings.is_empty() && !self.has_ending(text, endings, unavailable) {
+            return None;
+        }
+        let path = self.context.resolve(text);
+        if let Err(issue) = regular_file(&path) {
+            let (message, help) = issue;
+            self.context.report(Issue::error(span, message).maybe_help(help));
+            return None;
+        }
+        Some(Located { value: path, span })
+    }
+
+    /// Whether a path ends as it should; an error if not.
+    pub(in super::super) fn has_ending(&self, text: &str, endings: &[&str], unavailable: &[&str]) -> bool {
+        let ending = ending(text);
+        if endings.contains(&ending.as_str()) {
+            return true;
+        }
+        let Some(span) = self.span() else { return false };
+        let list = endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>().join(", ");
+        let shown = shortened(&ending, 16);
+        let message = match ending.as_str() {
+            "" => format!("`{}` needs a file ending that says its format", self.name),
+            known if unavailable.contains(&known) => {
+                format!("`{}`: .{shown} files are not available in this version", self.name)
+            }
+            _ => format!("`{}`: unknown file ending .{shown}", self.name),
+        };
+        let mut issue = Issue::error(span, message).help(format!("expected one of {list}"));
+        if let Some(near) = nearest(&ending, endings.iter().copied()) {
+            issue = issue.label(format!("did you mean .{near}?"));
+        }
+        self.context.report(issue);
+        false
+    }
+}
+
+/// What follows the last dot of a path, in small letters; may be empty.
+fn ending(text: &str) -> String {
+    Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+fn regular_file(path: &Path) -> Result<(), (String, Option<String>)> {
+    let shown = shortened(&path.to_string_lossy(), 200);
+    let other = |what: &str| Err((format!("{shown} is {what}, not a file"), None));
+    match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => other("a folder"),
+        Ok(metadata) if !metadata.is_file() => other("a pipe, a socket or a device"),
+        Ok(_) => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err((
+            format!("there is no file {shown}"),
+            Some(match neighbour(path) {
+                Some(near) => format!("did you mean {}?", visible(&near.to_string_lossy())),
+                None => "paths are relative to the scene file".to_owned(),
+            }),
+        )),
+        Err(error) => Err((format!("cannot read {shown}: {}", reason(&error)), None)),
+    }
+}

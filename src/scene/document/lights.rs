@@ -1,0 +1,26 @@
+//! `[[light]]`.
+
+use super::super::description::{Falloff, PointLight};
+use super::limits::Limits;
+use super::table::Table;
+use crate::math::Vec3;
+
+const FALLOFFS: [(&str, Falloff); 2] = [("square", Falloff::Square), ("none", Falloff::None)];
+
+pub(super) fn read(root: &Table<'_>) -> Option<Vec<PointLight>> {
+    let read: Vec<Option<PointLight>> = root.tables("light").iter().map(light).collect();
+    read.into_iter().collect()
+}
+
+fn light(table: &Table<'_>) -> Option<PointLight> {
+    let kind = table.optional("type");
+    if kind.is_given() {
+        // The keys of the other types would only be called unknown.
+        kind.choice(&[("point", ())], &["spot", "directional"])?;
+    }
+    let position = table.required("position", "[0, 3, 0]").vector(Limits::Any);
+    let intensity = table.optional("intensity").color().unwrap_or(Vec3::splat(10.0));
+    let falloff = table.optional("falloff").choice(&FALLOFFS, &[]).unwrap_or(Falloff::Square);
+    table.finish();
+    Some(PointLight { position: position?, intensity, falloff })
+}

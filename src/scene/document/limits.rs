@@ -1,0 +1,85 @@
+//! Ranges of numbers, and the words for them.
+
+/// Numbers that a key accepts. All are finite and of magnitude at most [`LARGEST`] besides.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Limits {
+    /// Any number.
+    Any,
+    /// Any number but 0.
+    NotZero,
+    /// From here on.
+    AtLeast(f64),
+    /// A length or size: > 0, and not so small that its square is nothing.
+    Length,
+    /// Both ends included.
+    Between(f64, f64),
+    /// Both ends excluded.
+    Inside(f64, f64),
+}
+
+/// Products of two larger numbers do not fit into 32-bit floats.
+pub(super) const LARGEST: f64 = 1e18;
+
+/// Products of two smaller ones are lost there.
+const SMALLEST: f64 = 1e-18;
+
+impl Limits {
+    /// What is wrong with a number, to be read after its name: `must be greater than 0`.
+    pub(super) fn violation(self, number: f64) -> Option<String> {
+        if number.is_nan() || number.is_infinite() {
+            return Some("must be a finite number".to_owned());
+        }
+        if number.abs() > LARGEST {
+            return Some("must be less than 1e18 in magnitude".to_owned());
+        }
+        let tiny = number != 0.0 && number.abs() < SMALLEST;
+        match self {
+            Self::Length | Self::NotZero if tiny => Some("must be more than 1e-18 in magnitude".to_owned()),
+            _ if self.contains(number) => None,
+            _ => Some(self.words()),
+        }
+    }
+
+    fn contains(self, number: f64) -> bool {
+        match self {
+            Self::Any => true,
+            Self::NotZero => number != 0.0,
+            Self::AtLeast(least) => number >= least,
+            Self::Length => number > 0.0,
+            Self::Between(least, most) => (least..=most).contains(&number),
+            Self::Inside(low, high) => low < number && number < high,
+        }
+    }
+
+    fn words(self) -> String {
+        match self {
+            Self::Any => "must be a number".to_owned(),
+            Self::NotZero => "must not be 0".to_owned(),
+            Self::AtLeast(least) => format!("must be at least {least}"),
+            Self::Length => "must be greater than 0".to_owned(),
+            Self::Between(least, most) => format!("must be between {least} and {most}"),
+            Self::Inside(low, high) => format!("must be greater than {low} and less than {high}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_belong_where_the_words_say() {
+        let ok = |limits: Limits, number| limits.violation(number).is_none();
+        assert!(ok(Limits::Any, -0.0) && ok(Limits::AtLeast(0.0), -0.0));
+        assert!(!ok(Limits::Length, 0.0) && ok(Limits::Length, 1e-9) && !ok(Limits::Length, 1e-30));
+        assert!(!ok(Limits::Inside(0.0, 180.0), 180.0) && ok(Limits::Between(0.0, 1.0), 1.0));
+        assert!(!ok(Limits::NotZero, -0.0) && ok(Limits::NotZero, -2.0));
+        for bad in [f64::NAN, f64::INFINITY, 1.1e18, -1e300] {
+            assert!(!ok(Limits::Any, bad), "{bad}");
+        }
+        assert_eq!(
+            Limits::Between(-100.0, 100.0).violation(200.0).as_deref(),
+            Some("must be between -100 and 100")
+        );
+    }
+}

@@ -1,0 +1,117 @@
+//! `[materials.*]`.
+
+use super::super::description::{ColorSource, Material, MaterialKind};
+use super::context::Issue;
+use super::key::Key;
+use super::limits::Limits;
+use super::names::Names;
+use super::table::Table;
+use crate::math::Vec3;
+
+/// The materials of a file.
+pub(super) struct Materials {
+    /// What they are called.
+    pub(super) names: Names,
+    /// In the order of the names; none if one of them is wrong.
+    pub(super) list: Option<Vec<Material>>,
+    /// Which of them emit light.
+    emissive: Vec<bool>,
+}
+
+impl Materials {
+    /// Whether a material emits light.
+    pub(super) fn is_emissive(&self, index: usize) -> bool {
+        self.emissive.get(index).copied().unwrap_or(false)
+    }
+
+    /// Whether a material emits light.
+    pub(super) fn emits(material: &Material) -> bool {
+        matches!(material.kind, MaterialKind::Phong { emission, .. } if emission != Vec3::ZERO)
+    }
+}
+
+pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
+    let tables = root.named_tables("materials");
+    let names = Names::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
+    let read: Vec<Option<Material>> =
+        tables.into_iter().map(|(name, _, table)| material(name, &table?, textures)).collect();
+    let emissive = read.iter().map(|material| material.as_ref().is_some_and(Materials::emits)).collect();
+    Materials { names, list: read.into_iter().collect(), emissive }
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Phong,
+    Mirror,
+    Glass,
+}
+
+const KINDS: [(&str, Kind); 3] = [("phong", Kind::Phong), ("mirror", Kind::Mirror), ("glass", Kind::Glass)];
+
+fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Material> {
+    let key = table.optional("type");
+    // Without knowing the type, no key can be called unknown.
+    let kind = if key.is_given() { key.choice(&KINDS, &[])? } else { Kind::Phong };
+    let kind = match kind {
+        Kind::Phong => phong(table, textures),
+        Kind::Mirror => mirror(table),
+        Kind::Glass => glass(table),
+    };
+    table.finish();
+    Some(Material { name, kind })
+}
+
+fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
+    let (diffuse_key, specular_key) = (table.optional("diffuse"), table.optional("specular"));
+    let diffuse = diffuse_key.color_or_texture(textures).unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
+    let specular = specular_key.color_or_texture(textures).unwrap_or(ColorSource::Constant(Vec3::ZERO));
+    warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
+    let normal_map = table.optional("normal_map").name_in(textures);
+    let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
+    MaterialKind::Phong {
+        diffuse,
+        specular,
+        shininess: table.optional("shininess").number32(Limits::Between(0.0, 1e6)).unwrap_or(32.0),
+        ambient: table.optional("ambient").color_or_texture(textures),
+        emission: emission(&table.optional("emission")).unwrap_or(Vec3::ZERO),
+        normal_map: normal_map.map(|index| (index, strength)),
+    }
+}
+
+fn emission(key: &Key<'_>) -> Option<Vec3> {
+    if key.value?.get_ref().is_table() {
+        let issue = Issue::error(key.span()?, "a texture in `emission` is not supported yet")
+            .help("give it a colour, [r, g, b] or \"#rrggbb\"");
+        key.context.report(issue);
+        return None;
+    }
+    key.color()
+}
+
+/// Warns about a material that reflects more light than falls on it.
+fn warn_about_gain(kd_key: &Key<'_>, ks_key: &Key<'_>, kd: &ColorSource, ks: &ColorSource) {
+    let constant = |source: &ColorSource| match source {
+        ColorSource::Constant(color) => *color,
+        ColorSource::Texture(_) => Vec3::ZERO,
+    };
+    let sum = constant(kd) + constant(ks);
+    // A sum that is 1 when written down may be above it in binary.
+    let most = sum.max_element();
+    let Some(span) = ks_key.span().or(kd_key.span()).filter(|_| most > 1.0 + 1e-5) else { return };
+    let channel = ["red", "green", "blue"][sum.max_position()];
+    let issue = Issue::warning(span, "this material reflects more light than falls on it")
+        .label(format!("diffuse + specular is {:.3} in {channel}", most))
+        .help("keep `diffuse` + `specular` at or below 1 in every channel");
+    kd_key.context.report(issue);
+}
+
+fn mirror(table: &Table<'_>) -> MaterialKind {
+    MaterialKind::Mirror { reflectance: table.optional("reflectance").fraction().unwrap_or(Vec3::splat(0.9)) }
+}
+
+fn glass(table: &Table<'_>) -> MaterialKind {
+    MaterialKind::Glass {
+        ior: table.optional("ior").number32(Limits::Between(1.0, 10.0)).unwrap_or(1.5),
+        tint: table.optional("tint").fraction().unwrap_or(Vec3::ONE),
+    }
+}

@@ -1,0 +1,92 @@
+//! From TOML to a scene: one file for each family of tables. Every reader goes on after a mistake, so that
+//! all of them are reported, and gives nothing where a value is missing or wrong.
+
+mod camera;
+mod context;
+mod key;
+mod lights;
+mod limits;
+mod materials;
+mod names;
+mod photons;
+mod render;
+mod shapes;
+mod syntax;
+mod table;
+mod textures;
+mod value;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use toml::de::DeTable;
+
+use super::Outcome;
+use super::description::Scene;
+use context::{Context, Issue};
+use materials::Materials;
+use table::Table;
+
+/// Reads and validates the text of a scene; `path` says where the files are that it names.
+pub(super) fn lower(source: &Arc<str>, path: &Path) -> Outcome {
+    let context = Context::new(Arc::clone(source), path);
+    if source.trim_start_matches('\u{feff}').trim().is_empty() {
+        let help = "`glimt new FILE` writes a scene to start from";
+        context.report(Issue::error(0..0, "the scene file is empty").help(help));
+        return Outcome { scene: None, diagnostics: context.finish(&[]) };
+    }
+    let (root, errors) = DeTable::parse_recoverable(source);
+    let broken_lines = syntax::report(&context, &errors);
+    let scene = scene(&Table::root(&context, root.get_ref()));
+    let has_errors = context.has_errors();
+    Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines) }
+}
+
+/// The whole file. Names are gathered before what refers to them.
+fn scene(root: &Table<'_>) -> Option<Scene> {
+    let render = render::read(root);
+    let camera = camera::read(root);
+    let photons = photons::read(root);
+    let textures = textures::read(root);
+    let materials = materials::read(root, &textures.names);
+    let (objects, mesh_files) = shapes::read(root, &materials);
+    let lights = lights::read(root);
+    root.unavailable("environment", "[environment] is not available in this version", Some(ENVIRONMENT));
+    root.finish();
+
+    let scene = Scene {
+        render: render?,
+        camera: camera?,
+        photons: photons?,
+        textures: textures.list?,
+        mesh_files,
+        objects: objects?,
+        lights: lights?,
+        materials: materials.list?,
+    };
+    if !root.context.has_errors() {
+        textures.names.warn_about_unused(root.context);
+        materials.names.warn_about_unused(root.context);
+        warn_about_darkness(root.context, &scene);
+    }
+    Some(scene)
+}
+
+const ENVIRONMENT: &str = "use `background` in [render] for what rays see that leave the scene";
+
+/// Warns about a scene without shapes, or without light.
+fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
+    if scene.objects.is_empty() {
+        let help = "add one, such as a [[sphere]]; until then the picture is the background";
+        context.report(Issue::warning(0..0, "the scene has no shapes").help(help));
+        return;
+    }
+    let own_materials = scene.objects.iter().any(|object| object.material.is_none());
+    let emits = |index: usize| Materials::emits(&scene.materials[index]);
+    let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
+    if scene.lights.is_empty() && !own_materials && !lamps && scene.render.ambient == crate::math::Vec3::ZERO
+    {
+        let help = "add a [[light]], give a material in use `emission`, or set `ambient` in [render]";
+        context.report(Issue::warning(0..0, "nothing lights this scene").help(help));
+    }
+}

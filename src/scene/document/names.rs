@@ -1,0 +1,67 @@
+//! Names that the file gives to things, and whether they are used.
+
+use std::cell::Cell;
+use std::collections::HashMap;
+use std::ops::Range;
+
+use super::super::nearest::nearest;
+use super::super::sanitize::shortened;
+use super::context::{Context, Issue};
+
+/// The textures or the materials of a file.
+pub(super) struct Names {
+    /// `texture` or `material`.
+    pub(super) kind: &'static str,
+    entries: Vec<Entry>,
+    indices: HashMap<String, usize>,
+}
+
+struct Entry {
+    name: String,
+    span: Range<usize>,
+    used: Cell<bool>,
+}
+
+impl Names {
+    pub(super) fn new(kind: &'static str, names: impl Iterator<Item = (String, Range<usize>)>) -> Self {
+        let entries: Vec<Entry> =
+            names.map(|(name, span)| Entry { name, span, used: Cell::new(false) }).collect();
+        let indices = entries.iter().enumerate().map(|(index, entry)| (entry.name.clone(), index)).collect();
+        Self { kind, entries, indices }
+    }
+
+    /// The index of a name, which is used from now on.
+    pub(super) fn find(&self, name: &str) -> Option<usize> {
+        let index = *self.indices.get(name)?;
+        self.entries[index].used.set(true);
+        Some(index)
+    }
+
+    /// Adds to an issue about an unknown name what there is.
+    pub(super) fn advise(&self, issue: Issue, name: &str) -> Issue {
+        const MOST: usize = 12;
+        let kind = self.kind;
+        let known = || self.entries.iter().map(|entry| entry.name.as_str());
+        let quoted = |name: &str| format!("\"{}\"", shortened(name, 40));
+        let list = known().take(MOST).map(quoted).collect::<Vec<_>>().join(", ");
+        let help = match self.entries.len() {
+            0 => format!("the scene has no {kind}s; a table [{kind}s.NAME] makes one"),
+            count if count > MOST => format!("there are {list} and {} more", count - MOST),
+            1 => format!("there is {list}"),
+            _ => format!("there are {list}"),
+        };
+        let issue = issue.help(help);
+        match nearest(name, known()) {
+            Some(near) => issue.label(format!("did you mean {}?", quoted(near))),
+            None => issue,
+        }
+    }
+
+    /// A warning for each name that nothing referred to. Only worth it where everything else is right.
+    pub(super) fn warn_about_unused(&self, context: &Context<'_>) {
+        for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
+            let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));
+            context.report(Issue::warning(entry.span.clone(), message));
+        }
+    }
+}

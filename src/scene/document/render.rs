@@ -1,0 +1,108 @@
+//! `[render]`.
+
+use std::path::PathBuf;
+
+use super::super::description::{Accel, Integrator, PixelFilter, Render, Shadows, Tonemap};
+use super::context::Issue;
+use super::limits::Limits;
+use super::table::Table;
+use crate::math::Vec3;
+
+const MAX_SIDE: i128 = 65_536;
+const MAX_PIXELS: u64 = 1 << 30;
+const MAX_U32: i128 = u32::MAX as i128;
+
+/// Endings of pictures that can be written.
+pub(super) const PICTURES: [&str; 6] = ["png", "exr", "ppm", "hdr", "jpg", "jpeg"];
+
+/// The values of a scene that says nothing.
+fn defaults() -> Render {
+    Render {
+        width: 640,
+        height: 480,
+        samples: 64,
+        shadow_samples: 1,
+        max_depth: 8,
+        integrator: Integrator::Whitted,
+        shadows: Shadows::Soft,
+        ambient: Vec3::ZERO,
+        background: Vec3::ZERO,
+        filter: PixelFilter::Box,
+        exposure: 0.0,
+        tonemap: Tonemap::None,
+        accel: Accel::Bvh,
+        seed: 0,
+        output: None,
+    }
+}
+
+pub(super) fn read(root: &Table<'_>) -> Option<Render> {
+    let default = defaults();
+    let Some(table) = root.table("render") else { return Some(default) };
+    let key = |name| table.optional(name);
+    let render = Render {
+        width: key("width").whole(1..=MAX_SIDE).unwrap_or(default.width),
+        height: key("height").whole(1..=MAX_SIDE).unwrap_or(default.height),
+        samples: key("samples").whole(1..=MAX_U32).unwrap_or(default.samples),
+        shadow_samples: key("shadow_samples").whole(1..=4096).unwrap_or(default.shadow_samples),
+        max_depth: key("max_depth").whole(0..=MAX_U32).unwrap_or(default.max_depth),
+        integrator: key("integrator").choice(&INTEGRATORS, &["path"]).unwrap_or(default.integrator),
+        shadows: key("shadows").choice(&SHADOWS, &[]).unwrap_or(default.shadows),
+        ambient: key("ambient").color().unwrap_or(default.ambient),
+        background: key("background").color().unwrap_or(default.background),
+        filter: key("filter").choice(&FILTERS, &[]).unwrap_or(default.filter),
+        exposure: key("exposure").number32(Limits::Between(-100.0, 100.0)).unwrap_or(default.exposure),
+        tonemap: key("tonemap").choice(&TONEMAPS, &[]).unwrap_or(default.tonemap),
+        accel: key("accel").choice(&[("bvh", Accel::Bvh)], &["kdtree"]).unwrap_or(default.accel),
+        seed: key("seed").whole(0..=MAX_U32).unwrap_or(default.seed),
+        output: output(&table),
+    };
+    refuse_error(&table);
+    check_size(&table, &render);
+    table.finish();
+    Some(render)
+}
+
+const INTEGRATORS: [(&str, Integrator); 1] = [("whitted", Integrator::Whitted)];
+const SHADOWS: [(&str, Shadows); 3] =
+    [("off", Shadows::Off), ("hard", Shadows::Hard), ("soft", Shadows::Soft)];
+const FILTERS: [(&str, PixelFilter); 4] = [
+    ("box", PixelFilter::Box),
+    ("tent", PixelFilter::Tent),
+    ("gaussian", PixelFilter::Gaussian),
+    ("mitchell", PixelFilter::Mitchell),
+];
+const TONEMAPS: [(&str, Tonemap); 4] = [
+    ("none", Tonemap::None),
+    ("reinhard", Tonemap::Reinhard),
+    ("aces", Tonemap::Aces),
+    ("agx", Tonemap::Agx),
+];
+
+fn output(table: &Table<'_>) -> Option<PathBuf> {
+    let key = table.optional("output");
+    let text = key.text("the path of a picture, such as \"picture.png\"")?;
+    key.has_ending(text, &PICTURES, &["webp"]).then(|| PathBuf::from(text))
+}
+
+/// Stopping at an error is for a later version; not to stop is the default.
+fn refuse_error(table: &Table<'_>) {
+    let key = table.optional("error");
+    let Some((error, span)) = key.number(Limits::AtLeast(0.0)).zip(key.span()) else { return };
+    if error > 0.0 {
+        let message = "`error` > 0 is not available in this version";
+        let help = "use 0.0 and set `samples`: every pixel gets that many";
+        table.context.report(Issue::error(span, message).help(help));
+    }
+}
+
+fn check_size(table: &Table<'_>, render: &Render) {
+    let Render { width, height, .. } = *render;
+    let spans = || table.optional("width").span().or(table.optional("height").span());
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        let issue =
+            Issue::error(spans().unwrap_or_default(), format!("{width} × {height} pixels are too many"))
+                .help(format!("a picture has at most {MAX_PIXELS} pixels"));
+        table.context.report(issue);
+    }
+}

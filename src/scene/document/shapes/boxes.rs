@@ -1,0 +1,13 @@
+//! `[[box]]`.
+
+use super::super::super::description::Shape;
+use super::super::limits::Limits;
+use super::super::table::Table;
+use crate::math::DVec3;
+
+pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
+    let center = table.required("center", "[0, 0.5, 0]").vector(Limits::Any);
+    let size = table.optional("size").vector(Limits::Length).unwrap_or(DVec3::ONE);
+    let rotate = table.optional("rotate").vector(Limits::Any).unwrap_or(DVec3::ZERO);
+    Some(Shape::Box { center: center?, size, rotate })
+}

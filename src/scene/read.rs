@@ -1,0 +1,182 @@
+//! Bytes of a scene file, read without ever blocking or filling the memory.
+
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::MAX_FILE_BYTES;
+use super::diagnostic::{Diagnostic, Place, Severity};
+use super::nearest::nearest;
+use super::sanitize::visible;
+
+/// The text and the hash of its bytes. The error is one diagnostic that names the file.
+pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnostic>> {
+    let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
+    let hash = blake3::hash(&bytes);
+    if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(problem(
+            path,
+            "this is a binary file, not the text of a scene".to_owned(),
+            Some("a scene is TOML, saved as UTF-8; `glimt new FILE` writes one to start from".to_owned()),
+            None,
+        ));
+    }
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok((text.into(), hash)),
+        Err(error) => Err(not_utf8(path, error.as_bytes(), error.utf8_error().valid_up_to())),
+    }
+}
+
+fn problem(path: &Path, message: String, help: Option<String>, place: Option<Place>) -> Box<Diagnostic> {
+    Box::new(Diagnostic { severity: Severity::Error, message, path: path.to_owned(), place, help })
+}
+
+fn not_utf8(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
+    let source: Arc<str> = String::from_utf8_lossy(bytes).into();
+    let line = bytes[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
+    let message = format!("line {line} is not UTF-8 text: byte 0x{:02x} at offset {offset}", bytes[offset]);
+    let span = offset..offset + char::REPLACEMENT_CHARACTER.len_utf8();
+    let label = "not a character in UTF-8".to_owned();
+    let help = Some("save the file as UTF-8".to_owned());
+    problem(path, message, help, Some(Place { source, span, label }))
+}
+
+type Refusal = (String, Option<String>);
+
+fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
+    let unreadable = |error: io::Error| unreadable(path, &error);
+    regular(&std::fs::metadata(path).map_err(unreadable)?)?;
+    let file = open(path).map_err(unreadable)?;
+    // The name may lead elsewhere by now.
+    regular(&file.metadata().map_err(unreadable)?)?;
+    let mut bytes = Vec::new();
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        return Err(too_large());
+    }
+    Ok(bytes)
+}
+
+/// Opens a file for reading; a pipe without a writer does not block.
+fn open(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, nix::libc::O_NONBLOCK);
+    options.open(path)
+}
+
+fn regular(metadata: &Metadata) -> Result<(), Refusal> {
+    if metadata.is_dir() {
+        return Err((
+            "this is a folder, not a scene file".to_owned(),
+            Some("name a scene file, such as scene.toml".to_owned()),
+        ));
+    }
+    if !metadata.is_file() {
+        return Err((
+            "this is a pipe, a socket or a device, not a scene file".to_owned(),
+            Some("a scene is read from a regular file, so that it can be watched".to_owned()),
+        ));
+    }
+    if metadata.len() > MAX_FILE_BYTES {
+        return Err(too_large());
+    }
+    Ok(())
+}
+
+fn too_large() -> Refusal {
+    (
+        format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20),
+        Some("large geometry belongs in mesh files, which [[mesh]] names".to_owned()),
+    )
+}
+
+fn unreadable(path: &Path, error: &io::Error) -> Refusal {
+    if error.kind() == io::ErrorKind::NotFound {
+        let help = neighbour(path).map(|near| format!("did you mean {}?", visible(&near.to_string_lossy())));
+        let start = || "`glimt new FILE` writes a scene to start from".to_owned();
+        return ("there is no such scene file".to_owned(), Some(help.unwrap_or_else(start)));
+    }
+    (format!("cannot read the scene file: {}", reason(error)), None)
+}
+
+/// An error of the file system in words.
+pub(super) fn reason(error: &io::Error) -> String {
+    #[cfg(unix)]
+    if error.raw_os_error() == Some(nix::libc::ELOOP) {
+        return "its symbolic links lead in a circle".to_owned();
+    }
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        io::ErrorKind::NotADirectory => "a part of its path is a file, not a folder".to_owned(),
+        io::ErrorKind::InvalidInput => "that is no name of a file".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+/// The file beside a missing one whose name is nearest to it.
+pub(super) fn neighbour(path: &Path) -> Option<PathBuf> {
+    const MOST_FILES: usize = 2_000;
+    let folder = path.parent()?;
+    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let names: Vec<String> = std::fs::read_dir(listed)
+        .ok()?
+        .take(MOST_FILES)
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    Some(folder.join(near))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(path: &Path) -> Diagnostic {
+        *text(path).expect_err("a diagnostic")
+    }
+
+    #[test]
+    fn what_is_no_file_is_refused_at_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        assert!(message(folder.path()).message.contains("folder"));
+        assert!(message(Path::new("/dev/zero")).message.contains("device"));
+        let pipe = folder.path().join("pipe");
+        nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+        assert!(message(&pipe).message.contains("pipe"));
+        assert_eq!(open(&pipe).expect("does not block").metadata().expect("metadata").len(), 0);
+        let circle = folder.path().join("circle.toml");
+        std::os::unix::fs::symlink(&circle, &circle).expect("a link");
+        assert!(message(&circle).message.contains("circle"));
+    }
+
+    #[test]
+    fn a_missing_file_offers_its_neighbour() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("cornell.toml"), "").expect("written");
+        let missing = message(&folder.path().join("cornel.toml"));
+        assert!(missing.message.contains("no such scene file"));
+        assert!(missing.help.expect("a way out").contains("cornell.toml"));
+        let lonely = message(&folder.path().join("zebra"));
+        assert!(lonely.help.expect("a way out").contains("glimt new"));
+    }
+
+    #[test]
+    fn size_and_encoding() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("scene.toml");
+        let file = File::create(&path).expect("a file");
+        file.set_len(MAX_FILE_BYTES + 1).expect("grown");
+        assert!(message(&path).message.contains("16 MiB"));
+        std::fs::write(&path, b"# fine\nname = \"\xe4\"\n").expect("written");
+        let encoding = message(&path);
+        assert!(encoding.message.contains("line 2"), "{}", encoding.message);
+        assert!(encoding.message.contains("0xe4"));
+        assert_eq!(encoding.place.expect("a place").span.start, 15);
+        std::fs::write(&path, b"\x7fELF\0\0").expect("written");
+        assert!(message(&path).message.contains("binary"));
+    }
+}

@@ -1,0 +1,209 @@
+//! Diagnostics as text: `file:line:column`, the source line with the place underlined, the way out.
+//!
+//! Everything that comes from files passes [`visible`], so that only the report's own line ends, and in
+//! [`Style::Ansi`] its own colours, reach the output.
+
+mod lines;
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
+
+use annotate_snippets::renderer::DecorStyle;
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+
+use super::diagnostic::{Diagnostic, Severity};
+use super::sanitize::visible;
+
+pub use lines::{Line, Piece, Role, lines};
+
+/// Whether a report has colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Text only.
+    Plain,
+    /// With ANSI escape sequences.
+    Ansi,
+}
+
+/// The diagnostics, ordered by file and place, and a last line that counts them; empty if there are none.
+/// `width` is that of the terminal in columns: messages are wrapped at it, source lines cut.
+pub fn render(diagnostics: &[Diagnostic], width: usize, style: Style) -> String {
+    let renderer = match style {
+        Style::Plain => Renderer::plain(),
+        Style::Ansi => Renderer::styled(),
+    };
+    render_with(diagnostics, width, &renderer)
+}
+
+/// `2 errors, 1 warning`.
+pub fn summary(diagnostics: &[Diagnostic]) -> String {
+    let count = |severity| diagnostics.iter().filter(|one| one.severity == severity).count();
+    let words = |count: usize, name: &str| match count {
+        0 => None,
+        1 => Some(format!("1 {name}")),
+        _ => Some(format!("{count} {name}s")),
+    };
+    let parts = [words(count(Severity::Error), "error"), words(count(Severity::Warning), "warning")];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+/// Line and column of a byte of a text, both from 1; columns count characters.
+pub fn line_and_column(source: &str, offset: usize) -> (usize, usize) {
+    LineIndex::new(source).locate(source, offset)
+}
+
+fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) -> String {
+    if diagnostics.is_empty() {
+        return String::new();
+    }
+    let renderer = renderer.clone().term_width(width.max(MIN_WIDTH)).decor_style(DecorStyle::Ascii);
+    let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
+    sorted.sort_by_key(|one| (&one.path, one.place.as_ref().map(|place| place.span.start)));
+    let mut index: Option<(Arc<str>, LineIndex)> = None;
+    let mut text = String::new();
+    for diagnostic in sorted {
+        text.push_str(&one(diagnostic, width.max(MIN_WIDTH), &renderer, &mut index));
+        text.push_str("\n\n");
+    }
+    text.push_str(&summary(diagnostics));
+    text.push('\n');
+    text
+}
+
+/// Narrower terminals get a report of this width.
+const MIN_WIDTH: usize = 30;
+
+fn one(
+    diagnostic: &Diagnostic,
+    width: usize,
+    renderer: &Renderer,
+    index: &mut Option<(Arc<str>, LineIndex)>,
+) -> String {
+    let level = match diagnostic.severity {
+        Severity::Error => Level::ERROR,
+        Severity::Warning => Level::WARNING,
+    };
+    let path = diagnostic.path.to_string_lossy();
+    let mut origin = Origin::path(visible(&path));
+    let mut snippet = None;
+    if let Some(place) = &diagnostic.place {
+        if index.as_ref().is_none_or(|(source, _)| !Arc::ptr_eq(source, &place.source)) {
+            *index = Some((Arc::clone(&place.source), LineIndex::new(&place.source)));
+        }
+        let Some((source, lines)) = index else { return String::new() };
+        let (line, column) = lines.locate(source, place.span.start);
+        origin = origin.line(line).char_column(column);
+        let whole = lines.span(line - 1, source).unwrap_or_default();
+        let excerpt = Excerpt::new(source, whole, &place.span);
+        let label = (!place.label.is_empty()).then(|| visible(&place.label).into_owned());
+        let annotation = AnnotationKind::Primary.span(excerpt.span).label(label);
+        snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
+    }
+    let title = level.primary_title(wrapped(&diagnostic.message, width.saturating_sub("warning: ".len())));
+    let mut group: Group<'_> = title.element(origin);
+    if let Some(snippet) = snippet {
+        group = group.element(snippet);
+    }
+    if let Some(help) = &diagnostic.help {
+        group = group.element(Level::HELP.message(wrapped(help, width.saturating_sub(14))));
+    }
+    without_second_origin(&renderer.render(&[group]))
+}
+
+/// The renderer announces a snippet whose origin was already given by a line `:::` of its own.
+fn without_second_origin(rendered: &str) -> String {
+    let is_second = |line: &&str| {
+        let bare = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
+            Some((_, text)) if number > 0 => text,
+            _ => part,
+        });
+        bare.collect::<String>().trim() == ":::"
+    };
+    let Some(second) = rendered.lines().find(is_second) else { return rendered.to_owned() };
+    rendered.replacen(&format!("{second}\n"), "", 1)
+}
+
+/// One line of a source around a place, safe to show, and where the place is in it.
+struct Excerpt {
+    text: String,
+    span: Range<usize>,
+}
+
+impl Excerpt {
+    /// Of very long lines only what is near the place is kept.
+    const NEAR_BYTES: usize = 1_000;
+
+    fn new(source: &str, line: Range<usize>, place: &Range<usize>) -> Self {
+        let start = floor_char(source, place.start.clamp(line.start, line.end));
+        let end = floor_char(source, place.end.clamp(start, line.end));
+        let end = end.min(floor_char(source, start + Self::NEAR_BYTES)).max(start);
+        let left = floor_char(source, line.start.max(start.saturating_sub(Self::NEAR_BYTES)));
+        let right = floor_char(source, line.end.min(end + Self::NEAR_BYTES));
+        let (before, inside, after) =
+            (visible(&source[left..start]), visible(&source[start..end]), visible(&source[end..right]));
+        let from = before.len();
+        Self { span: from..from + inside.len(), text: format!("{before}{inside}{after}") }
+    }
+}
+
+fn floor_char(source: &str, offset: usize) -> usize {
+    let mut offset = offset.min(source.len());
+    while !source.is_char_boundary(offset) {
+        offset -= 1;
+    }
+    offset
+}
+
+/// Where the lines of a text begin.
+pub(super) struct LineIndex {
+    starts: Vec<usize>,
+}
+
+impl LineIndex {
+    pub(super) fn new(source: &str) -> Self {
+        let after = source.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+        Self { starts: std::iter::once(0).chain(after).collect() }
+    }
+
+    /// Line and column from 1. A byte order mark has no column.
+    pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
+        let offset = floor_char(source, offset);
+        let line = self.starts.partition_point(|start| *start <= offset);
+        let before = &source[self.starts[line - 1]..offset];
+        let before = before.strip_prefix('\u{feff}').unwrap_or(before);
+        (line, before.chars().count() + 1)
+    }
+
+    /// Bytes of a line (from 0) without its end and without a byte order mark.
+    pub(super) fn span(&self, line: usize, source: &str) -> Option<Range<usize>> {
+        let start = *self.starts.get(line)?;
+        let end = self.starts.get(line + 1).map_or(source.len(), |next| next - 1);
+        let text = &source[start..end];
+        let mark = if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
+        Some(start + mark..start + text.strip_suffix('\r').unwrap_or(text).len().max(mark))
+    }
+}
+
+/// Safe to show, broken between words where a line would be longer than `width` characters.
+fn wrapped(text: &str, width: usize) -> Cow<'static, str> {
+    let text = visible(text);
+    let mut lines = String::with_capacity(text.len());
+    let mut column = 0;
+    for word in text.split(' ') {
+        let length = word.chars().count();
+        if column > 0 && column + 1 + length > width {
+            lines.push('\n');
+            column = 0;
+        } else if !lines.is_empty() {
+            lines.push(' ');
+            column += 1;
+        }
+        lines.push_str(word);
+        column += length;
+    }
+    lines.into()
+}
+
+#[cfg(test)]
+mod tests;

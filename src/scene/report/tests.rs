@@ -1,0 +1,108 @@
+use std::path::PathBuf;
+
+use super::super::diagnostic::Place;
+use super::*;
+
+fn at(source: &Arc<str>, span: Range<usize>, label: &str) -> Diagnostic {
+    Diagnostic {
+        severity: Severity::Error,
+        message: "`radius` must be greater than 0".to_owned(),
+        path: PathBuf::from("a.toml"),
+        place: Some(Place { source: Arc::clone(source), span, label: label.to_owned() }),
+        help: Some("say how large it is".to_owned()),
+    }
+}
+
+#[test]
+fn shows_file_line_column_source_label_and_help() {
+    let source: Arc<str> = "# äöü\n[[sphere]]\nradius = -0.5\n".into();
+    let text = render(&[at(&source, 27..31, "found -0.5")], 80, Style::Plain);
+    let expected = "\
+error: `radius` must be greater than 0
+ --> a.toml:3:8
+  |
+3 | radius = -0.5
+  |        ^^^^ found -0.5
+  |
+  = help: say how large it is
+
+1 error
+";
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn columns_count_characters_and_survive_tabs_and_escapes() {
+    let source: Arc<str> = "\tmö\u{1b}[31m = \"木\u{202e}\" nix\r\n".into();
+    let start = source.find("nix").expect("there");
+    let text = render(&[at(&source, start..start + 3, "here")], 80, Style::Plain);
+    assert!(text.contains("a.toml:1:17\n"), "{text}");
+    assert!(!text.contains(['\u{1b}', '\u{202e}', '\t', '\r']), "{text:?}");
+    let mut rows = text.lines().skip(3);
+    let (line, carets) = (rows.next().expect("source"), rows.next().expect("carets"));
+    let width = |text: &str| unicode_width::UnicodeWidthStr::width(text);
+    assert_eq!(
+        width(&line[..line.find("nix").expect("there")]),
+        width(&carets[..carets.find('^').expect("^")])
+    );
+}
+
+#[test]
+fn sorts_by_place_and_counts() {
+    let source: Arc<str> = "a = 1\nb = 2\n".into();
+    let mut warning = at(&source, 0..1, "first");
+    warning.severity = Severity::Warning;
+    let text = render(&[at(&source, 6..7, "second"), warning], 80, Style::Plain);
+    assert!(text.find("first") < text.find("second"), "{text}");
+    assert!(text.ends_with("\n1 error, 1 warning\n"), "{text}");
+    assert_eq!(render(&[], 80, Style::Plain), "");
+}
+
+#[test]
+fn a_line_of_megabytes_is_cut_at_the_width() {
+    let source: Arc<str> = format!("{} = oops{}", "x".repeat(3_000_000), " y".repeat(1_000_000)).into();
+    let text = render(&[at(&source, 3_000_003..3_000_007, "here")], 60, Style::Plain);
+    assert!(text.contains("a.toml:1:3000004\n"), "{text}");
+    assert!(text.contains("oops"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 60), "{text}");
+}
+
+#[test]
+fn ends_of_texts_and_places_over_several_lines_are_underlined() {
+    let source: Arc<str> = "a = [\n 1,\n]".into();
+    assert!(render(&[at(&source, 4..11, "here")], 80, Style::Plain).contains("a.toml:1:5\n"));
+    assert!(render(&[at(&source, 11..11, "here")], 80, Style::Plain).contains("a.toml:3:2\n"));
+    let empty: Arc<str> = "".into();
+    assert!(render(&[at(&empty, 0..0, "here")], 80, Style::Plain).contains("a.toml:1:1\n"));
+    let marked: Arc<str> = "\u{feff}a = 1".into();
+    assert!(render(&[at(&marked, 3..4, "here")], 80, Style::Plain).contains("a.toml:1:1\n"));
+}
+
+#[test]
+fn long_messages_are_wrapped() {
+    let source: Arc<str> = "a = 1\n".into();
+    let mut long = at(&source, 0..1, "");
+    long.message = "many words ".repeat(20).trim_end().to_owned();
+    long.help = Some("more words ".repeat(20).trim_end().to_owned());
+    let text = render(&[long], 50, Style::Plain);
+    assert!(text.lines().all(|line| line.chars().count() <= 50), "{text}");
+    assert_eq!(text.matches("many").count(), 20);
+}
+
+#[test]
+fn lines_have_the_text_of_the_plain_report_and_roles() {
+    let source: Arc<str> = "radius = -0.5 # \u{1b}[31m\n".into();
+    let diagnostics = [at(&source, 9..13, "found -0.5")];
+    let lines = lines(&diagnostics, 80);
+    let joined: Vec<String> =
+        lines.iter().map(|line| line.iter().map(|piece| piece.text.as_str()).collect()).collect();
+    assert_eq!(joined.join("\n") + "\n", render(&diagnostics, 80, Style::Plain));
+    let role =
+        |text: &str| lines.iter().flatten().find(|piece| piece.text.contains(text)).map(|piece| piece.role);
+    assert_eq!(role("error"), Some(Role::Error));
+    assert_eq!(role("found"), Some(Role::Error));
+    assert_eq!(role("greater"), Some(Role::Message));
+    assert_eq!(role("a.toml:1:10"), Some(Role::Text));
+    assert_eq!(role("-->"), Some(Role::Frame));
+    assert!(render(&diagnostics, 80, Style::Ansi).contains("\u{1b}["));
+}

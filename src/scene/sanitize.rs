@@ -1,0 +1,78 @@
+//! Text from files, made safe to show: no control bytes, nothing invisible, nothing that turns the direction
+//! of writing.
+
+use std::borrow::Cow;
+
+/// The text with every character that a terminal would act on, or not show at all, replaced by a visible
+/// stand-in: `␛` for ESC and `␊` for a line end (control pictures), four spaces for a tab, `\u{202e}` for C1
+/// bytes, directional marks, zero-width characters and the like. The result is one line.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if text.chars().all(is_plain) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        match c {
+            '\t' => shown.push_str("    "),
+            '\u{7f}' => shown.push('␡'),
+            '\0'..='\u{1f}' => shown.extend(char::from_u32(0x2400 + u32::from(c))),
+            c if is_plain(c) => shown.push(c),
+            c => shown.extend(c.escape_unicode()),
+        }
+    }
+    Cow::Owned(shown)
+}
+
+/// [`visible`] text, cut in the middle of nowhere: at most `limit` characters, the last one `…` where more
+/// followed.
+pub fn shortened(text: &str, limit: usize) -> String {
+    let shown = visible(text);
+    if shown.chars().count() <= limit {
+        return shown.into_owned();
+    }
+    shown.chars().take(limit.saturating_sub(1)).chain(['…']).collect()
+}
+
+/// Whether a terminal shows this character as itself, in its place.
+fn is_plain(c: char) -> bool {
+    !matches!(c,
+        '\0'..='\u{1f}'
+        | '\u{7f}'..='\u{9f}'           // DEL and C1
+        | '\u{ad}'                      // soft hyphen
+        | '\u{61c}'                     // Arabic letter mark
+        | '\u{115f}' | '\u{1160}'       // Hangul fillers
+        | '\u{180e}'                    // Mongolian vowel separator
+        | '\u{200b}'..='\u{200f}'       // zero width, direction marks
+        | '\u{2028}'..='\u{202e}'       // line and paragraph separators, embeddings, overrides
+        | '\u{2060}'..='\u{206f}'       // word joiner, isolates, deprecated marks
+        | '\u{3164}' | '\u{ffa0}'       // more fillers
+        | '\u{feff}'                    // byte order mark
+        | '\u{fff9}'..='\u{fffb}'       // interlinear annotations
+        | '\u{e0000}'..='\u{e0fff}'     // tags, variation selectors
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plain_text_is_not_copied() {
+        assert!(matches!(visible("Bäume, 木, 🌳"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn what_a_terminal_acts_on_becomes_visible() {
+        assert_eq!(visible("\u{1b}]52;c;x\u{7}"), "␛]52;c;x␇");
+        assert_eq!(visible("a\r\nb\tc\u{7f}\0"), "a␍␊b    c␡␀");
+        assert_eq!(visible("\u{9b}31m\u{202e}gpj.exe\u{2066}"), "\\u{9b}31m\\u{202e}gpj.exe\\u{2066}");
+        assert_eq!(visible("\u{feff}a\u{200b}"), "\\u{feff}a\\u{200b}");
+    }
+
+    #[test]
+    fn shortening_counts_what_is_shown() {
+        assert_eq!(shortened("äöü", 3), "äöü");
+        assert_eq!(shortened("äöüß", 3), "äö…");
+        assert_eq!(shortened("a\tbc", 4), "a  …");
+    }
+}

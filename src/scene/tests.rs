@@ -1,0 +1,271 @@
+use super::description::*;
+use super::*;
+use crate::math::color::srgb8_to_linear;
+use crate::math::{DVec3, Vec2, Vec3};
+
+const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+
+fn outcome(text: &str) -> Outcome {
+    parse(text.into(), Path::new("scene.toml"))
+}
+
+/// The scene of a text without errors, with a camera added.
+fn scene(text: &str) -> Scene {
+    let outcome = outcome(&format!("{text}\n{CAMERA}"));
+    let words: Vec<&str> = outcome.diagnostics.iter().map(|one| one.message.as_str()).collect();
+    outcome.scene.unwrap_or_else(|| panic!("{words:?}"))
+}
+
+/// Messages of a text with a camera added.
+fn messages(text: &str) -> Vec<String> {
+    outcome(&format!("{text}\n{CAMERA}")).diagnostics.into_iter().map(|one| one.message).collect()
+}
+
+#[test]
+fn the_starter_parses_without_a_word() {
+    let outcome = outcome(starter());
+    assert_eq!(outcome.diagnostics, []);
+    let scene = outcome.scene.expect("a scene");
+    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (5, 1, 5));
+}
+
+#[test]
+fn a_scene_that_says_nothing_has_the_documented_defaults() {
+    let scene = scene("");
+    let Render { width, height, samples, shadow_samples, max_depth, seed, .. } = scene.render;
+    assert_eq!((width, height, samples, shadow_samples, max_depth, seed), (640, 480, 64, 1, 8, 0));
+    assert_eq!(scene.render.shadows, Shadows::Soft);
+    assert_eq!((scene.render.filter, scene.render.tonemap), (PixelFilter::Box, Tonemap::None));
+    assert_eq!((scene.render.exposure, &scene.render.output), (0.0, &None));
+    assert_eq!(scene.photons, Photons { enabled: false, count: 200_000, radius: 0.0, bounces: 16 });
+    let camera = Camera::LookAt {
+        position: DVec3::new(0.0, 1.0, 4.0),
+        look_at: DVec3::Y,
+        up: DVec3::Y,
+        fov: 40.0,
+        aperture: 0.0,
+        focus: 4.0,
+    };
+    assert_eq!(scene.camera, camera);
+}
+
+#[test]
+fn materials_have_the_documented_defaults() {
+    let scene = scene("[materials.a]\n[materials.b]\ntype='mirror'\n[materials.c]\ntype='glass'");
+    let phong = MaterialKind::Phong {
+        diffuse: ColorSource::Constant(Vec3::splat(0.7)),
+        specular: ColorSource::Constant(Vec3::ZERO),
+        shininess: 32.0,
+        ambient: None,
+        emission: Vec3::ZERO,
+        normal_map: None,
+    };
+    let kinds: Vec<_> = scene.materials.into_iter().map(|material| material.kind).collect();
+    let mirror = MaterialKind::Mirror { reflectance: Vec3::splat(0.9) };
+    assert_eq!(kinds, [phong, mirror, MaterialKind::Glass { ior: 1.5, tint: Vec3::ONE }]);
+}
+
+#[test]
+fn numbers_and_colours_come_in_every_spelling() {
+    let scene = scene(
+        "render = { width = 1_280, height = 0x1e0, seed = 4_294_967_295, exposure = -0.0, error = 0.0, \
+         ambient = '#ff8000', background = [1, 2.5, 1e1] }",
+    );
+    assert_eq!((scene.render.width, scene.render.height, scene.render.seed), (1280, 480, u32::MAX));
+    assert_eq!(scene.render.ambient, srgb8_to_linear([255, 128, 0]));
+    assert_eq!(scene.render.background, Vec3::new(1.0, 2.5, 10.0));
+}
+
+#[test]
+fn things_keep_the_order_of_the_file_and_shapes_that_of_their_kinds() {
+    let scene = scene(
+        "[materials.z]\n[materials.a]\n[materials.m]\n\
+         [[box]]\ncenter=[0,0,0]\nmaterial='m'\n\
+         [[sphere]]\ncenter=[0,0,0]\nradius=2\nmaterial='z'\n\
+         [[plane]]\nmaterial='a'\n\
+         [[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='a'\n",
+    );
+    assert_eq!(scene.materials.iter().map(|one| one.name.as_str()).collect::<Vec<_>>(), ["z", "a", "m"]);
+    assert_eq!(
+        scene.objects.iter().map(|one| one.material).collect::<Vec<_>>(),
+        [Some(0), Some(1), Some(1), Some(2)]
+    );
+    let sphere = |radius| Shape::Sphere { center: DVec3::ZERO, radius };
+    assert_eq!((&scene.objects[0].shape, &scene.objects[1].shape), (&sphere(2.0), &sphere(1.0)));
+    assert_eq!(scene.objects[2].shape, Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y });
+    let unit = Shape::Box { center: DVec3::ZERO, size: DVec3::ONE, rotate: DVec3::ZERO };
+    assert_eq!(scene.objects[3].shape, unit);
+}
+
+#[test]
+fn a_mesh_file_is_listed_once_however_it_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    std::fs::create_dir(folder.path().join("sub")).expect("a folder");
+    std::fs::write(folder.path().join("a.obj"), "").expect("written");
+    std::fs::write(folder.path().join("b.OFF"), "").expect("written");
+    std::fs::write(folder.path().join("t.png"), "").expect("written");
+    let text = format!(
+        "[textures.t]\nfile='t.png'\nrepeat=[2,-1]\nwrap='mirror'\nfilter='nearest'\nencoding='linear'\n\
+         [materials.m]\ndiffuse={{texture='t'}}\nnormal_map='t'\nnormal_strength=0.5\n\
+         [[mesh]]\nfile='a.obj'\nmaterial='m'\nscale=2\n[[mesh]]\nfile='b.OFF'\nsmooth=false\n\
+         [[mesh]]\nfile='sub/../a.obj'\nscale=[1,-2,3]\n{CAMERA}"
+    );
+    std::fs::write(&path, &text).expect("written");
+    let loaded = load(&path).expect("a scene");
+    assert_eq!(loaded.warnings, []);
+    assert_eq!(loaded.content_hash, blake3::hash(text.as_bytes()));
+    let scene = &loaded.scene;
+    let files: Vec<_> = scene.mesh_files.iter().map(|file| file.value.clone()).collect();
+    assert_eq!(files, [folder.path().join("a.obj"), folder.path().join("b.OFF")]);
+    assert_eq!(&loaded.source[scene.mesh_files[0].span.clone()], "'a.obj'");
+    let meshes: Vec<_> = scene
+        .objects
+        .iter()
+        .map(|object| match object.shape {
+            Shape::Mesh { file, scale, smooth, .. } => (file, scale, smooth, object.material),
+            _ => panic!("not a mesh"),
+        })
+        .collect();
+    let flipped = DVec3::new(1.0, -2.0, 3.0);
+    let expected =
+        [(0, DVec3::splat(2.0), true, Some(0)), (1, DVec3::ONE, false, None), (0, flipped, true, None)];
+    assert_eq!(meshes, expected);
+    let texture = &scene.textures[0];
+    assert_eq!(
+        (texture.repeat, texture.wrap, texture.filter),
+        (Vec2::new(2.0, -1.0), Wrap::Mirror, TextureFilter::Nearest)
+    );
+    let MaterialKind::Phong { diffuse, normal_map, .. } = &scene.materials[0].kind else {
+        panic!("not phong")
+    };
+    assert_eq!((diffuse, normal_map), (&ColorSource::Texture(0), &Some((0, 0.5))));
+
+    let late =
+        loaded.diagnostic_at(scene.mesh_files[1].span.clone(), Severity::Error, "no usable face", None);
+    let shown = report::render(&[late], 300, report::Style::Plain);
+    assert!(shown.contains("scene.toml:16:6\n") && shown.contains("^^^^^^^"), "{shown}");
+}
+
+#[test]
+fn an_orbiter_stands_for_position_and_view() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken/scene.toml");
+    let text = "[camera]\norbiter='files/view.txt'\naperture=0.5\nfov=30";
+    let camera = parse(text.into(), &path).scene.expect("a scene").camera;
+    let Camera::Orbiter { file, fov, aperture, focus } = camera else { panic!("no orbiter") };
+    assert_eq!(file.value, path.with_file_name("files/view.txt"));
+    assert_eq!((fov, aperture, focus), (Some(30.0), 0.5, None));
+}
+
+#[test]
+fn warns_only_of_real_darkness_and_real_gain() {
+    let sphere = "[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='m'\n";
+    let dark = "nothing lights this scene";
+    assert_eq!(messages(&format!("[materials.m]\n{sphere}")), [dark]);
+    assert_eq!(messages(&format!("[materials.m]\nemission=[0,0,1]\n{sphere}")), [""; 0]);
+    assert_eq!(messages(&format!("[render]\nambient=[0,0,1]\n[materials.m]\n{sphere}")), [""; 0]);
+    let gain = "this material reflects more light than falls on it";
+    let lit = |material: &str| {
+        messages(&format!("[render]\nambient='#111111'\n[materials.m]\n{material}\n{sphere}"))
+    };
+    assert_eq!(lit("diffuse=[0.7,0.7,0.7]\nspecular=[0.3,0.3,0.3]"), [""; 0]);
+    assert_eq!(lit("diffuse=[0.7,0.7,0.7]\nspecular=[0.3,0.31,0.3]"), [gain]);
+    assert_eq!(lit("diffuse=[1.2,0.7,0.7]"), [gain]);
+    assert_eq!(lit("specular=[0.4,0,0]"), [gain]);
+}
+
+#[test]
+fn a_lamp_of_any_finite_shape_is_fine() {
+    let shapes = "[[quad]]\ncorner=[0,0,0]\nu=[1,0,0]\nv=[0,1,0]\nmaterial='m'\n\
+                  [[triangle]]\na=[0,0,0]\nb=[1,0,0]\nc=[0,1,0]\nmaterial='m'\n\
+                  [[box]]\ncenter=[0,0,0]\nmaterial='m'\n";
+    assert_eq!(messages(&format!("[materials.m]\nemission='#ffffff'\n{shapes}")), [""; 0]);
+}
+
+#[test]
+fn a_flood_of_errors_is_counted_and_cut() {
+    let text: String = (0..700).map(|number| format!("wrong{number} = 1\n")).collect();
+    let messages = messages(&text);
+    assert_eq!(messages.len(), 501);
+    assert_eq!(messages[500], "and 200 more like these");
+}
+
+mod properties {
+    use super::super::diagnostic::Diagnostic;
+    use super::super::report::{Style, lines, render};
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Every place lies in its text, and every report is safe to print.
+    fn check(diagnostics: &[Diagnostic]) {
+        for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
+            assert!(place.source.get(place.span.clone()).is_some(), "{:?}", place.span);
+        }
+        let text = render(diagnostics, 60, Style::Plain);
+        assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
+        let pieces = lines(diagnostics, 60);
+        assert_eq!(pieces.len(), text.lines().count());
+        assert!(pieces.iter().flatten().all(|piece| !piece.text.contains(char::is_control)));
+    }
+
+    /// Pieces that make broken TOML.
+    fn fragment() -> impl Strategy<Value = String> {
+        prop_oneof![
+            "[\\[\\]{}=,.#\"'\\\\\n\t 0-9a-z_-]{0,6}",
+            any::<String>(),
+            prop::sample::select(vec![
+                "[[sphere]]\n",
+                "[camera]\n",
+                "[materials.red]\n",
+                "radius = ",
+                "nan",
+                "1e999",
+                "\"\"\"",
+                "'''",
+                "{ texture = ",
+                "\u{1b}]0;x\u{7}",
+                "\u{202e}",
+                "# 木\n",
+                "\r\n",
+                "99999999999999999999",
+                "[[",
+                "]]",
+                "a.b.c = 1\n",
+                "1979-05-27",
+                "\u{feff}",
+            ])
+            .prop_map(str::to_owned),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn random_text_never_panics(parts in prop::collection::vec(fragment(), 0..40)) {
+            check(&outcome(&parts.concat()).diagnostics);
+        }
+
+        #[test]
+        fn mutations_of_a_scene_never_panic(
+            changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..12, fragment()), 1..8),
+        ) {
+            let mut text: Vec<char> = starter().chars().collect();
+            for (at, removed, inserted) in changes {
+                let at = at.index(text.len() + 1);
+                let end = (at + removed).min(text.len());
+                text.splice(at..end, inserted.chars());
+            }
+            let outcome = outcome(&text.into_iter().collect::<String>());
+            let errors = outcome.diagnostics.iter().filter(|one| one.severity == Severity::Error).count();
+            prop_assert_eq!(outcome.scene.is_none(), errors > 0);
+            check(&outcome.diagnostics);
+        }
+
+        #[test]
+        fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().join("scene.toml");
+            std::fs::write(&path, bytes).expect("written");
+            check(&load(&path).err().unwrap_or_default());
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The front end in a real terminal with a worker that only pretends:
+//! `cargo test --release --lib by_hand -- --ignored --nocapture`. The file named by `GLIMT_BY_HAND` stands for the
+//! scene: the word `broken` in it fails, `panic` panics, anything else renders. The key `w` panics in the front end.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::fixtures::{asset, diagnostic, done, settings, stage};
+use super::{Changed, ColorChoice, Options, PreviewChoice, run};
+use crate::film::Picture;
+use crate::pipeline::protocol::{
+    Command, Event, Failure, LatestPreview, PreviewSlot, RenderProgress, Request, Stage, Status,
+};
+use crate::pipeline::settings::Overrides;
+use crate::scene::diagnostic::Severity;
+
+#[test]
+#[ignore = "needs a terminal and a person"]
+fn by_hand() {
+    let scene = PathBuf::from(std::env::var("GLIMT_BY_HAND").unwrap_or_default());
+    let (commands, orders) = channel();
+    let (sender, events) = channel();
+    let (watcher, changes) = channel();
+    let previews = PreviewSlot::default();
+    let slot = Arc::clone(&previews);
+    thread::spawn(move || work(&orders, &sender, &slot));
+    let watched = scene.clone();
+    thread::spawn(move || watch(&watched, &watcher));
+    let outcome = run(Options {
+        scene,
+        overrides: Overrides::default(),
+        color: ColorChoice::Auto,
+        preview: PreviewChoice::Auto,
+        cell_aspect: None,
+        commands: Box::new(move |command| {
+            assert!(!matches!(command, Command::Write), "w panics in the thread of the front end");
+            commands.send(command).unwrap_or_default();
+        }),
+        events,
+        previews,
+        changes,
+    });
+    match outcome {
+        Ok(status) => std::process::exit(i32::from(status.0)),
+        Err(error) => {
+            println!("error: {error}");
+            std::process::exit(1);
+        }
+    }
+}
+
+fn watch(scene: &PathBuf, changes: &Sender<Changed>) {
+    let mut last = std::fs::read(scene).ok();
+    loop {
+        thread::sleep(Duration::from_millis(30));
+        let now = std::fs::read(scene).ok();
+        if now != last {
+            last = now;
+            if changes.send(Changed { noticed: Instant::now() }).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+fn work(orders: &Receiver<Command>, events: &Sender<Event>, slot: &Mutex<Option<LatestPreview>>) {
+    let mut next = None;
+    loop {
+        match next.take().or_else(|| orders.recv().ok()) {
+            Some(Command::Render(request)) => next = pretend(&request, orders, events, slot),
+            Some(Command::Quit) | None => return,
+            Some(_) => {}
+        }
+    }
+}
+
+/// Renders for two seconds; stops at the next order for a picture.
+fn pretend(
+    request: &Request,
+    orders: &Receiver<Command>,
+    events: &Sender<Event>,
+    slot: &Mutex<Option<LatestPreview>>,
+) -> Option<Command> {
+    let generation = request.generation;
+    let say = |event| events.send(event).unwrap_or_default();
+    say(Event::Started { generation });
+    let text = std::fs::read_to_string(&request.scene).unwrap_or_default();
+    assert!(!text.contains("panic"), "the file says panic");
+    if text.contains("broken") {
+        let failure = Failure::Scene(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        say(Event::Failed { generation, failure });
+        return None;
+    }
+    say(Event::Stage { generation, stage: stage(Stage::Parse, Status::Done, 0.0003, "") });
+    say(Event::Settings { generation, settings: Box::new(settings()) });
+    say(Event::Stage { generation, stage: stage(Stage::Textures, Status::Running, 0.0, "") });
+    let start = Instant::now();
+    for step in 0..=20_u32 {
+        say(Event::Asset { generation, progress: asset("bricks", u64::from(step.min(10)), 10) });
+        if let Some(size) = request.preview {
+            let height = (size.width * 3 / 4).min(size.height).max(1);
+            let picture = Arc::new(pretty(height * 4 / 3, height, step + text.len() as u32 * 20));
+            *slot.lock().expect("a slot") = Some(LatestPreview { generation, picture });
+            say(Event::Preview { generation });
+        }
+        let progress = RenderProgress {
+            fraction: f64::from(step) / 20.0,
+            elapsed_seconds: start.elapsed().as_secs_f64(),
+            eta_seconds: Some(f64::from(20 - step) * 0.1),
+            samples: step * 3,
+            total_samples: 60,
+        };
+        say(Event::Progress { generation, progress });
+        if let Ok(command) = orders.recv_timeout(Duration::from_millis(100)) {
+            return Some(command);
+        }
+    }
+    say(Event::Written { generation, path: "cornell.png".into(), bytes: 210_400 });
+    say(done(generation, vec![diagnostic(Severity::Warning, "texture `b` is not used")], false));
+    None
+}
+
+fn pretty(width: u32, height: u32, phase: u32) -> Picture {
+    let pixel = |x: u32, y: u32| [(x * 255 / width) as u8, (y * 255 / height) as u8, (phase * 6 % 256) as u8];
+    let pixels =
+        (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
+    Picture { width, height, pixels }
+}

@@ -1,0 +1,113 @@
+//! Everything that can happen to the front end: one closed set.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crossterm::event::{KeyCode, KeyModifiers};
+
+use super::options::Changed;
+use crate::film::Picture;
+use crate::pipeline::protocol;
+
+/// One thing that happened.
+#[derive(Clone, Debug)]
+pub(super) enum Event {
+    /// A key was pressed.
+    Key(KeyPress),
+    /// The window has this size now.
+    Resize(Window),
+    /// The worker says something. Pictures come as [`Event::Picture`].
+    Worker(protocol::Event),
+    /// The newest picture of the slot.
+    Picture { generation: u64, picture: Arc<Picture> },
+    /// A file that the scene depends on was written.
+    Changed(Changed),
+    /// A signal, or what amounts to one.
+    Signal(Signal),
+    /// A frame with the picture of this generation is on the screen.
+    Shown { generation: u64 },
+    /// Time passed.
+    Tick,
+    /// Ctrl-z where nothing could continue the program again.
+    NoShell,
+    /// A source of events ended.
+    Lost(Source),
+}
+
+/// A key with its modifiers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct KeyPress {
+    pub code: KeyCode,
+    pub modifiers: KeyModifiers,
+}
+
+impl KeyPress {
+    /// A character without ctrl or alt.
+    pub(super) const fn plain(character: char) -> Self {
+        Self { code: KeyCode::Char(character), modifiers: KeyModifiers::NONE }
+    }
+
+    /// A character with ctrl.
+    pub(super) const fn ctrl(character: char) -> Self {
+        Self { code: KeyCode::Char(character), modifiers: KeyModifiers::CONTROL }
+    }
+
+    /// A key that is no character.
+    pub(super) const fn special(code: KeyCode) -> Self {
+        Self { code, modifiers: KeyModifiers::NONE }
+    }
+}
+
+/// The terminal's window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Window {
+    pub columns: u16,
+    pub rows: u16,
+    /// Height of a cell over its width.
+    pub cell_aspect: f32,
+}
+
+/// The signals that are handled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Signal {
+    Interrupt,
+    Terminate,
+    /// SIGHUP, or the terminal is gone without one.
+    Hangup,
+    /// SIGTSTP.
+    Suspend,
+    /// SIGCONT.
+    Continue,
+}
+
+/// Where events come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    Worker,
+    Watcher,
+    Keys,
+}
+
+/// What the loop has to do for the state.
+#[derive(Clone, Debug)]
+pub(super) enum Effect {
+    /// An order for the worker.
+    Send(protocol::Command),
+    /// Restore the terminal and end.
+    Quit(super::ExitStatus),
+    /// The worker is gone: restore the terminal and end with an error.
+    GiveUp,
+    /// Ctrl-z: stop the whole job, as the terminal would.
+    StopJob,
+    /// SIGTSTP came: restore the terminal, stop, and take it again.
+    Suspend,
+    /// SIGCONT came: take the terminal again and draw everything.
+    Redraw,
+}
+
+/// A picture that was written.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Written {
+    pub path: PathBuf,
+    pub bytes: u64,
+}

@@ -1,0 +1,195 @@
+//! A scripted worker and a screen without a terminal, for tests.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::buffer::Buffer;
+
+use super::color::ColorDepth;
+use super::event::{Effect, Event, KeyPress, Window};
+use super::state::{PreviewKind, Setup, State};
+use super::update::{start, update};
+use super::view;
+use crate::film::Picture;
+use crate::pipeline::protocol::{
+    self, AssetProgress, Command, Counters, Effective, Failure, ImageReport, RenderProgress, Report, Request,
+    SampleCounts, Stage, StageReport, Status,
+};
+use crate::pipeline::settings::Overrides;
+use crate::scene::diagnostic::{Diagnostic, Place, Severity};
+
+pub(super) fn window(columns: u16, rows: u16) -> Window {
+    Window { columns, rows, cell_aspect: 2.0 }
+}
+
+/// A state that has not sent anything yet.
+pub(super) fn state(columns: u16, rows: u16) -> State {
+    state_with(columns, rows, PreviewKind::HalfBlock, ColorDepth::TrueColor, Overrides::default())
+}
+
+pub(super) fn state_with(
+    columns: u16,
+    rows: u16,
+    preview: PreviewKind,
+    depth: ColorDepth,
+    overrides: Overrides,
+) -> State {
+    let scene = PathBuf::from("scenes/cornell.toml");
+    let setup = Setup { scene, overrides, window: window(columns, rows), preview, depth };
+    State::new(setup, Instant::now())
+}
+
+/// A front end whose loop is the test.
+pub(super) struct Desk {
+    pub state: State,
+    pub now: Instant,
+}
+
+impl Desk {
+    /// 80×24, started.
+    pub(super) fn new() -> Self {
+        Self::with(state(80, 24))
+    }
+
+    pub(super) fn with(mut state: State) -> Self {
+        let now = state.now;
+        start(&mut state);
+        Self { state, now }
+    }
+
+    /// One event; what is sent to the worker and the other effects.
+    pub(super) fn event(&mut self, event: Event) -> Vec<Effect> {
+        update(&mut self.state, event, self.now)
+    }
+
+    pub(super) fn worker(&mut self, event: protocol::Event) -> Vec<Effect> {
+        self.event(Event::Worker(event))
+    }
+
+    pub(super) fn key(&mut self, key: KeyPress) -> Vec<Effect> {
+        self.event(Event::Key(key))
+    }
+
+    pub(super) fn press(&mut self, character: char) -> Vec<Effect> {
+        self.key(KeyPress::plain(character))
+    }
+
+    pub(super) fn wait(&mut self, milliseconds: u64) -> Vec<Effect> {
+        self.now += Duration::from_millis(milliseconds);
+        self.event(Event::Tick)
+    }
+
+    /// A render from beginning to end, its picture in one colour.
+    pub(super) fn finish(&mut self, color: [u8; 3]) {
+        let generation = self.state.generation;
+        self.worker(protocol::Event::Started { generation });
+        self.worker(protocol::Event::Settings { generation, settings: Box::new(settings()) });
+        self.event(Event::Picture { generation, picture: plain_picture(50, 38, color) });
+        self.worker(done(generation, Vec::new(), false));
+    }
+
+    pub(super) fn fail(&mut self, diagnostics: Vec<Diagnostic>) {
+        let generation = self.state.generation;
+        self.worker(protocol::Event::Started { generation });
+        self.worker(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
+    }
+
+    /// What is on the screen.
+    pub(super) fn screen(&mut self) -> Buffer {
+        self.state.dirty = false;
+        let backend = TestBackend::new(self.state.window.columns, self.state.window.rows);
+        let mut terminal = Terminal::new(backend).expect("a test backend");
+        terminal.draw(|frame| view::draw(&self.state, frame)).expect("a test backend");
+        terminal.backend().buffer().clone()
+    }
+
+    pub(super) fn text(&mut self) -> String {
+        text(&self.screen())
+    }
+}
+
+/// The rows of a buffer.
+pub(super) fn text(buffer: &Buffer) -> String {
+    let width = usize::from(buffer.area.width).max(1);
+    let rows = buffer.content.chunks(width);
+    rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>() + "\n").collect()
+}
+
+/// The request among effects.
+pub(super) fn request(effects: &[Effect]) -> Option<&Request> {
+    effects.iter().find_map(|effect| match effect {
+        Effect::Send(Command::Render(request)) => Some(&**request),
+        _ => None,
+    })
+}
+
+pub(super) fn plain_picture(width: u32, height: u32, color: [u8; 3]) -> Arc<Picture> {
+    Arc::new(Picture { width, height, pixels: vec![color; width as usize * height as usize] })
+}
+
+pub(super) fn settings() -> Effective {
+    Effective {
+        width: 640,
+        height: 480,
+        samples: 64,
+        integrator: "whitted",
+        shadows: "soft",
+        photons: false,
+        dof: true,
+        accel: "bvh",
+        view: "beauty",
+        seed: 0,
+        threads: 2,
+        outputs: vec![PathBuf::from("cornell.png")],
+    }
+}
+
+pub(super) fn stage(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {
+    StageReport { name, status, seconds, why: why.to_owned() }
+}
+
+pub(super) fn asset(name: &str, done: u64, total: u64) -> AssetProgress {
+    AssetProgress { name: name.to_owned(), done, total }
+}
+
+pub(super) fn progress(fraction: f64, eta_seconds: Option<f64>) -> RenderProgress {
+    let samples = (fraction * 64.0) as u32;
+    RenderProgress { fraction, elapsed_seconds: 1.0, eta_seconds, samples, total_samples: 64 }
+}
+
+pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) -> protocol::Event {
+    let image = ImageReport {
+        path: Some("cornell.png".to_owned()),
+        paths: vec!["cornell.png".to_owned()],
+        width: 640,
+        height: 480,
+        samples: SampleCounts { min: 64, mean: 64.0, max: 64 },
+        complete: true,
+    };
+    let report = Report {
+        glimt: "0.1.0",
+        scene: "scenes/cornell.toml".to_owned(),
+        image,
+        settings: settings(),
+        stages: Stage::ALL.iter().map(|name| stage(*name, Status::Done, 0.25, "")).collect(),
+        counters: Counters::default(),
+        seconds: 1.93,
+        peak_memory_bytes: 0,
+    };
+    protocol::Event::Done { generation, report: Box::new(report), warnings, unchanged }
+}
+
+/// An error on the third line of a scene.
+pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
+    let source: Arc<str> = Arc::from("[render]\nwidth = 4\nheigth = 4\n");
+    Diagnostic {
+        severity,
+        message: message.to_owned(),
+        path: PathBuf::from("scenes/cornell.toml"),
+        place: Some(Place { source, span: 19..25, label: "here".to_owned() }),
+        help: Some("did you mean `height`?".to_owned()),
+    }
+}

@@ -1,0 +1,107 @@
+//! The one table of keys: what they do and what the help says of them.
+
+use crossterm::event::{KeyCode, KeyModifiers};
+
+use super::action::Action;
+use super::event::KeyPress;
+
+/// One line of the table.
+pub(super) struct Binding {
+    /// The keys that do it.
+    pub keys: &'static [KeyPress],
+    /// How they are written in the help.
+    pub label: &'static str,
+    pub action: Action,
+    /// What it does, for the help.
+    pub help: &'static str,
+    /// One word for the bottom line; empty: not there.
+    pub hint: &'static str,
+}
+
+const fn binding(
+    keys: &'static [KeyPress],
+    label: &'static str,
+    action: Action,
+    help: &'static str,
+    hint: &'static str,
+) -> Binding {
+    Binding { keys, label, action, help, hint }
+}
+
+/// Every key, in the order of the help.
+pub(super) const KEYMAP: &[Binding] = &[
+    binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, "show or hide this help", "help"),
+    binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
+    binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", "shadows"),
+    binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", "dof"),
+    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on or off", ""),
+    binding(&[KeyPress::plain('v')], "v", Action::NextView, "next view: normals, depth, …", "view"),
+    binding(&[KeyPress::plain('V')], "V", Action::PreviousView, "previous view", ""),
+    binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
+    binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
+    binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the image as it is now", "write"),
+    binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "back to the scene's own settings", "reset"),
+    binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", ""),
+    binding(
+        &[KeyPress::special(KeyCode::PageUp), KeyPress::special(KeyCode::Up)],
+        "PgUp, up",
+        Action::ScrollUp,
+        "scroll the errors up",
+        "",
+    ),
+    binding(
+        &[KeyPress::special(KeyCode::PageDown), KeyPress::special(KeyCode::Down)],
+        "PgDn, down",
+        Action::ScrollDown,
+        "scroll the errors down",
+        "",
+    ),
+    binding(&[KeyPress::special(KeyCode::Esc)], "Esc", Action::Close, "close the help or the errors", ""),
+    binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "stop and go back to the shell", ""),
+    binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
+];
+
+/// What a key means, if anything. Terminals differ in whether they report shift beside a capital or `?`, so
+/// shift does not count for characters.
+pub(super) fn action(key: KeyPress) -> Option<Action> {
+    let modifiers = match key.code {
+        KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,
+        _ => key.modifiers,
+    };
+    let key = KeyPress { modifiers, ..key };
+    KEYMAP.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
+}
+
+/// The line of an action; every action has one.
+pub(super) fn of(action: Action) -> Option<&'static Binding> {
+    KEYMAP.iter().find(|binding| binding.action == action)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_means_two_things() {
+        let keys: Vec<_> = KEYMAP.iter().flat_map(|binding| binding.keys).collect();
+        for (i, key) in keys.iter().enumerate() {
+            assert!(!keys[..i].contains(key), "{key:?} is bound twice");
+        }
+    }
+
+    #[test]
+    fn shift_beside_a_character_does_not_count_and_ctrl_does() {
+        let shifted = KeyPress { code: KeyCode::Char('?'), modifiers: KeyModifiers::SHIFT };
+        assert_eq!(action(shifted), Some(Action::ToggleHelp));
+        assert_eq!(action(KeyPress::plain('V')), Some(Action::PreviousView));
+        assert_eq!(action(KeyPress::ctrl('q')), None);
+        assert_eq!(action(KeyPress::plain('x')), None);
+    }
+
+    #[test]
+    fn the_fixed_keys_are_there() {
+        for key in "?qsdpv rw0".chars() {
+            assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
+        }
+    }
+}

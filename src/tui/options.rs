@@ -1,0 +1,92 @@
+//! What the front end is given and what it gives back.
+
+use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
+use std::time::Instant;
+
+use super::color::ColorChoice;
+use crate::pipeline::protocol::{Command, Event, PreviewSlot};
+use crate::pipeline::settings::Overrides;
+
+/// How the preview is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PreviewChoice {
+    /// Half blocks where there is colour, else a ramp of characters.
+    #[default]
+    Auto,
+    /// Two pixels a cell.
+    HalfBlock,
+    /// A ramp of characters by luminance.
+    Ascii,
+    /// No preview; the stages get the room.
+    None,
+}
+
+/// A file that the scene depends on was written.
+#[derive(Clone, Copy, Debug)]
+pub struct Changed {
+    /// When the watcher noticed: the start of "from save to first changed cell".
+    pub noticed: Instant,
+}
+
+/// Everything that the front end needs.
+pub struct Options {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// What the command line changes of it; the keys change more on top.
+    pub overrides: Overrides,
+    /// How many colours.
+    pub color: ColorChoice,
+    /// How the preview is drawn.
+    pub preview: PreviewChoice,
+    /// Height of a cell over its width; none: asked of the terminal, else 2.
+    pub cell_aspect: Option<f32>,
+    /// Where orders go. Must not block.
+    pub commands: Box<dyn FnMut(Command)>,
+    /// What the worker says. Its end means that the worker is gone, which ends the front end.
+    pub events: Receiver<Event>,
+    /// Where the worker puts pictures.
+    pub previews: PreviewSlot,
+    /// What the watcher says. Its end is said in the message line.
+    pub changes: Receiver<Changed>,
+}
+
+/// How the program is to end: its exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExitStatus(pub u8);
+
+impl ExitStatus {
+    /// The person asked for it.
+    pub const QUIT: Self = Self(0);
+    /// SIGHUP: the terminal is gone.
+    pub const HANGUP: Self = Self(129);
+    /// SIGINT or ctrl-c.
+    pub const INTERRUPTED: Self = Self(130);
+    /// SIGTERM.
+    pub const TERMINATED: Self = Self(143);
+}
+
+/// Why the front end could not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum TuiError {
+    /// Standard input or output is a file or a pipe.
+    #[error("{stream} is not a terminal: use `--once` to render without one")]
+    NotATerminal {
+        /// `standard input` or `standard output`.
+        stream: &'static str,
+    },
+    /// The terminal could not be set up or written to.
+    #[error("cannot {action} the terminal: {source}; `--once` renders without one")]
+    Terminal {
+        /// What was tried.
+        action: &'static str,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The worker ended by itself.
+    #[error("the renderer stopped{}", .reason.as_ref().map(|text| format!(": {text}")).unwrap_or_default())]
+    WorkerGone {
+        /// The message of its panic, if there was one.
+        reason: Option<String>,
+    },
+}

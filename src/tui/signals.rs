@@ -1,0 +1,155 @@
+//! Signals, and a terminal that goes away without one.
+//!
+//! They are heard on threads of their own, because the loop can be stuck: in a write to a terminal that takes
+//! nothing, or behind keys that never end (crossterm's reader spins once its terminal is gone). What has to end
+//! the program ends it from here when the loop does not.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Sender;
+use std::thread;
+use std::time::Duration;
+
+use nix::sys::signal::{Signal as Number, kill};
+use nix::unistd::{Pid, getpid, getppid, getsid};
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM, SIGTSTP};
+use signal_hook::iterator::Signals;
+use signal_hook::low_level;
+
+use super::ExitStatus;
+use super::event::{Event, Signal};
+use super::terminal;
+
+/// How long the loop has to end after it was told to.
+const GRACE: Duration = Duration::from_millis(1500);
+/// How long a stuck terminal has to take the bytes that restore it.
+const RESCUE: Duration = Duration::from_millis(100);
+/// How often the terminal is looked at.
+const WATCH: Duration = Duration::from_millis(500);
+
+/// Hears signals until it is dropped; after that they do what they do by default.
+pub(super) struct Listener {
+    over: Arc<AtomicBool>,
+}
+
+impl Listener {
+    /// Starts to listen; what is heard goes to `events`.
+    pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
+        let over = Arc::new(AtomicBool::new(false));
+        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGTSTP, SIGCONT])?;
+        let ear = Ear { over: Arc::clone(&over), events: events.clone() };
+        thread::Builder::new().name("signals".to_owned()).spawn(move || {
+            for number in signals.forever() {
+                ear.hear(number);
+            }
+        })?;
+        let ear = Ear { over: Arc::clone(&over), events: events.clone() };
+        thread::Builder::new().name("terminal-watch".to_owned()).spawn(move || ear.watch_terminal())?;
+        Ok(Self { over })
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Release);
+    }
+}
+
+struct Ear {
+    over: Arc<AtomicBool>,
+    events: Sender<Event>,
+}
+
+impl Ear {
+    fn hear(&self, number: i32) {
+        if self.over.load(Ordering::Acquire) {
+            let _ = low_level::emulate_default_handler(number);
+            return;
+        }
+        let signal = match number {
+            SIGINT => Signal::Interrupt,
+            SIGTERM => Signal::Terminate,
+            SIGHUP => Signal::Hangup,
+            SIGTSTP => Signal::Suspend,
+            _ => Signal::Continue,
+        };
+        self.tell(signal);
+    }
+
+    fn watch_terminal(&self) {
+        while !self.over.load(Ordering::Acquire) {
+            thread::sleep(WATCH);
+            if !terminal::is_there() {
+                self.tell(Signal::Hangup);
+                return;
+            }
+        }
+    }
+
+    fn tell(&self, signal: Signal) {
+        if let Some(status) = ends(signal) {
+            let over = Arc::clone(&self.over);
+            thread::spawn(move || end_later(signal, status, &over));
+        }
+        // The loop is gone: so is the need to tell it.
+        let _ = self.events.send(Event::Signal(signal));
+    }
+}
+
+/// The exit code of a signal that ends the program.
+fn ends(signal: Signal) -> Option<ExitStatus> {
+    match signal {
+        Signal::Interrupt => Some(ExitStatus::INTERRUPTED),
+        Signal::Terminate => Some(ExitStatus::TERMINATED),
+        Signal::Hangup => Some(ExitStatus::HANGUP),
+        Signal::Suspend | Signal::Continue => None,
+    }
+}
+
+/// Ends the process when the loop did not. After a hangup nothing is waited for: there is nobody to see it.
+fn end_later(signal: Signal, status: ExitStatus, over: &AtomicBool) {
+    thread::sleep(GRACE);
+    if signal != Signal::Hangup {
+        if over.load(Ordering::Acquire) {
+            return;
+        }
+        terminal::rescue();
+        thread::sleep(RESCUE);
+    }
+    low_level::exit(i32::from(status.0));
+}
+
+/// Whether a stopped program could be continued: a shell of the same session is waiting. A session's first
+/// process (a terminal that runs glimt itself) has none.
+pub(super) fn has_shell() -> bool {
+    match (getsid(None), getsid(Some(getppid()))) {
+        (Ok(own), Ok(parents)) => own == parents && own != getpid(),
+        _ => false,
+    }
+}
+
+/// What ctrl-z does outside raw mode: SIGTSTP to the whole job, so that a program around glimt stops too.
+pub(super) fn stop_job() -> io::Result<()> {
+    kill(Pid::from_raw(0), Number::SIGTSTP).map_err(io::Error::from)
+}
+
+/// Stops this process, as SIGTSTP would without a handler; returns when it is continued.
+pub(super) fn stop() {
+    // A process that cannot be stopped goes on, which is all that can be done.
+    let _ = low_level::emulate_default_handler(SIGTSTP);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_signals_that_end_have_their_codes() {
+        assert_eq!(ends(Signal::Interrupt), Some(ExitStatus(130)));
+        assert_eq!(ends(Signal::Terminate), Some(ExitStatus(143)));
+        assert_eq!(ends(Signal::Hangup), Some(ExitStatus(129)));
+        assert_eq!(ends(Signal::Suspend), None);
+        assert_eq!(ends(Signal::Continue), None);
+    }
+}

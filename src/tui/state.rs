@@ -1,0 +1,233 @@
+//! What the front end knows. It changes in `update` alone.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::color::ColorDepth;
+use super::event::{Window, Written};
+use super::view::layout::Layout;
+use crate::film::Picture;
+use crate::pipeline::protocol::{
+    AssetProgress, Effective, PreviewSize, RenderProgress, Report, Stage, StageReport,
+};
+use crate::pipeline::settings::{Overrides, View};
+use crate::scene::description::Shadows;
+use crate::scene::diagnostic::Diagnostic;
+
+/// How pictures become cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PreviewKind {
+    HalfBlock,
+    Ascii,
+    None,
+}
+
+/// What the keys changed on top of the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Toggles {
+    pub shadows: Option<Shadows>,
+    pub dof: Option<bool>,
+    pub view: Option<View>,
+}
+
+/// What the worker is doing for the current generation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Activity {
+    /// At work since then.
+    Running { since: Instant },
+    /// Finished.
+    Done,
+    /// Could not be done.
+    Broken,
+    /// Stopped.
+    Cancelled,
+}
+
+/// Why the picture is not of the file as it is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Problems {
+    /// Errors and warnings with places.
+    pub diagnostics: Vec<Diagnostic>,
+    /// A failure without a place.
+    pub work: Option<String>,
+}
+
+/// A save on its way to the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PendingChange {
+    pub generation: u64,
+    pub noticed: Instant,
+}
+
+/// The pane of errors and warnings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Pane {
+    pub open: bool,
+    /// First line shown.
+    pub scroll: usize,
+}
+
+/// The bar of a loading asset.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct AssetBar {
+    pub progress: AssetProgress,
+    /// When it was full; it stays a moment longer, so that 100% is seen.
+    pub finished: Option<Instant>,
+}
+
+impl AssetBar {
+    const LINGER: Duration = Duration::from_millis(400);
+
+    /// When it goes.
+    pub(super) fn end(&self) -> Option<Instant> {
+        self.finished.map(|finished| finished + Self::LINGER)
+    }
+}
+
+/// The picture on the screen and the request that it is of.
+#[derive(Clone, Debug)]
+pub(super) struct Shown {
+    pub generation: u64,
+    pub picture: Arc<Picture>,
+}
+
+/// How the front end starts.
+pub(super) struct Setup {
+    pub scene: PathBuf,
+    pub overrides: Overrides,
+    pub window: Window,
+    pub preview: PreviewKind,
+    pub depth: ColorDepth,
+}
+
+/// Everything.
+pub(super) struct State {
+    pub scene: PathBuf,
+    /// The command line's.
+    pub base: Overrides,
+    pub toggles: Toggles,
+    pub window: Window,
+    pub preview: PreviewKind,
+    pub depth: ColorDepth,
+
+    /// Of the newest request.
+    pub generation: u64,
+    /// The preview size of the newest request.
+    pub requested: Option<PreviewSize>,
+    pub activity: Activity,
+    pub paused: bool,
+    /// When to ask for another preview size.
+    pub resize_due: Option<Instant>,
+
+    pub effective: Option<Effective>,
+    pub stages: [Option<StageReport>; Stage::ALL.len()],
+    pub assets: Vec<AssetBar>,
+    pub progress: Option<RenderProgress>,
+    pub report: Option<Box<Report>>,
+    pub unchanged: bool,
+    pub written: Vec<Written>,
+    pub picture: Option<Shown>,
+
+    /// None while the file is whole.
+    pub problems: Option<Problems>,
+    pub warnings: Vec<Diagnostic>,
+    pub pane: Pane,
+    pub help: bool,
+    pub message: Option<String>,
+
+    pub change: Option<PendingChange>,
+    /// From the last save to its first changed cell.
+    pub first_change: Option<Duration>,
+
+    /// The time of the newest event.
+    pub now: Instant,
+    /// Whether the screen is out of date.
+    pub dirty: bool,
+    /// Whether the next frame is the first picture of a request, which does not wait for its turn.
+    pub urgent: bool,
+}
+
+impl State {
+    pub(super) fn new(setup: Setup, now: Instant) -> Self {
+        Self {
+            scene: setup.scene,
+            base: setup.overrides,
+            toggles: Toggles::default(),
+            window: setup.window,
+            preview: setup.preview,
+            depth: setup.depth,
+            generation: 0,
+            requested: None,
+            activity: Activity::Running { since: now },
+            paused: false,
+            resize_due: None,
+            effective: None,
+            stages: Default::default(),
+            assets: Vec::new(),
+            progress: None,
+            report: None,
+            unchanged: false,
+            written: Vec::new(),
+            picture: None,
+            problems: None,
+            warnings: Vec::new(),
+            pane: Pane::default(),
+            help: false,
+            message: None,
+            change: None,
+            first_change: None,
+            now,
+            dirty: true,
+            urgent: false,
+        }
+    }
+
+    /// The scene's settings as the command line and the keys change them.
+    pub(super) fn overrides(&self) -> Overrides {
+        let mut overrides = self.base.clone();
+        overrides.shadows = self.toggles.shadows.or(overrides.shadows);
+        overrides.dof = self.toggles.dof.or(overrides.dof);
+        overrides.view = self.toggles.view.or(overrides.view);
+        overrides
+    }
+
+    /// The view that the run was started with: the only one that is written without being asked.
+    pub(super) fn base_view(&self) -> View {
+        self.base.view.unwrap_or_default()
+    }
+
+    pub(super) fn view(&self) -> View {
+        self.toggles.view.unwrap_or_else(|| self.base_view())
+    }
+
+    pub(super) fn is_running(&self) -> bool {
+        matches!(self.activity, Activity::Running { .. })
+    }
+
+    /// How long the current request has been under way.
+    pub(super) fn running_for(&self) -> Option<Duration> {
+        match self.activity {
+            Activity::Running { since } => Some(self.now.saturating_duration_since(since)),
+            _ => None,
+        }
+    }
+
+    /// The preview that the window has room for: a box of square pixels, each as wide as a cell.
+    pub(super) fn preview_size(&self) -> Option<PreviewSize> {
+        if self.preview == PreviewKind::None {
+            return None;
+        }
+        let area = Layout::of(self).preview;
+        let height = (f32::from(area.height) * self.window.cell_aspect).round() as u32;
+        (area.width > 0 && height > 0).then_some(PreviewSize { width: u32::from(area.width), height })
+    }
+
+    /// When the state has to hear of the time again, if nothing else happens.
+    pub(super) fn next_tick(&self) -> Option<Instant> {
+        const CLOCK: Duration = Duration::from_millis(250);
+        let clock = (self.is_running() && !self.paused).then(|| self.now + CLOCK);
+        let bars = self.assets.iter().filter_map(AssetBar::end).min();
+        [clock, self.resize_due, bars].into_iter().flatten().min()
+    }
+}

@@ -1,0 +1,256 @@
+//! The terminal: taken, given back, whatever happens.
+//!
+//! One [`Screen`] owns it. It is given back when the screen is dropped, when the front end's thread panics (by a
+//! hook that is chained once), before the program stops, and by [`rescue`] when the front end is stuck.
+
+use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, Once, PoisonError};
+use std::thread::ThreadId;
+
+use crossterm::cursor::{Hide, Show};
+use crossterm::style::ResetColor;
+use crossterm::terminal::{
+    Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode,
+    enable_raw_mode,
+};
+use crossterm::{execute, terminal};
+use ratatui::Terminal;
+use ratatui::backend::CrosstermBackend;
+
+use super::event::Window;
+use super::options::TuiError;
+use super::state::State;
+use super::view;
+
+/// Whether the terminal is taken.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+/// The thread whose panic gives the terminal back; those of other threads are kept in [`PANIC`].
+static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
+/// What the last panic of another thread said.
+static PANIC: Mutex<Option<String>> = Mutex::new(None);
+
+/// A frame goes out in few writes.
+const FRAME_BUFFER_BYTES: usize = 1 << 17;
+/// Half blocks are about square at this height over width of a cell.
+const DEFAULT_CELL_ASPECT: f32 = 2.0;
+
+/// The terminal, taken.
+pub(super) struct Screen {
+    /// None once it was abandoned.
+    terminal: Option<Terminal<CrosstermBackend<BufWriter<Stdout>>>>,
+}
+
+impl Screen {
+    /// Takes the terminal: raw mode, alternate screen, no cursor.
+    pub(super) fn open() -> Result<Self, TuiError> {
+        chain_panic_hook();
+        take().map_err(|source| TuiError::Terminal { action: "set up", source })?;
+        let backend = CrosstermBackend::new(BufWriter::with_capacity(FRAME_BUFFER_BYTES, io::stdout()));
+        match Terminal::new(backend) {
+            Ok(terminal) => Ok(Self { terminal: Some(terminal) }),
+            Err(source) => {
+                give_back();
+                Err(TuiError::Terminal { action: "ask for the size of", source })
+            }
+        }
+    }
+
+    /// Draws what differs from the frame before.
+    pub(super) fn draw(&mut self, state: &State) -> io::Result<()> {
+        match &mut self.terminal {
+            Some(terminal) => terminal.draw(|frame| view::draw(state, frame)).map(|_| ()),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether it may be drawn on.
+    pub(super) fn is_taken(&self) -> bool {
+        TAKEN.load(Ordering::Acquire) && self.terminal.is_some()
+    }
+
+    /// Gives the terminal back until [`Screen::resume`].
+    pub(super) fn suspend(&mut self) {
+        give_back();
+    }
+
+    /// Takes the terminal again, whoever changed its modes, and forgets what was on it.
+    pub(super) fn resume(&mut self) -> io::Result<()> {
+        let Some(terminal) = &mut self.terminal else { return Ok(()) };
+        // What a shell set while the program was stopped is no longer what was saved when it was taken.
+        if TAKEN.swap(false, Ordering::AcqRel) {
+            disable_raw_mode()?;
+        }
+        take()?;
+        // Not `Terminal::clear`, which asks the terminal where the cursor is and would wait for the keys' thread.
+        let area = terminal.size()?;
+        terminal.resize(area.into())
+    }
+
+    /// The terminal is gone: nothing more is written to it.
+    pub(super) fn abandon(mut self) {
+        TAKEN.store(false, Ordering::Release);
+        std::mem::forget(self.terminal.take());
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        give_back();
+    }
+}
+
+fn take() -> io::Result<()> {
+    enable_raw_mode()?;
+    TAKEN.store(true, Ordering::Release);
+    *OWNER.lock().unwrap_or_else(PoisonError::into_inner) = Some(std::thread::current().id());
+    enter(&mut io::stdout()).inspect_err(|_| give_back())
+}
+
+/// Gives the terminal back, if it is taken. Errors are of no use: there is nobody left to tell.
+fn give_back() {
+    if TAKEN.swap(false, Ordering::AcqRel) {
+        let _ = leave(&mut io::stdout());
+        let _ = disable_raw_mode();
+    }
+}
+
+/// Gives the terminal back from another thread while the owner may be stuck in a write and hold the lock of
+/// standard output. Returns at once; a terminal that takes nothing keeps the writer waiting, not the caller.
+pub(super) fn rescue() {
+    if TAKEN.swap(false, Ordering::AcqRel) {
+        let _ = disable_raw_mode();
+        std::thread::spawn(|| {
+            let tty = std::fs::OpenOptions::new().write(true).open("/dev/tty");
+            tty.and_then(|mut tty| leave(&mut tty))
+        });
+    }
+}
+
+/// The bytes that take the screen.
+fn enter(out: &mut impl Write) -> io::Result<()> {
+    execute!(out, EnterAlternateScreen, Hide, Clear(ClearType::All))
+}
+
+/// The bytes that give it back, from any state that a frame can be cut in.
+fn leave(out: &mut impl Write) -> io::Result<()> {
+    execute!(out, EndSynchronizedUpdate, ResetColor, LeaveAlternateScreen, Show)
+}
+
+/// While the terminal is taken, a panic of its owner gives it back and is then reported as always; a panic of
+/// another thread would be lost on the alternate screen and is kept for [`last_panic`].
+fn chain_panic_hook() {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let previous = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            let owner = *OWNER.lock().unwrap_or_else(PoisonError::into_inner);
+            if TAKEN.load(Ordering::Acquire) && owner != Some(std::thread::current().id()) {
+                *PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some(info.to_string());
+            } else {
+                give_back();
+                previous(info);
+            }
+        }));
+    });
+}
+
+/// What the last panic of another thread said.
+pub(super) fn last_panic() -> Option<String> {
+    PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// An error where keys or screen are no terminal.
+pub(super) fn require() -> Result<(), TuiError> {
+    if !io::stdin().is_terminal() {
+        return Err(TuiError::NotATerminal { stream: "standard input" });
+    }
+    if !io::stdout().is_terminal() {
+        return Err(TuiError::NotATerminal { stream: "standard output" });
+    }
+    Ok(())
+}
+
+/// Whether both ends of the terminal are still there.
+pub(super) fn is_there() -> bool {
+    require().is_ok()
+}
+
+/// The size of the window; the aspect of a cell as given, else from the window's size in pixels, else 2.
+pub(super) fn window(cell_aspect: Option<f32>) -> Window {
+    match terminal::window_size() {
+        Ok(size) => Window {
+            columns: size.columns,
+            rows: size.rows,
+            cell_aspect: cell_aspect
+                .unwrap_or_else(|| aspect((size.columns, size.rows), (size.width, size.height))),
+        },
+        Err(_) => {
+            let (columns, rows) = terminal::size().unwrap_or((80, 24));
+            Window { columns, rows, cell_aspect: cell_aspect.unwrap_or(DEFAULT_CELL_ASPECT) }
+        }
+    }
+}
+
+/// Height over width of a cell. Sizes in pixels are often zero or nonsense; values within 3% of 2 are 2, so that
+/// pictures need no scaling.
+fn aspect(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
+    let width = f32::from(pixels.0) / f32::from(cells.0);
+    let height = f32::from(pixels.1) / f32::from(cells.1);
+    let aspect = height / width;
+    let sane = width >= 2.0 && (1.2..=3.5).contains(&aspect);
+    if sane && (aspect - DEFAULT_CELL_ASPECT).abs() > 0.06 { aspect } else { DEFAULT_CELL_ASPECT }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(write: impl Fn(&mut Vec<u8>) -> io::Result<()>) -> String {
+        let mut out = Vec::new();
+        write(&mut out).expect("a vector takes everything");
+        String::from_utf8(out).expect("ASCII")
+    }
+
+    #[test]
+    fn leaving_undoes_entering() {
+        let enter = bytes(enter);
+        let leave = bytes(leave);
+        for mode in ["?1049", "?25"] {
+            assert!(enter.contains(mode) && leave.contains(mode), "{mode}: {enter:?} {leave:?}");
+        }
+        assert!(enter.contains("\x1b[?1049h") && enter.contains("\x1b[?25l"), "{enter:?}");
+        assert!(leave.contains("\x1b[0m"), "{leave:?}");
+        assert!(leave.ends_with("\x1b[?1049l\x1b[?25h"), "{leave:?}");
+    }
+
+    #[test]
+    fn the_screen_is_left_in_a_vt100() {
+        let side = |length| std::num::NonZero::new(length).expect("not zero");
+        let mut screen = vt100::Parser::new(side(5), side(20), 0);
+        screen.process(b"shell$ ");
+        screen.process(bytes(enter).as_bytes());
+        screen.process(b"picture");
+        assert!(screen.screen().alternate_screen() && screen.screen().hide_cursor());
+        screen.process(bytes(leave).as_bytes());
+        assert!(!screen.screen().alternate_screen() && !screen.screen().hide_cursor());
+        assert!(screen.screen().contents().starts_with("shell$ "));
+    }
+
+    #[test]
+    fn the_aspect_of_a_cell_is_believed_when_it_is_sane() {
+        assert_eq!(aspect((80, 24), (80 * 8, 24 * 18)), 2.25);
+        assert_eq!(aspect((80, 24), (0, 0)), 2.0);
+        assert_eq!(aspect((0, 0), (640, 480)), 2.0);
+        assert_eq!(aspect((80, 24), (80, 24)), 2.0);
+        assert_eq!(aspect((100, 50), (1000, 1010)), 2.0);
+    }
+
+    #[test]
+    fn giving_back_what_was_not_taken_does_nothing() {
+        assert!(!TAKEN.load(Ordering::Acquire));
+        give_back();
+        rescue();
+        assert!(!TAKEN.load(Ordering::Acquire));
+    }
+}

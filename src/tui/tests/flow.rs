@@ -1,0 +1,164 @@
+//! Requests, generations, time and signals.
+
+use std::time::Duration;
+
+use super::{BLUE, RED, cells_of};
+use crate::pipeline::protocol::{self, Failure, PreviewSize};
+use crate::tui::event::{Effect, Event, KeyPress, Signal, Source};
+use crate::tui::fixtures::*;
+use crate::tui::state::Activity;
+use crate::tui::{Changed, ExitStatus};
+
+#[test]
+fn the_first_request_has_room_for_the_preview() {
+    let mut state = state(80, 24);
+    let effects = crate::tui::update::start(&mut state);
+    let request = request(&effects).expect("a request");
+    assert_eq!(request.preview, Some(PreviewSize { width: 51, height: 40 }));
+    assert_eq!((request.generation, request.write, request.force), (1, true, false));
+}
+
+#[test]
+fn pictures_of_older_generations_are_dropped() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let old = desk.state.generation;
+    desk.press('r');
+    desk.screen();
+    desk.event(Event::Picture { generation: old, picture: plain_picture(50, 38, BLUE) });
+    desk.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
+    desk.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
+    assert!(!desk.state.dirty, "nothing is drawn for them");
+    assert!(desk.state.progress.is_none() && desk.state.problems.is_none());
+    assert_eq!(cells_of(&mut desk, BLUE), 0);
+    assert!(cells_of(&mut desk, RED) > 0, "the last picture stands until there is a newer one");
+}
+
+#[test]
+fn the_first_change_is_measured_from_the_save_to_the_frame() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let noticed = desk.now;
+    desk.now += Duration::from_millis(3);
+    let effects = desk.event(Event::Changed(Changed { noticed }));
+    assert_eq!(request(&effects).map(|it| it.generation), Some(2));
+    desk.event(Event::Shown { generation: 1 });
+    assert_eq!(desk.state.first_change, None, "the old picture does not count");
+    desk.event(Event::Picture { generation: 2, picture: plain_picture(50, 38, BLUE) });
+    desk.now += Duration::from_millis(20);
+    desk.event(Event::Shown { generation: 2 });
+    assert!(desk.text().contains("first change after 23 ms"), "{}", desk.text());
+    desk.now += Duration::from_millis(20);
+    desk.event(Event::Shown { generation: 2 });
+    assert!(!desk.state.dirty && desk.text().contains("after 23 ms"), "measured once");
+}
+
+#[test]
+fn only_the_first_picture_of_a_request_does_not_wait_for_its_turn() {
+    let mut desk = Desk::new();
+    let picture = |desk: &mut Desk, generation| {
+        desk.state.urgent = false;
+        desk.event(Event::Picture { generation, picture: plain_picture(50, 38, RED) });
+        desk.state.urgent
+    };
+    assert!(picture(&mut desk, 1));
+    assert!(!picture(&mut desk, 1));
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    assert!(!picture(&mut desk, 1), "an old one is no news");
+    assert!(picture(&mut desk, 2));
+    assert!(!picture(&mut desk, 2));
+}
+
+#[test]
+fn nothing_is_drawn_when_nothing_changed() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.screen();
+    desk.press('x');
+    desk.wait(10_000);
+    desk.event(Event::Shown { generation: 1 });
+    desk.worker(protocol::Event::Preview { generation: 1 });
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Up));
+    assert!(!desk.state.dirty);
+    assert_eq!(desk.state.next_tick(), None);
+}
+
+#[test]
+fn the_clock_runs_while_rendering_and_stands_while_paused() {
+    let mut desk = Desk::new();
+    desk.screen();
+    assert!(desk.state.next_tick().is_some());
+    desk.wait(250);
+    assert!(desk.state.dirty);
+    desk.press(' ');
+    desk.screen();
+    assert_eq!(desk.state.next_tick(), None);
+}
+
+#[test]
+fn another_window_asks_for_another_preview_once_it_is_quiet() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    assert!(desk.event(Event::Resize(window(120, 40))).is_empty());
+    assert!(cells_of(&mut desk, RED) > 51 * 20, "the picture at hand is scaled meanwhile");
+    desk.now += Duration::from_millis(50);
+    desk.event(Event::Resize(window(200, 60)));
+    assert!(desk.wait(100).is_empty());
+    let effects = desk.wait(50);
+    let request = request(&effects).expect("a request");
+    assert_eq!(request.preview, desk.state.preview_size());
+    assert_eq!(request.preview, Some(PreviewSize { width: 153, height: 112 }));
+    assert!(!request.force);
+    desk.finish(RED);
+    desk.event(Event::Resize(window(200, 60)));
+    assert!(desk.wait(1000).is_empty(), "the same size asks for nothing");
+}
+
+#[test]
+fn a_long_render_is_not_given_up_for_the_window() {
+    let mut desk = Desk::new();
+    desk.now += Duration::from_secs(5);
+    desk.event(Event::Resize(window(120, 40)));
+    assert!(desk.wait(200).is_empty());
+    let effects = desk.worker(done(1, Vec::new(), false));
+    assert!(request(&effects).is_some(), "it is asked for afterwards");
+}
+
+#[test]
+fn a_comment_edited_renders_nothing_and_says_so() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.worker(protocol::Event::Started { generation: 2 });
+    desk.worker(done(2, Vec::new(), true));
+    assert!(desk.text().contains("unchanged"));
+    assert!(cells_of(&mut desk, RED) > 0);
+}
+
+#[test]
+fn signals_end_stop_and_redraw() {
+    let mut desk = Desk::new();
+    let effect = |desk: &mut Desk, signal| desk.event(Event::Signal(signal));
+    assert!(matches!(effect(&mut desk, Signal::Interrupt)[..], [Effect::Quit(ExitStatus(130))]));
+    assert!(matches!(effect(&mut desk, Signal::Terminate)[..], [Effect::Quit(ExitStatus(143))]));
+    assert!(matches!(effect(&mut desk, Signal::Hangup)[..], [Effect::Quit(ExitStatus(129))]));
+    assert!(matches!(effect(&mut desk, Signal::Suspend)[..], [Effect::Suspend]));
+    assert!(matches!(effect(&mut desk, Signal::Continue)[..], [Effect::Redraw]));
+}
+
+#[test]
+fn a_source_that_ends_is_dealt_with() {
+    let mut desk = Desk::new();
+    assert!(matches!(desk.event(Event::Lost(Source::Worker))[..], [Effect::GiveUp]));
+    assert!(matches!(desk.event(Event::Lost(Source::Keys))[..], [Effect::Quit(ExitStatus::HANGUP)]));
+    assert!(desk.event(Event::Lost(Source::Watcher)).is_empty());
+    assert!(desk.text().contains("no longer watched"));
+}
+
+#[test]
+fn a_cancelled_render_says_that_it_stopped() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Cancelled { generation: 1 });
+    assert_eq!(desk.state.activity, Activity::Cancelled);
+    assert!(desk.text().contains("stopped"));
+}

@@ -1,0 +1,168 @@
+//! What each key does, and that the help says so.
+
+use super::RED;
+use crate::pipeline::protocol::{self, Command};
+use crate::pipeline::settings::{Overrides, View};
+use crate::scene::description::Shadows;
+use crate::scene::diagnostic::Severity;
+use crate::tui::action::Action;
+use crate::tui::color::ColorDepth;
+use crate::tui::event::{Effect, Event, KeyPress};
+use crate::tui::fixtures::*;
+use crate::tui::keymap::KEYMAP;
+use crate::tui::state::PreviewKind;
+use crate::tui::{Changed, ExitStatus};
+
+/// Every key of the table does what its line says. The match has an arm for every action.
+#[test]
+fn every_key_has_its_effect() {
+    for binding in KEYMAP {
+        for key in binding.keys {
+            let mut desk = Desk::new();
+            desk.finish(RED);
+            check(binding.action, *key, &mut desk);
+        }
+    }
+}
+
+fn check(action: Action, key: KeyPress, desk: &mut Desk) {
+    let overrides = |effects: &[Effect]| request(effects).map(|it| it.overrides.clone());
+    match action {
+        Action::CycleShadows => {
+            for wanted in [Shadows::Hard, Shadows::Off, Shadows::Soft] {
+                let effects = desk.key(key);
+                assert_eq!(overrides(&effects).expect("a request").shadows, Some(wanted));
+            }
+        }
+        Action::ToggleDepthOfField => {
+            for wanted in [false, true] {
+                let effects = desk.key(key);
+                assert_eq!(overrides(&effects).expect("a request").dof, Some(wanted));
+            }
+        }
+        Action::TogglePhotons => {
+            assert!(desk.key(key).is_empty());
+            assert!(desk.text().contains("photons come with a later version"));
+        }
+        Action::NextView | Action::PreviousView => {
+            let effects = desk.key(key);
+            let wanted = if action == Action::NextView { View::Normal } else { View::Shadow };
+            let request = request(&effects).expect("a request");
+            assert_eq!((request.overrides.view, request.write), (Some(wanted), false));
+            assert!(desk.text().contains(&format!("view {}", wanted.name())));
+        }
+        Action::TogglePause => {
+            desk.press('r');
+            assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Pause(true))]));
+            assert!(desk.text().contains("paused"));
+            assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Pause(false))]));
+        }
+        Action::RenderAgain => assert!(request(&desk.key(key)).expect("a request").force),
+        Action::WriteNow => assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Write)])),
+        Action::SceneSettings => {
+            desk.press('s');
+            desk.press('v');
+            assert_eq!(overrides(&desk.key(key)), Some(Overrides::default()));
+            assert!(desk.key(key).is_empty(), "there is nothing left to undo");
+        }
+        Action::ToggleDiagnostics | Action::Close => {
+            desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
+            assert!(desk.key(key).is_empty());
+            assert!(!desk.text().contains("error: wrong"));
+        }
+        Action::ScrollUp | Action::ScrollDown => {
+            desk.fail((0..9).map(|_| diagnostic(Severity::Error, "wrong")).collect());
+            desk.state.pane.scroll = 9;
+            desk.key(key);
+            assert_eq!(desk.state.pane.scroll < 9, action == Action::ScrollUp);
+            assert_eq!(desk.state.pane.scroll > 9, action == Action::ScrollDown);
+        }
+        Action::ToggleHelp => {
+            desk.key(key);
+            assert!(desk.text().contains("quit") && desk.text().contains(" keys "));
+            desk.key(key);
+            assert!(!desk.text().contains(" keys "));
+        }
+        Action::Suspend => assert!(matches!(desk.key(key)[..], [Effect::StopJob])),
+        Action::Interrupt => assert!(matches!(desk.key(key)[..], [Effect::Quit(ExitStatus(130))])),
+        Action::Quit => assert!(matches!(desk.key(key)[..], [Effect::Quit(ExitStatus(0))])),
+    }
+}
+
+#[test]
+fn the_help_shows_every_line_of_the_table_at_80_by_24() {
+    let mut desk = Desk::new();
+    desk.press('?');
+    let text = desk.text();
+    for binding in KEYMAP {
+        let line = text.lines().find(|line| line.contains(binding.help));
+        let line = line.unwrap_or_else(|| panic!("{:?} is not in\n{text}", binding.help));
+        assert!(line.contains(binding.label), "{line:?}");
+    }
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    assert!(!desk.text().contains(" keys "));
+}
+
+#[test]
+fn the_bottom_line_is_made_from_the_table_until_there_is_a_message() {
+    let mut desk = Desk::new();
+    let bottom = |desk: &mut Desk| desk.text().lines().last().map(str::to_owned).unwrap_or_default();
+    let hints = bottom(&mut desk);
+    for binding in KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::ToggleHelp) {
+        assert!(hints.contains(&format!("{} {}", binding.label, binding.hint)), "{hints:?}");
+    }
+    desk.press('p');
+    assert!(bottom(&mut desk).contains("photons come with"));
+    desk.press('?');
+    desk.press('?');
+    assert_eq!(bottom(&mut desk), hints);
+}
+
+#[test]
+fn toggles_start_from_the_command_line_and_go_back_to_it() {
+    let base = Overrides { shadows: Some(Shadows::Off), view: Some(View::Depth), ..Overrides::default() };
+    let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone());
+    let mut desk = Desk::with(state);
+    assert!(desk.text().contains("shadows off") && desk.text().contains("view depth"));
+    let effects = desk.press('s');
+    let soft = request(&effects).expect("a request");
+    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), true));
+    let effects = desk.press('V');
+    assert!(!request(&effects).expect("a request").write, "only the view of the command line is written");
+    let effects = desk.press('0');
+    assert_eq!(request(&effects).map(|it| it.overrides.clone()), Some(base));
+}
+
+#[test]
+fn depth_of_field_of_a_pinhole_is_explained() {
+    let mut desk = Desk::new();
+    let pinhole = || Box::new(protocol::Effective { dof: false, ..settings() });
+    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole() });
+    assert!(desk.press('d').is_empty());
+    assert!(desk.text().contains("no aperture"));
+
+    let base = Overrides { dof: Some(false), ..Overrides::default() };
+    let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
+    let mut desk = Desk::with(state);
+    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole() });
+    assert_eq!(request(&desk.press('d')).expect("a request").overrides.dof, Some(true));
+    desk.worker(protocol::Event::Settings { generation: 2, settings: pinhole() });
+    assert!(desk.text().contains("no aperture"));
+}
+
+#[test]
+fn a_new_request_lets_a_paused_worker_go_on() {
+    let mut desk = Desk::new();
+    desk.press(' ');
+    let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
+    assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
+    assert!(!desk.state.paused);
+}
+
+#[test]
+fn pausing_nothing_is_explained() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    assert!(desk.press(' ').is_empty());
+    assert!(desk.text().contains("nothing is rendering"));
+}

@@ -1,0 +1,286 @@
+//! What is on the screen.
+
+use std::time::Duration;
+
+use proptest::prelude::*;
+use ratatui::style::Color;
+
+use super::{BLUE, RED, cells_of};
+use crate::pipeline::protocol::{self, Failure, Stage, Status};
+use crate::pipeline::settings::Overrides;
+use crate::scene::diagnostic::Severity;
+use crate::tui::Changed;
+use crate::tui::color::ColorDepth;
+use crate::tui::event::{Event, KeyPress};
+use crate::tui::fixtures::*;
+use crate::tui::keymap::KEYMAP;
+use crate::tui::state::PreviewKind;
+
+#[test]
+fn the_picture_is_in_half_blocks_in_the_middle_of_its_area() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let screen = desk.screen();
+    // 51 × 20 cells have room for 51 × 39 of 50:38; the area begins in row 1.
+    let cell = &screen[(25, 10)];
+    assert_eq!((cell.symbol(), cell.fg, cell.bg), ("▀", Color::Rgb(200, 20, 10), Color::Rgb(200, 20, 10)));
+    assert_eq!(cells_of(&mut desk, RED), 51 * 20);
+    assert_ne!(screen[(51, 10)].symbol(), "▀", "the picture ends where the stages begin");
+}
+
+#[test]
+fn upper_and_lower_pixels_are_foreground_and_background() {
+    let mut desk = Desk::new();
+    let generation = desk.state.generation;
+    let mut picture = (*plain_picture(51, 40, RED)).clone();
+    for (i, pixel) in picture.pixels.iter_mut().enumerate() {
+        if (i / 51) % 2 == 1 {
+            *pixel = BLUE;
+        }
+    }
+    desk.event(Event::Picture { generation, picture: picture.into() });
+    let screen = desk.screen();
+    for place in [(0, 1), (50, 20), (17, 9)] {
+        assert_eq!((screen[place].fg, screen[place].bg), (Color::Rgb(200, 20, 10), Color::Rgb(10, 20, 200)));
+    }
+}
+
+#[test]
+fn without_colours_the_picture_is_a_ramp_and_nothing_has_a_colour() {
+    let state = state_with(80, 24, PreviewKind::Ascii, ColorDepth::None, Overrides::default());
+    let mut desk = Desk::with(state);
+    desk.finish([255; 3]);
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    let screen = desk.screen();
+    assert_eq!(screen[(25, 5)].symbol(), "@");
+    assert!(screen.content.iter().all(|cell| cell.fg == Color::Reset && cell.bg == Color::Reset));
+}
+
+#[test]
+fn a_picture_that_lies_about_its_size_is_not_shown() {
+    let mut desk = Desk::new();
+    let mut picture = (*plain_picture(4, 4, RED)).clone();
+    picture.pixels.truncate(3);
+    desk.event(Event::Picture { generation: 1, picture: picture.into() });
+    assert!(desk.state.picture.is_none());
+}
+
+#[test]
+fn the_table_shows_each_stage_as_it_stands() {
+    let mut desk = Desk::new();
+    for report in [
+        stage(Stage::Parse, Status::Done, 0.0004, ""),
+        stage(Stage::Meshes, Status::Reused, 0.0, ""),
+        stage(Stage::Photons, Status::Skipped, 0.0, "off"),
+        stage(Stage::Render, Status::Running, 0.0, ""),
+    ] {
+        desk.worker(protocol::Event::Stage { generation: 1, stage: report });
+    }
+    let text = desk.text();
+    for line in
+        ["✓ parse     0.40 ms", "= meshes     reused", "· accel", "- photons   skipped  off", "> render"]
+    {
+        assert!(text.contains(line), "{line:?} is not in\n{text}");
+    }
+}
+
+#[test]
+fn the_bar_of_an_asset_fills_stays_a_moment_and_goes() {
+    let mut desk = Desk::new();
+    let asset = |done| protocol::Event::Asset { generation: 1, progress: asset("bricks", done, 8) };
+    desk.worker(asset(3));
+    let text = desk.text();
+    assert!(text.contains("bricks") && text.contains("███░░░░░  37%"), "{text}");
+    desk.worker(asset(8));
+    desk.wait(100);
+    assert!(desk.text().contains("████████ 100%"));
+    assert_eq!(desk.text().matches("bricks").count(), 1);
+    desk.wait(400);
+    assert!(desk.state.dirty);
+    assert!(!desk.text().contains("bricks"));
+}
+
+#[test]
+fn a_full_bar_goes_after_the_render_too() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Asset { generation: 1, progress: asset("knot.obj", 2, 2) });
+    desk.worker(done(1, Vec::new(), false));
+    assert!(desk.text().contains("knot.obj"));
+    let wake = desk.state.next_tick().expect("the bar asks to be woken");
+    assert!(wake > desk.now && wake <= desk.now + Duration::from_millis(500));
+    desk.wait(500);
+    assert!(!desk.text().contains("knot.obj"));
+    assert_eq!(desk.state.next_tick(), None);
+}
+
+#[test]
+fn the_render_bar_tells_percent_samples_and_what_is_to_go() {
+    let mut desk = Desk::new();
+    desk.now += Duration::from_millis(1200);
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.25, None) });
+    assert!(desk.text().contains("25% · samples 16/64 · 1.2 s · ETA …"), "{}", desk.text());
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(125.0)) });
+    assert!(desk.text().contains("50% · samples 32/64 · 1.2 s · ETA 2 min 05 s"), "{}", desk.text());
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(1.0, Some(0.0)) });
+    desk.worker(done(1, Vec::new(), false));
+    let text = desk.text();
+    assert!(text.contains("100% · samples 64/64 · total 1.93 s") && !text.contains('░'), "{text}");
+}
+
+#[test]
+fn a_written_image_is_named_with_its_size() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.worker(protocol::Event::Written { generation: 1, path: "out/cornell.png".into(), bytes: 210_400 });
+    let text = desk.text();
+    for words in ["image out/cornell.png", "640×480 px, 210.4 kB", "wrote out/cornell.png"] {
+        assert!(text.contains(words), "{words:?} is not in\n{text}");
+    }
+}
+
+#[test]
+fn a_broken_file_keeps_the_picture_and_shows_the_place() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let before = cells_of(&mut desk, RED);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    let text = desk.text();
+    for words in [
+        "error: unknown key `heigth`",
+        "scenes/cornell.toml:3:1",
+        "3 | heigth = 4",
+        "| ^^^^^^ here",
+        "help: did you mean `height`?",
+        " 1 error ",
+        "broken",
+    ] {
+        assert!(text.contains(words), "{words:?} is not in\n{text}");
+    }
+    let after = cells_of(&mut desk, RED);
+    assert!(after >= before / 2, "{after} of {before} cells are left");
+
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    assert!(desk.text().contains("heigth"), "the pane stays until the file is whole");
+    desk.finish(BLUE);
+    assert!(!desk.text().contains("heigth"));
+    assert_eq!((cells_of(&mut desk, BLUE), cells_of(&mut desk, RED)), (before, 0));
+}
+
+#[test]
+fn long_errors_are_scrolled_and_stop_at_their_ends() {
+    let mut desk = Desk::new();
+    desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    assert!(desk.text().contains("wrong number 0") && !desk.text().contains("wrong number 8"));
+    assert!(desk.text().contains("9 errors"));
+    let down = KeyPress::special(crossterm::event::KeyCode::PageDown);
+    let up = KeyPress::special(crossterm::event::KeyCode::Up);
+    for _ in 0..20 {
+        desk.key(down);
+    }
+    let text = desk.text();
+    assert!(text.contains("wrong number 8") && !text.contains("wrong number 0"), "{text}");
+    desk.screen();
+    desk.key(down);
+    assert!(!desk.state.dirty, "the end is the end");
+    for _ in 0..20 {
+        desk.key(up);
+    }
+    assert!(desk.text().contains("wrong number 0"));
+}
+
+#[test]
+fn work_that_failed_is_said_in_the_pane() {
+    let mut desk = Desk::new();
+    let failure = Failure::Work("cannot write /nowhere/a.png: no such folder".to_owned());
+    desk.worker(protocol::Event::Failed { generation: 1, failure });
+    assert!(desk.text().contains("error: cannot write /nowhere/a.png"), "{}", desk.text());
+}
+
+#[test]
+fn warnings_are_counted_and_shown_on_demand() {
+    let mut desk = Desk::new();
+    desk.worker(done(1, vec![diagnostic(Severity::Warning, "texture `b` is not used")], false));
+    assert!(desk.text().contains("1 warning") && !desk.text().contains("not used"));
+    desk.press('e');
+    assert!(desk.text().contains("warning: texture `b` is not used"));
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    assert!(!desk.text().contains("not used"));
+}
+
+#[test]
+fn names_with_escape_sequences_come_out_harmless() {
+    let evil = "a\u{1b}]52;c;eA==\u{7}\u{9b}31m\u{202e}b\rc";
+    let mut desk = Desk::new();
+    desk.state.scene = evil.into();
+    desk.worker(protocol::Event::Asset { generation: 1, progress: asset(evil, 1, 2) });
+    desk.worker(protocol::Event::Stage {
+        generation: 1,
+        stage: stage(Stage::Parse, Status::Done, 0.1, evil),
+    });
+    desk.worker(protocol::Event::Written { generation: 1, path: evil.into(), bytes: 1 });
+    let harmless = |text: &str| {
+        assert!(text.contains('␛'), "{text}");
+        assert!(text.chars().all(|c| c == '\n' || !(c.is_control() || c == '\u{202e}')), "{text:?}");
+    };
+    harmless(&desk.text());
+    let mut broken = diagnostic(Severity::Error, evil);
+    broken.path = evil.into();
+    broken.help = Some(evil.to_owned());
+    desk.fail(vec![broken]);
+    harmless(&desk.text());
+    desk.worker(protocol::Event::Failed { generation: 1, failure: Failure::Work(evil.to_owned()) });
+    harmless(&desk.text());
+}
+
+#[test]
+fn a_small_window_says_what_it_hides() {
+    let mut desk = Desk::with(state(60, 5));
+    assert!(desk.text().contains("too small: messages, name, stages hidden"), "{}", desk.text());
+    desk.press('p');
+    assert!(desk.text().contains("photons come with"), "{}", desk.text());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_window_and_no_history_panics(
+        columns in 1_u16..250,
+        rows in 1_u16..80,
+        aspect in 1.2_f32..3.5,
+        kind in 0..3_usize,
+        depth in 0..4_usize,
+        picture in (1_u32..90, 1_u32..90),
+        script in prop::collection::vec(0..9_u8, 0..14),
+        keys in prop::collection::vec(0..KEYMAP.len(), 0..14),
+    ) {
+        let kind = [PreviewKind::HalfBlock, PreviewKind::Ascii, PreviewKind::None][kind];
+        let depth = [ColorDepth::TrueColor, ColorDepth::Indexed256, ColorDepth::Ansi16, ColorDepth::None][depth];
+        let mut desk = Desk::with(state_with(columns, rows, kind, depth, Overrides::default()));
+        desk.state.window.cell_aspect = aspect;
+        let mut keys = keys.iter();
+        for step in script {
+            let generation = desk.state.generation;
+            match step {
+                0 => desk.fail(vec![diagnostic(Severity::Error, "a rather long message that has to be wrapped"); 3]),
+                1 => desk.finish(RED),
+                2 => { desk.worker(protocol::Event::Asset { generation, progress: asset("long name of a texture", 1, 2) }); }
+                3 => { desk.worker(protocol::Event::Progress { generation, progress: progress(0.3, Some(9.0)) }); }
+                4 => {
+                    let picture = plain_picture(picture.0, picture.1, BLUE);
+                    desk.event(Event::Picture { generation, picture });
+                }
+                5 => { desk.event(Event::Resize(window(rows, columns.min(80)))); }
+                6 => { desk.wait(300); }
+                _ => {
+                    if let Some(key) = keys.next() {
+                        desk.key(KEYMAP[*key].keys[0]);
+                    }
+                }
+            }
+            desk.screen();
+        }
+        desk.screen();
+    }
+}

@@ -1,0 +1,146 @@
+//! What a key does to the state.
+
+use super::{render, say};
+use crate::pipeline::protocol::Command;
+use crate::pipeline::settings::View;
+use crate::scene::description::Shadows;
+use crate::tui::ExitStatus;
+use crate::tui::action::Action;
+use crate::tui::event::{Effect, KeyPress};
+use crate::tui::keymap;
+use crate::tui::state::{State, Toggles};
+use crate::tui::view::diagnostics;
+
+pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
+    let Some(action) = keymap::action(key) else { return Vec::new() };
+    state.dirty |= state.message.take().is_some();
+    act(state, action)
+}
+
+fn act(state: &mut State, action: Action) -> Vec<Effect> {
+    match action {
+        Action::CycleShadows => cycle_shadows(state),
+        Action::ToggleDepthOfField => toggle_depth_of_field(state),
+        Action::TogglePhotons => told(state, "photons come with a later version: this one has none"),
+        Action::NextView => step_view(state, 1),
+        Action::PreviousView => step_view(state, View::ALL.len() - 1),
+        Action::TogglePause => toggle_pause(state),
+        Action::RenderAgain => render(state, true),
+        Action::WriteNow => write_now(state),
+        Action::SceneSettings => scene_settings(state),
+        Action::ToggleDiagnostics => toggle_diagnostics(state),
+        Action::ScrollUp => scroll(state, |line, page| line.saturating_sub(page)),
+        Action::ScrollDown => scroll(state, |line, page| line.saturating_add(page)),
+        Action::ToggleHelp => change(state, |state| state.help = !state.help),
+        Action::Close => {
+            change(state, |state| if state.help { state.help = false } else { state.pane.open = false })
+        }
+        Action::Suspend => vec![Effect::StopJob],
+        Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],
+        Action::Quit => vec![Effect::Quit(ExitStatus::QUIT)],
+    }
+}
+
+fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
+    how(state);
+    state.dirty = true;
+    Vec::new()
+}
+
+fn told(state: &mut State, message: &str) -> Vec<Effect> {
+    say(state, message);
+    Vec::new()
+}
+
+fn cycle_shadows(state: &mut State) -> Vec<Effect> {
+    let next = match shadows(state) {
+        "soft" => Shadows::Hard,
+        "hard" => Shadows::Off,
+        _ => Shadows::Soft,
+    };
+    state.toggles.shadows = Some(next);
+    render(state, false)
+}
+
+/// The shadows that hold now, by name.
+pub(in crate::tui) fn shadows(state: &State) -> &'static str {
+    match state.overrides().shadows {
+        Some(Shadows::Off) => "off",
+        Some(Shadows::Hard) => "hard",
+        Some(Shadows::Soft) => "soft",
+        None => state.effective.as_ref().map_or("soft", |effective| effective.shadows),
+    }
+}
+
+/// A scene whose depth of field is off although nothing switched it off has a pinhole for a lens.
+fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
+    let switched_off = state.overrides().dof == Some(false);
+    match &state.effective {
+        None => return told(state, "the scene has not been read yet"),
+        Some(effective) if !effective.dof && !switched_off => {
+            return told(
+                state,
+                "no depth of field: the scene's camera has no aperture (set `aperture` and `focus`)",
+            );
+        }
+        Some(_) => {}
+    }
+    state.toggles.dof = Some(switched_off);
+    render(state, false)
+}
+
+fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
+    let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
+    let next = View::ALL[(current + steps) % View::ALL.len()];
+    state.toggles.view = (next != state.base_view()).then_some(next);
+    let effects = render(state, false);
+    if state.toggles.view.is_some() {
+        say(state, format!("view {}: shown, not written; w writes it", next.name()));
+    }
+    effects
+}
+
+fn toggle_pause(state: &mut State) -> Vec<Effect> {
+    if !state.is_running() && !state.paused {
+        return told(state, "nothing is rendering");
+    }
+    state.paused = !state.paused;
+    state.dirty = true;
+    vec![Effect::Send(Command::Pause(state.paused))]
+}
+
+fn write_now(state: &mut State) -> Vec<Effect> {
+    say(state, "writing the image as it is now");
+    vec![Effect::Send(Command::Write)]
+}
+
+fn scene_settings(state: &mut State) -> Vec<Effect> {
+    if state.toggles == Toggles::default() {
+        return told(state, "the keys have changed nothing");
+    }
+    state.toggles = Toggles::default();
+    let effects = render(state, false);
+    say(state, "back to the scene's own settings");
+    effects
+}
+
+fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
+    if state.problems.is_none() && state.warnings.is_empty() {
+        return told(state, "no errors and no warnings");
+    }
+    change(state, |state| {
+        state.pane.open = !state.pane.open;
+        state.pane.scroll = 0;
+    })
+}
+
+fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> Vec<Effect> {
+    if !state.pane.open {
+        return Vec::new();
+    }
+    let (page, last) = diagnostics::extent(state);
+    let line = step(state.pane.scroll.min(last), page).min(last);
+    state.dirty |= line != state.pane.scroll;
+    state.pane.scroll = line;
+    Vec::new()
+}

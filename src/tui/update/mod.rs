@@ -1,0 +1,159 @@
+//! State and event in, effects out. Nothing here touches the world.
+
+mod keys;
+mod worker;
+
+pub(super) use keys::shadows;
+
+use std::time::{Duration, Instant};
+
+use super::ExitStatus;
+use super::event::{Effect, Event, Signal, Source, Window};
+use super::options::Changed;
+use super::state::{Activity, PendingChange, PreviewKind, Shown, State};
+use crate::film::Picture;
+use crate::pipeline::protocol::{Command, Request};
+
+/// The window must keep its size for this long before another preview is asked for.
+const RESIZE_QUIET: Duration = Duration::from_millis(120);
+/// A request that has been under way for longer is not given up for the sake of the preview's size.
+const TOO_DEAR_TO_RESTART: Duration = Duration::from_secs(1);
+
+/// The first request.
+pub(super) fn start(state: &mut State) -> Vec<Effect> {
+    render(state, false)
+}
+
+/// One event.
+pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
+    state.now = now;
+    match event {
+        Event::Key(key) => keys::update(state, key),
+        Event::Resize(window) => resize(state, window),
+        Event::Worker(event) => worker::update(state, event),
+        Event::Picture { generation, picture } => show(state, Shown { generation, picture }),
+        Event::Changed(Changed { noticed }) => {
+            state.message = None;
+            let effects = render(state, false);
+            state.change = Some(PendingChange { generation: state.generation, noticed });
+            effects
+        }
+        Event::Signal(signal) => vec![signalled(signal)],
+        Event::Shown { generation } => shown(state, generation),
+        Event::Tick => tick(state),
+        Event::Lost(source) => lost(state, source),
+        Event::NoShell => {
+            say(state, "there is no shell to go back to");
+            Vec::new()
+        }
+    }
+}
+
+/// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
+fn render(state: &mut State, force: bool) -> Vec<Effect> {
+    state.generation += 1;
+    state.requested = state.preview_size();
+    state.resize_due = None;
+    state.activity = Activity::Running { since: state.now };
+    state.dirty = true;
+    let request = Request {
+        generation: state.generation,
+        scene: state.scene.clone(),
+        overrides: state.overrides(),
+        preview: state.requested,
+        write: state.view() == state.base_view(),
+        force,
+    };
+    let mut effects = Vec::new();
+    if std::mem::take(&mut state.paused) {
+        effects.push(Effect::Send(Command::Pause(false)));
+    }
+    effects.push(Effect::Send(Command::Render(Box::new(request))));
+    effects
+}
+
+fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
+    if shown.generation == state.generation && is_whole(&shown.picture) && state.preview != PreviewKind::None
+    {
+        state.urgent |= state.picture.as_ref().is_none_or(|last| last.generation != shown.generation);
+        state.picture = Some(shown);
+        state.dirty = true;
+    }
+    Vec::new()
+}
+
+fn is_whole(picture: &Picture) -> bool {
+    picture.width > 0
+        && picture.height > 0
+        && u64::try_from(picture.pixels.len())
+            .is_ok_and(|pixels| pixels == u64::from(picture.width) * u64::from(picture.height))
+}
+
+fn shown(state: &mut State, generation: u64) -> Vec<Effect> {
+    if let Some(change) = state.change.take_if(|change| change.generation == generation) {
+        state.first_change = Some(state.now.saturating_duration_since(change.noticed));
+        state.dirty = true;
+    }
+    Vec::new()
+}
+
+fn resize(state: &mut State, window: Window) -> Vec<Effect> {
+    state.window = window;
+    state.dirty = true;
+    state.resize_due = (state.preview_size() != state.requested).then(|| state.now + RESIZE_QUIET);
+    Vec::new()
+}
+
+fn tick(state: &mut State) -> Vec<Effect> {
+    state.dirty |= state.is_running() && !state.paused;
+    let (now, bars) = (state.now, state.assets.len());
+    state.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
+    state.dirty |= state.assets.len() != bars;
+    if state.resize_due.is_none_or(|due| state.now < due) {
+        return Vec::new();
+    }
+    state.resize_due = None;
+    if state.paused || state.running_for().is_some_and(|time| time > TOO_DEAR_TO_RESTART) {
+        return Vec::new();
+    }
+    resized_preview(state)
+}
+
+/// Another preview where the window has another size than the one that was asked for.
+fn resized_preview(state: &mut State) -> Vec<Effect> {
+    let change = state.change;
+    let size = state.preview_size();
+    if size == state.requested || size.is_none() {
+        return Vec::new();
+    }
+    let effects = render(state, false);
+    // A save that is still on its way is measured to the picture that replaces its own.
+    state.change = change.map(|change| PendingChange { generation: state.generation, ..change });
+    effects
+}
+
+fn signalled(signal: Signal) -> Effect {
+    match signal {
+        Signal::Interrupt => Effect::Quit(ExitStatus::INTERRUPTED),
+        Signal::Terminate => Effect::Quit(ExitStatus::TERMINATED),
+        Signal::Hangup => Effect::Quit(ExitStatus::HANGUP),
+        Signal::Suspend => Effect::Suspend,
+        Signal::Continue => Effect::Redraw,
+    }
+}
+
+fn lost(state: &mut State, source: Source) -> Vec<Effect> {
+    match source {
+        Source::Worker => vec![Effect::GiveUp],
+        Source::Watcher => {
+            say(state, "files are no longer watched: r renders again");
+            Vec::new()
+        }
+        Source::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],
+    }
+}
+
+fn say(state: &mut State, message: impl Into<String>) {
+    state.message = Some(message.into());
+    state.dirty = true;
+}

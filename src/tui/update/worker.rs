@@ -1,0 +1,129 @@
+//! What the worker's events do to the state. Those of older generations do nothing.
+
+use super::{resized_preview, say};
+use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport};
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::sanitize::visible;
+use crate::tui::event::{Effect, Written};
+use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
+
+pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
+    if generation(&event) != state.generation {
+        return Vec::new();
+    }
+    // The picture itself is taken from its slot; what is watched is the wiring's.
+    let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
+    state.dirty |= !shows_nothing;
+    match event {
+        Event::Started { .. } => started(state),
+        Event::Stage { stage, .. } => record(state, stage),
+        Event::Asset { progress, .. } => asset(state, progress),
+        Event::Settings { settings, .. } => {
+            let pinhole = state.overrides().dof == Some(true) && !settings.dof;
+            state.effective = Some(*settings);
+            mended(state);
+            if pinhole {
+                say(state, "no depth of field: the scene's camera has no aperture");
+            }
+        }
+        Event::Progress { progress, .. } => state.progress = Some(progress),
+        Event::Preview { .. } | Event::Files { .. } => {}
+        Event::Written { path, bytes, .. } => wrote(state, Written { path, bytes }),
+        Event::WriteFailed { message, .. } => say(state, format!("error: {}", visible(&message))),
+        Event::Done { report, warnings, unchanged, .. } => {
+            return done(state, report, warnings, unchanged);
+        }
+        Event::Failed { failure, .. } => failed(state, failure),
+        Event::Cancelled { .. } => {
+            state.activity = Activity::Cancelled;
+            state.assets.clear();
+        }
+    }
+    Vec::new()
+}
+
+fn generation(event: &Event) -> u64 {
+    match event {
+        Event::Started { generation }
+        | Event::Stage { generation, .. }
+        | Event::Asset { generation, .. }
+        | Event::Settings { generation, .. }
+        | Event::Progress { generation, .. }
+        | Event::Preview { generation }
+        | Event::Written { generation, .. }
+        | Event::WriteFailed { generation, .. }
+        | Event::Files { generation, .. }
+        | Event::Done { generation, .. }
+        | Event::Failed { generation, .. }
+        | Event::Cancelled { generation } => *generation,
+    }
+}
+
+fn started(state: &mut State) {
+    state.stages = Default::default();
+    state.assets.clear();
+    state.progress = None;
+    state.report = None;
+    state.unchanged = false;
+}
+
+fn record(state: &mut State, stage: StageReport) {
+    if let Some(slot) = state.stages.get_mut(stage.name as usize) {
+        *slot = Some(stage);
+    }
+}
+
+/// One bar for each name.
+fn asset(state: &mut State, progress: AssetProgress) {
+    let finished = (progress.done >= progress.total).then_some(state.now);
+    let bar = AssetBar { progress, finished };
+    match state.assets.iter_mut().find(|asset| asset.progress.name == bar.progress.name) {
+        Some(asset) => *asset = bar,
+        None => state.assets.push(bar),
+    }
+}
+
+fn wrote(state: &mut State, written: Written) {
+    say(state, format!("wrote {}", visible(&written.path.to_string_lossy())));
+    state.written.retain(|other| other.path != written.path);
+    state.written.push(written);
+}
+
+/// The file is whole again.
+fn mended(state: &mut State) {
+    if state.problems.take().is_some() {
+        state.pane = Pane::default();
+    }
+}
+
+fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) -> Vec<Effect> {
+    mended(state);
+    for stage in &report.stages {
+        record(state, stage.clone());
+    }
+    state.effective = Some(report.settings.clone());
+    state.activity = Activity::Done;
+    state.paused = false;
+    state.assets.retain(|asset| asset.finished.is_some());
+    state.report = Some(report);
+    state.unchanged = unchanged;
+    state.pane.open &= !warnings.is_empty();
+    state.warnings = warnings;
+    if unchanged && state.change.is_some_and(|change| change.generation == state.generation) {
+        state.change = None;
+        state.first_change = None;
+    }
+    resized_preview(state)
+}
+
+fn failed(state: &mut State, failure: Failure) {
+    state.activity = Activity::Broken;
+    state.paused = false;
+    state.assets.clear();
+    state.change = None;
+    state.problems = Some(match failure {
+        Failure::Scene(diagnostics) => Problems { diagnostics, work: None },
+        Failure::Work(message) => Problems { diagnostics: Vec::new(), work: Some(message) },
+    });
+    state.pane = Pane { open: true, scroll: 0 };
+}

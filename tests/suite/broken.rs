@@ -1,0 +1,409 @@
+//! Broken scenes as files: what each says, where, and that it says nothing else.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glimt::scene::diagnostic::{Diagnostic, Severity};
+use glimt::scene::report::{Style, line_and_column, render, summary};
+
+/// Line, column, and `message; label`.
+type Said = (usize, usize, &'static str);
+
+/// Every file of `tests/broken` with all that it is told, in order.
+const BROKEN: &[(&str, &[Said])] = &[
+    (
+        "brackets",
+        &[
+            (2, 1, "[render] must be a table; found an array of tables"),
+            (12, 2, "`sphere` must be a list of tables; found a table"),
+            (18, 8, "[materials.wall] must be a table; found 1"),
+            (20, 2, "`light` must be a list of tables; found a table"),
+        ],
+    ),
+    (
+        "camera_both",
+        &[
+            (4, 1, "`position` and `orbiter` exclude each other"),
+            (5, 1, "`look_at` and `orbiter` exclude each other"),
+        ],
+    ),
+    ("camera_direction", &[(4, 11, "the camera has no direction; the same point as `position`")]),
+    (
+        "camera_up",
+        &[(4, 11, "`up` must not be parallel to the view; the view is parallel to the default [0, 1, 0]")],
+    ),
+    ("camera_up_zero", &[(5, 6, "`up` has no direction; its length is 0")]),
+    (
+        "choices",
+        &[
+            (3, 14, r#"`integrator` cannot be "whited"; did you mean "whitted"?"#),
+            (4, 11, r#"`shadows` cannot be "softer"; did you mean "soft"?"#),
+            (5, 10, r#"`filter` cannot be "gauss""#),
+            (6, 11, r#"`tonemap` must be one of "none", "reinhard", "aces", "agx"; found 1"#),
+            (7, 9, r#"`accel` cannot be "octree""#),
+            (22, 8, r#"`type` cannot be "area""#),
+            (27, 11, r#"`falloff` cannot be "cube""#),
+        ],
+    ),
+    (
+        "colours",
+        &[
+            (3, 15, "`ambient` must be at least 0; found -0.1"),
+            (4, 14, r##"`background` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
+            (11, 11, r##"`diffuse` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
+            (
+                12,
+                12,
+                r##"`specular` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found an array of 2 values"##,
+            ),
+            (13, 12, r##"`emission` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
+            (17, 21, "`reflectance` must be between 0 and 1; found 1.1"),
+            (21, 7, "`ior` must be between 1 and 10; found 0.9"),
+            (22, 15, "`tint` must be between 0 and 1; found 2"),
+        ],
+    ),
+    ("comment_only", &[(1, 1, "the scene has no [camera]")]),
+    (
+        "crlf_tabs",
+        &[
+            (4, 19, r#"`look_at` must be three numbers, [x, y, z]; found the string "ä""#),
+            (5, 8, "`fov` must be greater than 0 and less than 180; found 0"),
+        ],
+    ),
+    (
+        "duplicates",
+        &[
+            (14, 2, "`camera` is given twice; the second time"),
+            (17, 12, "`red` is given twice; the second time"),
+        ],
+    ),
+    ("emissive_plane", &[(10, 12, "an infinite plane cannot be a light; this material has `emission`")]),
+    ("empty_list", &[(10, 12, "`material` must be the name of a material; found 7")]),
+    (
+        "endings",
+        &[
+            (3, 10, "`output`: .webp files are not available in this version"),
+            (10, 8, "`file`: unknown file ending .gif"),
+            (13, 8, "`file` needs a file ending that says its format"),
+            (20, 8, "`file`: .gltf files are not available in this version"),
+            (24, 8, "`file`: unknown file ending .obi; did you mean .obj?"),
+        ],
+    ),
+    (
+        "escapes",
+        &[
+            (11, 11, "`radius` must be greater than 0; found -1"),
+            (12, 12, r#"there is no material "␛[31m␊red""#),
+        ],
+    ),
+    (
+        "huge_numbers",
+        &[
+            (3, 9, "40000 × 40000 pixels are too many"),
+            (
+                5,
+                11,
+                "`samples` must be a whole number between 1 and 4294967295; found 99999999999999999999999",
+            ),
+            (12, 11, "`center` must be less than 1e18 in magnitude; found 1e19"),
+            (12, 20, "`center` must be less than 1e18 in magnitude; found 1e999"),
+            (13, 10, "`radius` must be less than 1e18 in magnitude; found 1701411834604692317316873037158…"),
+        ],
+    ),
+    (
+        "materials",
+        &[
+            (8, 10, r#"`filter` cannot be "linear"; did you mean "bilinear"?"#),
+            (9, 8, r#"`wrap` cannot be "mirrored"; did you mean "mirror"?"#),
+            (10, 11, "`repeat` must not be 0; found 0"),
+            (11, 12, r#"`encoding` cannot be "gamma""#),
+            (14, 8, r#"`type` cannot be "fong""#),
+            (18, 1, "unknown key `diffuse` in [materials.steel]"),
+            (
+                21,
+                11,
+                r##"`diffuse` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found the name of a texture"##,
+            ),
+            (22, 13, "`shininess` must be between 0 and 1000000; found -1"),
+            (23, 14, "`normal_map` must be the name of a texture; found a table"),
+            (24, 19, "`normal_strength` must be at least 0; found -2"),
+            (25, 12, "a texture in `emission` is not supported yet"),
+            (28, 13, "unknown key `textur` in `diffuse`; did you mean `texture`?"),
+        ],
+    ),
+    (
+        "missing_files",
+        &[
+            (3, 11, "there is no file …/files/orbiter.txt"),
+            (6, 8, "there is no file …/files/brick.ppm"),
+            (9, 8, "…/files/folder.ppm is a folder, not a file"),
+            (12, 8, "`file` is empty: it must be the path of a file"),
+            (20, 8, "there is no file …/files/knots.obj"),
+        ],
+    ),
+    (
+        "missing_keys",
+        &[
+            (2, 1, "[camera] needs `position`; `position` is missing"),
+            (2, 1, "[camera] needs `look_at`; `look_at` is missing"),
+            (8, 1, "[[sphere]] needs `center`; `center` is missing"),
+            (8, 1, "[[sphere]] needs `radius`; `radius` is missing"),
+            (11, 1, "[[quad]] needs `material`; `material` is missing"),
+            (16, 1, "[[light]] needs `position`; `position` is missing"),
+        ],
+    ),
+    ("nesting", &[(2, 85, "arrays or tables are nested too deeply")]),
+    (
+        "no_area",
+        &[
+            (12, 5, "the quad has no area; `u` and `v` are parallel, or one of them is 0"),
+            (18, 5, "the triangle has no area; `a`, `b` and `c` are on one line"),
+            (22, 10, "the plane has no direction; a normal of length 0"),
+        ],
+    ),
+    ("no_camera", &[(1, 1, "the scene has no [camera]")]),
+    ("no_shapes", &[(1, 1, "warning: the scene has no shapes")]),
+    (
+        "not_finite",
+        &[
+            (3, 18, "`background` must be a finite number; found inf"),
+            (6, 13, "`position` must be a finite number; found nan"),
+            (7, 18, "`look_at` must be a finite number; found -inf"),
+            (14, 10, "`radius` must be a finite number; found +nan"),
+        ],
+    ),
+    (
+        "open_header",
+        &[
+            (2, 8, "this header is not closed"),
+            (7, 15, "`diffuse` must be at least 0; found -1"),
+            (9, 10, "this header is not closed"),
+            (13, 12, "`position` must be three numbers, [x, y, z]; found an array of 2 values"),
+        ],
+    ),
+    (
+        "open_list",
+        &[
+            (3, 22, "digits are missing in this number"),
+            (4, 23, "digits are missing in this number"),
+            (5, 16, "this text is not closed"),
+            (6, 12, "there is more on this line than one value"),
+            (9, 10, "a key without a value"),
+            (11, 1, "a comma is missing"),
+        ],
+    ),
+    ("output_ending", &[(3, 10, "`output`: unknown file ending .tiff")]),
+    (
+        "photons",
+        &[
+            (3, 11, r#"`enabled` must be true or false; found the string "yes""#),
+            (4, 9, "`count` must be a whole number between 1 and 1000000000000; found 0"),
+            (5, 10, "`radius` must be at least 0; found -1"),
+            (6, 11, "`bounces` must be a whole number; found 1e3"),
+        ],
+    ),
+    (
+        "ranges",
+        &[
+            (3, 9, "`width` must be a whole number between 1 and 65536; found 0"),
+            (4, 10, "`height` must be a whole number between 1 and 65536; found 65537"),
+            (5, 11, "`samples` must be a whole number between 1 and 4294967295; found 0"),
+            (6, 13, "`max_depth` must be a whole number between 0 and 4294967295; found -1"),
+            (7, 12, "`exposure` must be between -100 and 100; found 101"),
+            (8, 18, "`shadow_samples` must be a whole number between 1 and 4096; found 5000"),
+            (9, 8, "`seed` must be a whole number between 0 and 4294967295; found 4294967296"),
+            (14, 7, "`fov` must be greater than 0 and less than 180; found 180"),
+            (15, 12, "`aperture` must be at least 0; found -0.1"),
+            (16, 9, "`focus` must be greater than 0; found 0"),
+        ],
+    ),
+    (
+        "shape_sizes",
+        &[
+            (11, 10, "`radius` must be greater than 0; found -0.5"),
+            (16, 12, "`size` must be greater than 0; found 0"),
+            (16, 15, "`size` must be greater than 0; found -2"),
+            (21, 13, "`scale` must not be 0; found 0"),
+            (26, 9, "`scale` must not be 0; found 0.0"),
+            (27, 10, "`smooth` must be true or false; found 1"),
+        ],
+    ),
+    (
+        "syntax",
+        &[
+            (3, 9, "a value is missing"),
+            (4, 10, "`100 200` is not a number"),
+            (5, 11, r#"a text must stand in quotes; write "aces""#),
+            (6, 11, "`samples` must be a whole number between 1 and 4294967295; found 0"),
+            (8, 8, "this header is not closed"),
+            (18, 1, "`radius` is given twice; the second time"),
+            (19, 16, "this text is not closed"),
+        ],
+    ),
+    (
+        "unavailable",
+        &[
+            (3, 14, r#"integrator "path" is not available in this version; use "whitted""#),
+            (4, 9, r#"accel "kdtree" is not available in this version; use "bvh""#),
+            (5, 9, "`error` > 0 is not available in this version"),
+            (13, 10, r#"filter "mipmap" is not available in this version; use one of "nearest", "bilinear""#),
+            (23, 3, "[[disk]] is not available in this version"),
+            (26, 3, "[[cylinder]] is not available in this version"),
+            (27, 3, "[[cone]] is not available in this version"),
+            (28, 3, "[[torus]] is not available in this version"),
+            (31, 8, r#"type "spot" is not available in this version; use "point""#),
+            (36, 8, r#"type "directional" is not available in this version; use "point""#),
+            (39, 2, "[environment] is not available in this version"),
+        ],
+    ),
+    (
+        "undefined_names",
+        &[
+            (7, 23, r#"there is no texture "briks"; did you mean "bricks"?"#),
+            (8, 14, r#"there is no texture "bumps""#),
+            (16, 12, r#"there is no material "rot""#),
+            (21, 12, r#"there is no material "rad"; did you mean "red"?"#),
+        ],
+    ),
+    (
+        "unknown_keys",
+        &[
+            (2, 1, "unknown key `colour` outside of any table"),
+            (5, 1, "unknown key `widht` in [render]; did you mean `width`?"),
+            (6, 1, "unknown key `zebra` in [render]"),
+            (17, 1, "unknown key `raduis` in [[sphere]]; did you mean `radius`?"),
+            (20, 3, "unknown table `sphre`; did you mean `sphere`?"),
+        ],
+    ),
+    (
+        "warnings",
+        &[
+            (1, 1, "warning: nothing lights this scene"),
+            (7, 11, "warning: this version does not render photons"),
+            (9, 11, r#"warning: the texture "bricks" is not used"#),
+            (
+                14,
+                12,
+                "warning: this material reflects more light than falls on it; diffuse + specular is 1.100 in red",
+            ),
+            (16, 12, r#"warning: the material "blue" is not used"#),
+        ],
+    ),
+    (
+        "wrong_types",
+        &[
+            (3, 9, r#"`width` must be a whole number; found the string "wide""#),
+            (4, 11, "`samples` must be a whole number; found 1.5"),
+            (5, 11, r##"`ambient` must be a colour: [r, g, b] or "#rrggbb"; found 1"##),
+            (6, 8, "`seed` must be a whole number; found true"),
+            (9, 12, "`position` must be three numbers, [x, y, z]; found an array of 2 values"),
+            (10, 15, r#"`look_at` must be three numbers, [x, y, z]; found the string "1""#),
+            (10, 20, "`look_at` must be three numbers, [x, y, z]; found false"),
+            (11, 7, "`fov` must be a number; found the date 1979-05-27"),
+        ],
+    ),
+];
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken")
+}
+
+fn diagnostics(path: &Path) -> Vec<Diagnostic> {
+    match glimt::scene::load(path) {
+        Ok(loaded) => loaded.warnings,
+        Err(diagnostics) => diagnostics,
+    }
+}
+
+fn said(diagnostic: &Diagnostic) -> (usize, usize, String) {
+    let place = diagnostic.place.as_ref().expect("a place");
+    let (line, column) = line_and_column(&place.source, place.span.start);
+    let kind = if diagnostic.severity == Severity::Warning { "warning: " } else { "" };
+    let label = if place.label.is_empty() { String::new() } else { format!("; {}", place.label) };
+    (
+        line,
+        column,
+        format!("{kind}{}{label}", diagnostic.message).replace(folder().to_str().expect("UTF-8"), "…"),
+    )
+}
+
+#[test]
+fn every_broken_scene_is_told_all_of_it_and_nothing_else() {
+    for (name, expected) in BROKEN {
+        let found: Vec<_> =
+            diagnostics(&folder().join(name).with_extension("toml")).iter().map(said).collect();
+        let found: Vec<_> =
+            found.iter().map(|(line, column, text)| (*line, *column, text.as_str())).collect();
+        assert_eq!(&found, expected, "{name}");
+    }
+}
+
+#[test]
+fn every_file_of_the_folder_is_in_the_table() {
+    let files = fs::read_dir(folder()).expect("the folder").map(|entry| entry.expect("an entry").path());
+    let mut names: Vec<String> = files
+        .filter(|path| path.is_file())
+        .map(|path| path.file_stem().expect("a name").to_str().expect("UTF-8").to_owned())
+        .collect();
+    names.sort();
+    let listed: Vec<&str> = BROKEN.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, listed);
+    assert!(names.len() >= 24);
+}
+
+#[test]
+fn reports_name_each_place_show_its_line_and_are_safe_to_print() {
+    for (name, expected) in BROKEN {
+        let path = folder().join(name).with_extension("toml");
+        let text = fs::read_to_string(&path).expect("text");
+        let diagnostics = diagnostics(&path);
+        let report = render(&diagnostics, 100, Style::Plain);
+        for (line, column, _) in *expected {
+            let place = format!("--> {}:{line}:{column}\n", path.display());
+            assert!(report.contains(&place), "{place} is not in\n{report}");
+            let source = text.lines().nth(line - 1).unwrap_or_default().trim_start_matches('\u{feff}');
+            let start: String = source.trim().chars().take_while(|c| !c.is_control()).take(20).collect();
+            assert!(report.contains(&start), "{start} is not in\n{report}");
+        }
+        assert!(report.ends_with(&format!("\n{}\n", summary(&diagnostics))), "{report}");
+        let is_safe = |c: char| c == '\n' || !(c.is_control() || "\u{202e}\u{feff}".contains(c));
+        assert!(report.chars().all(is_safe), "{report:?}");
+        assert_eq!(report.matches("^").count() > 0, !diagnostics.is_empty());
+    }
+}
+
+/// The one diagnostic of a file with these bytes.
+fn of_bytes(bytes: &[u8]) -> Diagnostic {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, bytes).expect("written");
+    let [diagnostic] = diagnostics(&path).try_into().expect("one diagnostic");
+    assert_eq!(diagnostic.path, path);
+    diagnostic
+}
+
+#[test]
+fn what_is_no_text_is_refused_with_its_place() {
+    let latin = said(&of_bytes(b"[camera]\n# caf\xe9\n"));
+    assert_eq!((latin.0, latin.1), (2, 6));
+    assert!(latin.2.starts_with("line 2 is not UTF-8 text: byte 0xe9 at offset 14"), "{}", latin.2);
+    assert!(of_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message.contains("binary"));
+    assert!(
+        of_bytes("[camera]".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>().as_slice())
+            .message
+            .contains("binary")
+    );
+    for nothing in ["", " \n\t\r\n", "\u{feff}\n"] {
+        assert_eq!(said(&of_bytes(nothing.as_bytes())), (1, 1, "the scene file is empty".to_owned()));
+    }
+}
+
+#[test]
+fn nesting_of_any_depth_is_an_error_and_no_overflow() {
+    for (open, close) in [("[", "]"), ("{a=", "}"), ("a.", "a=1")] {
+        let text = format!("x = {}{close}\n", open.repeat(200_000));
+        assert_eq!(said(&of_bytes(text.as_bytes())).0, 1);
+        let header = format!("[{}a]\nb = 1\n", "a.".repeat(200_000));
+        assert_eq!(said(&of_bytes(header.as_bytes())).0, 1);
+    }
+}

@@ -1,0 +1,305 @@
+//! The program as scripts use it: exit codes, streams, files.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command as Process, Output, Stdio};
+use std::time::Duration;
+
+use assert_cmd::cargo::CommandCargoExt;
+
+const SCENE: &str = r#"[render]
+width = 32
+height = 24
+samples = 2
+
+[camera]
+position = [0, 1, 4]
+look_at = [0, 1, 0]
+
+[materials.ball]
+type = "phong"
+diffuse = [0.8, 0.2, 0.1]
+
+[[sphere]]
+center = [0, 1, 0]
+radius = 0.5
+material = "ball"
+
+[[light]]
+type = "point"
+position = [1, 3, 2]
+intensity = [10, 10, 10]
+"#;
+
+struct Desk(tempfile::TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        let desk = Self(tempfile::tempdir().expect("a scratch folder"));
+        desk.write("ball.toml", SCENE);
+        desk
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("written");
+    }
+
+    fn glimt(&self, line: &str) -> Process {
+        let mut process = Process::cargo_bin("glimt").expect("the program");
+        process.current_dir(self.0.path()).args(line.split_whitespace()).stdin(Stdio::null());
+        process.env_remove("NO_COLOR").env("TERM", "xterm");
+        process
+    }
+
+    fn run(&self, line: &str) -> Output {
+        self.glimt(line).output().expect("it runs")
+    }
+
+    /// Runs it; gives stderr after checking the exit code and that stdout is empty.
+    #[track_caller]
+    fn expect(&self, line: &str, code: i32) -> String {
+        let output = self.run(line);
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
+        assert!(output.stdout.is_empty(), "{line}: nothing belongs on stdout");
+        assert!(!stderr.contains('\u{1b}'), "{line}: no escape sequence without a terminal");
+        stderr
+    }
+}
+
+#[test]
+fn a_scene_is_rendered_and_named_at_the_end() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once", 0);
+    let last = stderr.lines().last().expect("a line");
+    assert!(last.starts_with("wrote ball.png (32×24, 2 samples, "), "{last}");
+    assert!(desk.path("ball.png").is_file());
+    for stage in ["parse", "accel", "render", "write"] {
+        assert!(stderr.lines().any(|line| line.starts_with(stage)), "{stage}: {stderr}");
+    }
+}
+
+#[test]
+fn several_outputs_and_no_progress() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once -o a.png -o b.ppm --progress none", 0);
+    assert_eq!(stderr, "");
+    assert!(desk.path("a.png").is_file() && desk.path("b.ppm").is_file());
+    assert!(!desk.path("ball.png").exists());
+}
+
+#[test]
+fn json_lines_have_the_keys_that_are_documented() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once --progress json", 0);
+    let lines: Vec<serde_json::Value> =
+        stderr.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let of = |event: &str| lines.iter().filter(|line| line["event"] == event).collect::<Vec<_>>();
+    let progress = of("progress");
+    let fractions: Vec<f64> =
+        progress.iter().map(|line| line["fraction"].as_f64().expect("a number")).collect();
+    assert!(fractions.windows(2).all(|pair| pair[0] <= pair[1]));
+    assert_eq!(fractions.last(), Some(&1.0));
+    assert!(progress.iter().all(|line| line.get("eta_seconds").is_some() && line["stage"] == "render"));
+    assert_eq!(of("written")[0]["path"], "ball.png");
+    assert_eq!(of("done").len(), 1);
+    let stages: Vec<_> = of("stage").into_iter().filter(|line| line["status"] != "running").collect();
+    assert_eq!(stages.len(), 8);
+}
+
+#[test]
+fn json_lines_hold_the_errors_and_nothing_is_mixed_with_them() {
+    let desk = Desk::new();
+    desk.write("ball.toml", &SCENE.replace("\"ball\"", "\"bal\""));
+    let stderr = desk.expect("ball.toml --once --progress json", 2);
+    let lines: Vec<serde_json::Value> =
+        stderr.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let last = lines.last().expect("a line");
+    assert_eq!((&last["event"], &last["kind"]), (&"failed".into(), &"scene".into()));
+    let errors = last["diagnostics"].as_array().expect("diagnostics");
+    let error = errors.iter().find(|one| one["severity"] == "error").expect("an error");
+    assert_eq!((&error["line"], &error["path"]), (&17.into(), &"ball.toml".into()));
+    assert!(error["message"].as_str().expect("text").contains("bal"));
+}
+
+#[test]
+fn the_report_has_its_keys() {
+    let desk = Desk::new();
+    desk.expect("ball.toml --once --report r.json --seed 5 --threads 2 --samples 3", 0);
+    let text = fs::read_to_string(desk.path("r.json")).expect("a report");
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(report["glimt"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(report["scene"], "ball.toml");
+    let image = &report["image"];
+    assert_eq!(
+        (&image["path"], &image["width"], &image["height"]),
+        (&"ball.png".into(), &32.into(), &24.into())
+    );
+    let samples = &image["samples"];
+    assert_eq!((&samples["min"], &samples["max"], &samples["mean"]), (&3.into(), &3.into(), &3.0.into()));
+    assert_eq!(image["complete"], true);
+    let settings = &report["settings"];
+    assert_eq!((&settings["seed"], &settings["threads"]), (&5.into(), &2.into()));
+    assert_eq!((&settings["integrator"], &settings["accel"]), (&"whitted".into(), &"bvh".into()));
+    assert_eq!((&settings["photons"], &settings["dof"]), (&false.into(), &false.into()));
+    let names: Vec<&str> = report["stages"]
+        .as_array()
+        .expect("stages")
+        .iter()
+        .map(|stage| {
+            assert!(["done", "reused", "skipped"].contains(&stage["status"].as_str().expect("a status")));
+            stage["name"].as_str().expect("a name")
+        })
+        .collect();
+    assert_eq!(names, ["parse", "meshes", "textures", "accel", "lights", "photons", "render", "write"]);
+    assert_eq!(report["counters"]["camera_rays"], 32 * 24 * 3);
+    for counter in ["triangles", "shadow_rays", "photons_stored", "texture_lookups", "non_finite_samples"] {
+        assert!(report["counters"][counter].is_u64(), "{counter}");
+    }
+    assert!(report["seconds"].as_f64().expect("seconds") > 0.0);
+    assert!(report["peak_memory_bytes"].as_u64().expect("bytes") > 1 << 20);
+}
+
+#[test]
+fn a_wrong_scene_is_2_and_leaves_the_picture() {
+    let desk = Desk::new();
+    desk.write("ball.png", "the old one");
+    desk.write("ball.toml", &SCENE.replace("width = 32", "width = = 32"));
+    let stderr = desk.expect("ball.toml --once", 2);
+    assert!(stderr.contains("error") && stderr.contains("ball.toml:2:"), "{stderr}");
+    assert_eq!(fs::read(desk.path("ball.png")).expect("there"), b"the old one");
+    let stderr = desk.expect("missing.toml --once", 2);
+    assert!(stderr.contains("missing.toml"), "{stderr}");
+}
+
+#[test]
+fn a_mesh_that_is_not_there_is_2_and_named() {
+    let desk = Desk::new();
+    desk.write("ball.toml", &format!("{SCENE}\n[[mesh]]\nfile = \"no.obj\"\nmaterial = \"ball\"\n"));
+    let stderr = desk.expect("ball.toml --once", 2);
+    assert!(stderr.contains("no.obj") && stderr.contains("ball.toml:25:"), "{stderr}");
+    assert!(!desk.path("ball.png").exists());
+}
+
+#[test]
+fn a_wrong_call_is_2() {
+    let desk = Desk::new();
+    for (line, word) in [
+        ("ball.toml --once --samples 0", "--samples"),
+        ("ball.toml --once --integrator path", "not available"),
+        ("ball.toml --once --accel kdtree", "not available"),
+        ("ball.toml --once -o a.xyz", "a.xyz"),
+        ("ball.toml --once --crop 0,0,33,1", "32×24"),
+        ("ball.toml --nonsense", "--nonsense"),
+        ("", "SCENE"),
+    ] {
+        let stderr = desk.expect(line, 2);
+        assert!(stderr.contains(word), "{line}: {stderr}");
+    }
+    assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_1() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once -o nowhere/a.png", 1);
+    assert!(stderr.contains("nowhere"), "{stderr}");
+    let stderr = desk.expect("ball.toml --once --report nowhere/r.json", 1);
+    assert!(stderr.contains("nowhere/r.json"), "{stderr}");
+}
+
+#[test]
+fn help_and_version_are_answers() {
+    let desk = Desk::new();
+    for (line, word) in
+        [("--help", "--samples"), ("--version", env!("CARGO_PKG_VERSION")), ("new --help", "FILE")]
+    {
+        let output = desk.run(line);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(String::from_utf8_lossy(&output.stdout).contains(word), "{line}");
+    }
+}
+
+#[test]
+fn check_says_what_there_is() {
+    let desk = Desk::new();
+    let output = desk.run("check ball.toml");
+    assert_eq!(output.status.code(), Some(0));
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(stdout.starts_with("ok: ball.toml: 1 object, 0 triangles"), "{stdout}");
+    desk.write("ball.toml", &SCENE.replace("\"ball\"", "\"bal\""));
+    let stderr = desk.expect("check ball.toml", 2);
+    assert!(stderr.contains("bal") && stderr.contains("ball.toml:17:"), "{stderr}");
+}
+
+#[test]
+fn new_writes_a_scene_that_renders_and_never_overwrites() {
+    let desk = Desk::new();
+    let stderr = desk.expect("new fresh.toml", 0);
+    assert!(stderr.contains("glimt fresh.toml"), "{stderr}");
+    desk.expect("fresh.toml --once --width 16 --height 12 --samples 1", 0);
+    let stderr = desk.expect("new ball.toml", 2);
+    assert!(stderr.contains("ball.toml exists"), "{stderr}");
+    assert_eq!(fs::read_to_string(desk.path("ball.toml")).expect("there"), SCENE);
+    desk.expect("new nowhere/x.toml", 1);
+}
+
+#[test]
+fn the_picture_does_not_depend_on_threads() {
+    let desk = Desk::new();
+    for threads in [1, 2, 7] {
+        desk.expect(&format!("ball.toml --once -o {threads}.ppm --samples 5 --threads {threads}"), 0);
+    }
+    let picture = |name: &str| fs::read(desk.path(name)).expect("a picture");
+    assert!(picture("1.ppm") == picture("2.ppm") && picture("1.ppm") == picture("7.ppm"));
+}
+
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    let desk = Desk::new();
+    let mut child = desk.glimt("ball.toml --once").stderr(Stdio::piped()).spawn().expect("it runs");
+    drop(child.stderr.take());
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    let mut child = desk.glimt("check ball.toml").stdout(Stdio::piped()).spawn().expect("it runs");
+    drop(child.stdout.take());
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+}
+
+#[test]
+fn signals_end_it_with_their_code_and_leave_the_picture() {
+    for (name, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
+        let desk = Desk::new();
+        desk.write("ball.png", "the old one");
+        let mut child = desk
+            .glimt("ball.toml --once --samples 4000000 --progress json")
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it runs");
+        wait_for(&mut child, "\"progress\"");
+        let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
+        assert!(killed.expect("kill runs").success());
+        assert_eq!(child.wait().expect("it ends").code(), Some(code), "{name}");
+        assert_eq!(fs::read(desk.path("ball.png")).expect("there"), b"the old one");
+        assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 2, "no temporary file");
+    }
+}
+
+/// Until the process says this on stderr; what comes after is read and dropped.
+fn wait_for(child: &mut std::process::Child, word: &str) {
+    use std::io::{BufRead, BufReader};
+    let stderr = BufReader::new(child.stderr.take().expect("piped"));
+    let (sender, said) = std::sync::mpsc::channel();
+    let word = word.to_owned();
+    std::thread::spawn(move || {
+        for line in stderr.lines().map_while(Result::ok) {
+            if line.contains(&word) {
+                let _ = sender.send(());
+            }
+        }
+    });
+    said.recv_timeout(Duration::from_secs(30)).expect("it says so");
+}

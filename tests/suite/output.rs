@@ -1,0 +1,311 @@
+//! Files on disk: written whole or not at all, whatever happens.
+
+use std::fs;
+use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+use glimt::output::{OutputError, check_target, write::atomic};
+
+/// Tells a test that it runs in a child process, and on what.
+const CHILD: &str = "GLIMT_TEST_CHILD";
+
+fn child_path() -> Option<PathBuf> {
+    std::env::var_os(CHILD).map(PathBuf::from)
+}
+
+/// This test binary again, for one test, in a child process.
+fn child(program: &Path, test: &str, path: &Path) -> Command {
+    let mut command = Command::new(program);
+    command.args(["--exact", test, "--nocapture"]).env(CHILD, path);
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+fn this_binary() -> PathBuf {
+    std::env::current_exe().expect("this binary")
+}
+
+fn scratch() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a directory")
+}
+
+/// Names in a directory, sorted.
+fn names(directory: &Path) -> Vec<String> {
+    let entries = fs::read_dir(directory).expect("a directory");
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+fn refused(path: &Path) -> String {
+    let before = check_target(path).expect_err("refused before the work").to_string();
+    let after = atomic(path, b"new").expect_err("refused at the end").to_string();
+    assert_eq!(before, after);
+    after
+}
+
+#[test]
+fn a_new_file_and_then_another_in_its_place() {
+    let directory = scratch();
+    let path = directory.path().join("out.png");
+    atomic(&path, b"first").expect("written");
+    assert_eq!(fs::read(&path).expect("a file"), b"first");
+    atomic(&path, b"").expect("written");
+    assert_eq!(fs::read(&path).expect("a file"), b"");
+    assert_eq!(names(directory.path()), ["out.png"]);
+}
+
+#[test]
+fn permissions_stay() {
+    let directory = scratch();
+    let path = directory.path().join("out.png");
+    fs::write(&path, "old").expect("a file");
+    for mode in [0o600, 0o664, 0o777] {
+        fs::set_permissions(&path, fs::Permissions::from_mode(mode)).expect("a mode");
+        atomic(&path, b"new").expect("written");
+        assert_eq!(fs::metadata(&path).expect("a file").mode() & 0o7777, mode);
+    }
+}
+
+#[test]
+fn a_link_stays_and_its_target_is_replaced() {
+    let directory = scratch();
+    let elsewhere = scratch();
+    let target = elsewhere.path().join("real.png");
+    // Relative within the directory, then absolute to another one, where no file is yet.
+    symlink("middle.png", directory.path().join("out.png")).expect("a link");
+    symlink(&target, directory.path().join("middle.png")).expect("a link");
+    let path = directory.path().join("out.png");
+    for bytes in [b"one", b"two"] {
+        check_target(&path).expect("a good target");
+        atomic(&path, bytes).expect("written");
+        assert_eq!(fs::read(&target).expect("a file"), bytes);
+    }
+    assert!(fs::symlink_metadata(&path).expect("a link").is_symlink());
+    assert_eq!(names(directory.path()), ["middle.png", "out.png"]);
+    assert_eq!(names(elsewhere.path()), ["real.png"]);
+}
+
+#[test]
+fn links_in_a_circle_are_an_error() {
+    let directory = scratch();
+    symlink("b.png", directory.path().join("a.png")).expect("a link");
+    symlink("a.png", directory.path().join("b.png")).expect("a link");
+    let message = refused(&directory.path().join("a.png"));
+    assert!(message.contains("a.png: Too many levels of symbolic links; "), "{message}");
+}
+
+#[test]
+fn a_full_disk_is_an_error() {
+    let directory = scratch();
+    let path = directory.path().join("x.png");
+    symlink("/dev/full", &path).expect("a link");
+    check_target(&path).expect("only the write can tell");
+    let message = atomic(&path, b"picture").expect_err("nothing fits").to_string();
+    let expected = format!(
+        "cannot write {}: No space left on device; free some space or choose another place",
+        path.display()
+    );
+    assert_eq!(message, expected);
+    assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device is still there");
+}
+
+#[test]
+fn devices_are_written_in_place() {
+    let directory = scratch();
+    let path = directory.path().join("x.png");
+    symlink("/dev/null", &path).expect("a link");
+    atomic(&path, b"picture").expect("written");
+    atomic(Path::new("/dev/null"), b"report").expect("written");
+    assert!(!fs::metadata("/dev/null").expect("a device").is_file());
+}
+
+#[test]
+fn a_pipe_without_a_reader_is_an_error_and_one_with_a_reader_gets_everything() {
+    let directory = scratch();
+    let path = directory.path().join("pipe.png");
+    nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+    let message = atomic(&path, b"picture").expect_err("nobody reads").to_string();
+    assert!(message.contains("nobody reads this pipe"), "{message}");
+    // Larger than what a pipe holds; `cat` is there once the pipe can be opened for writing.
+    let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| (i * 7 % 251) as u8).collect();
+    let reader = Command::new("cat").arg(&path).stdout(Stdio::piped()).spawn().expect("cat");
+    let holder = fs::OpenOptions::new().write(true).open(&path).expect("a pipe with a reader");
+    let collector = std::thread::spawn(move || reader.wait_with_output().expect("what was read").stdout);
+    atomic(&path, &bytes).expect("written");
+    drop(holder);
+    assert!(collector.join().expect("no panic") == bytes);
+}
+
+#[test]
+fn standard_output_is_written_in_place() {
+    if let Some(path) = child_path() {
+        atomic(&path, b"report").expect("written");
+        return;
+    }
+    let run = |stdout: Stdio| {
+        let mut command =
+            child(&this_binary(), "output::standard_output_is_written_in_place", Path::new("/dev/stdout"));
+        command.stdout(stdout).output().expect("a child")
+    };
+    let piped = run(Stdio::piped());
+    assert!(piped.status.success());
+    assert!(String::from_utf8_lossy(&piped.stdout).contains("report"));
+    let directory = scratch();
+    let path = directory.path().join("redirected");
+    let file = fs::OpenOptions::new().create(true).append(true).open(&path).expect("a file");
+    assert!(run(file.into()).status.success());
+    let text = fs::read_to_string(&path).expect("a file");
+    assert!(text.contains("running 1 test") && text.contains("report"), "{text}");
+}
+
+#[test]
+fn targets_that_cannot_be() {
+    let directory = scratch();
+    let inside = |name: &str| directory.path().join(name);
+    fs::create_dir(inside("dir.png")).expect("a directory");
+    fs::write(inside("file"), "").expect("a file");
+    let message = refused(&inside("missing/out.png"));
+    let expected = format!("the directory {} does not exist; create it or", inside("missing").display());
+    assert!(message.contains(&expected), "{message}");
+    for name in ["dir.png", "dir.png/", "new.png/"] {
+        let message = refused(&inside(name));
+        assert!(message.contains("it is a directory; name a file in it"), "{message}");
+    }
+    let message = refused(&inside("file/out.png"));
+    assert!(message.contains("Not a directory"), "{message}");
+    let message = refused(&inside(&format!("{}.png", "n".repeat(300))));
+    assert!(message.ends_with("File name too long; choose a shorter name"), "{message}");
+    assert_eq!(names(directory.path()), ["dir.png", "file"]);
+}
+
+#[test]
+fn the_longest_name_can_be_written() {
+    let directory = scratch();
+    let path = directory.path().join(format!("{}.png", "n".repeat(251)));
+    atomic(&path, b"picture").expect("written");
+    assert_eq!(fs::read(&path).expect("a file"), b"picture");
+}
+
+/// Root may write anything, so that this runs as a user with no rights.
+#[test]
+fn what_may_not_be_written_is_refused() {
+    if let Some(directory) = child_path() {
+        let message = refused(&directory.join("closed/out.png"));
+        assert!(
+            message.ends_with("Permission denied; allow writing there or choose another place"),
+            "{message}"
+        );
+        let message = refused(&directory.join("open/protected.png"));
+        assert!(message.contains("protected.png: Permission denied; "), "{message}");
+        atomic(&directory.join("open/other.png"), b"new").expect("written");
+        return;
+    }
+    let directory = scratch();
+    let mode = |name: &str, mode| {
+        let path = directory.path().join(name);
+        fs::set_permissions(path, fs::Permissions::from_mode(mode)).expect("a mode");
+    };
+    for name in ["closed", "open"] {
+        fs::create_dir(directory.path().join(name)).expect("a directory");
+    }
+    fs::write(directory.path().join("open/protected.png"), "old").expect("a file");
+    // A copy, as a user without rights may not reach where this binary is.
+    let program = directory.path().join("program");
+    fs::copy(this_binary(), &program).expect("a copy");
+    mode("open/protected.png", 0o444);
+    mode("closed", 0o555);
+    mode("open", 0o777);
+    mode("", 0o755);
+    let mut command = child(&program, "output::what_may_not_be_written_is_refused", directory.path());
+    if fs::metadata(directory.path()).expect("a directory").uid() == 0 {
+        command.uid(65534).gid(65534);
+    }
+    succeeded(&command.current_dir("/").output().expect("a child"));
+    mode("closed", 0o755);
+    assert_eq!(names(&directory.path().join("closed")), [""; 0]);
+    assert_eq!(names(&directory.path().join("open")), ["other.png", "protected.png"]);
+    assert_eq!(fs::read(directory.path().join("open/protected.png")).expect("a file"), b"old");
+}
+
+fn succeeded(output: &Output) {
+    assert!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_limit_on_the_size_of_files_is_an_error_and_not_the_end() {
+    if let Some(path) = child_path() {
+        let error = atomic(&path, &vec![1; 1 << 20]).expect_err("larger than the limit");
+        assert!(matches!(&error, OutputError::File { .. }));
+        assert!(error.to_string().contains("File too large; raise the limit"), "{error}");
+        return;
+    }
+    let directory = scratch();
+    let path = directory.path().join("out.png");
+    fs::write(&path, "old").expect("a file");
+    let script = "ulimit -f 64; exec \"$0\" --exact \"$1\"";
+    let test = "output::a_limit_on_the_size_of_files_is_an_error_and_not_the_end";
+    let mut command = Command::new("sh");
+    command.args(["-c", script]).arg(this_binary()).arg(test).env(CHILD, &path);
+    succeeded(&command.output().expect("a child"));
+    assert_eq!(fs::read(&path).expect("a file"), b"old");
+    assert_eq!(names(directory.path()), ["out.png"]);
+}
+
+#[test]
+fn many_writers_at_once() {
+    let directory = scratch();
+    let path = directory.path().join("out.png");
+    let contents: Vec<Vec<u8>> = (0..4).map(|i| vec![i; 10_000 + usize::from(i)]).collect();
+    std::thread::scope(|scope| {
+        for bytes in &contents {
+            let path = &path;
+            scope.spawn(move || (0..25).for_each(|_| atomic(path, bytes).expect("written")));
+        }
+    });
+    assert!(contents.contains(&fs::read(&path).expect("a file")));
+    assert_eq!(names(directory.path()), ["out.png"]);
+}
+
+/// Two pictures that a torn file would mix.
+fn two_pictures() -> [Vec<u8>; 2] {
+    [vec![0xaa; 3_000_000], vec![0x55; 2_000_001]]
+}
+
+#[test]
+fn killed_at_any_time_the_file_is_whole_and_the_next_write_clears_up() {
+    let test = "output::killed_at_any_time_the_file_is_whole_and_the_next_write_clears_up";
+    let pictures = two_pictures();
+    if let Some(path) = child_path() {
+        for bytes in pictures.iter().cycle() {
+            atomic(&path, bytes).expect("written");
+        }
+    }
+    let directory = scratch();
+    let path = directory.path().join("out.png");
+    atomic(&path, &pictures[0]).expect("written");
+    let mut left_behind = 0;
+    for round in 0..50_u64 {
+        let mut writer = child(&this_binary(), test, &path).spawn().expect("a child");
+        // Another file in its place says that it is writing; then a time of its own for each round.
+        let state = || fs::metadata(&path).map(|file| (file.ino(), file.mtime(), file.mtime_nsec()));
+        let before = state().expect("a file");
+        while state().expect("a file") == before {
+            assert!(writer.try_wait().expect("a child").is_none(), "the writer ended by itself");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_micros(round * 7919 % 10_000));
+        writer.kill().expect("killed");
+        assert_eq!(writer.wait().expect("a child").signal(), Some(9));
+        let found = fs::read(&path).expect("a file");
+        assert!(pictures.contains(&found), "round {round}: a torn file of {} bytes", found.len());
+        left_behind = left_behind.max(names(directory.path()).len() - 1);
+    }
+    assert!(left_behind <= 1, "each write clears up after the one before, {left_behind} files were left");
+    atomic(&path, b"done").expect("written");
+    assert_eq!(names(directory.path()), ["out.png"]);
+}
