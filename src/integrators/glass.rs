@@ -62,7 +62,7 @@ impl Wave<'_> {
         let refracted = PathRay {
             ray: leaving(surface, direction),
             throughput: path.throughput / (eta * eta),
-            path: path.path.wrapping_mul(2) | 1,
+            path: path.next_path(2),
             medium: inside,
             ..*path
         };
