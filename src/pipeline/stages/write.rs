@@ -104,7 +104,8 @@ fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
     let SampleStats { min, mean, max } = canvas.film.samples();
     let mut key = Fingerprint::new("write");
     key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());
-    key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize).u64(plan.bit_depth.into());
+    key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
+    key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());
     key.path(path).finish()
 }
 
