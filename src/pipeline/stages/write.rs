@@ -18,6 +18,13 @@ use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
 
+impl Written {
+    /// Write everything next time: a person asked for it.
+    pub(in crate::pipeline) fn forget(&mut self) {
+        self.0.clear();
+    }
+}
+
 /// Look at all targets before work is put into a picture for them.
 ///
 /// # Errors
