@@ -4,3 +4,4 @@ mod broken;
 mod house;
 mod once;
 mod output;
+mod terminal;
