@@ -77,7 +77,7 @@ impl Folder {
     }
 
     pub fn bytes(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+        fs::read(self.path(name)).expect(name)
     }
 
     /// The bytes of the picture that a headless run makes of the scene as it is.
