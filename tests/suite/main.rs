@@ -5,3 +5,4 @@ mod closed_forms;
 mod house;
 mod once;
 mod output;
+mod terminal;
