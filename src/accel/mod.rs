@@ -1,5 +1,8 @@
-//! Trees over boxes and ids. They know no shape: a closure tests what an id stands for.
+//! Trees over boxes and ids. They know no shape: a closure tests what an id stands for. The one exception is
+//! [`wide_bvh`], a tree over triangles whose leaves hold them ready for vector instructions.
 
 pub mod bvh;
+pub mod wide_bvh;
 
 pub use bvh::Bvh;
+pub use wide_bvh::WideBvh;

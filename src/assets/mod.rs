@@ -90,8 +90,6 @@ pub struct FileMaterial {
     pub specular: Vec3,
     /// Ns.
     pub shininess: f32,
-    /// Ka; none where the file has none.
-    pub ambient: Option<Vec3>,
     /// Ke, radiance.
     pub emission: Vec3,
     /// Ni.

@@ -282,7 +282,8 @@ fn tile_rect(crop: Rect, tile: usize) -> Rect {
 fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
     let sum = size_of::<DVec3>() + size_of::<u32>();
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
-    crop.area() as u64 * sum as u64 + u64::from(width) * u64::from(height) * pixel as u64
+    let whole = u64::from(width) * u64::from(height);
+    (crop.area() as u64).saturating_mul(sum as u64).saturating_add(whole.saturating_mul(pixel as u64))
 }
 
 /// Asks for all the memory at once first, as a system that promises more than it has refuses only that.

@@ -1,4 +1,4 @@
-//! From radiance to what a display shows: exposure, tone curve, clamp, sRGB.
+//! From radiance to what a display is sent: exposure, tone curve, clamp, sRGB.
 
 use rayon::prelude::*;
 
@@ -20,13 +20,25 @@ pub enum Curve {
     Agx,
 }
 
-/// How radiance becomes display light.
+/// How display light in [0, 1] is encoded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Transfer {
+    /// By the sRGB curve (IEC 61966-2-1).
+    #[default]
+    Srgb,
+    /// As it is: the values are what a display is sent.
+    Identity,
+}
+
+/// How radiance becomes what a display is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
     /// Radiance is multiplied by 2 to this power.
     pub exposure_stops: f32,
     /// What then brings it into [0, 1].
     pub curve: Curve,
+    /// How that is encoded.
+    pub transfer: Transfer,
 }
 
 /// Far above everything that any curve tells apart, far below what overflows inside one.
@@ -35,6 +47,9 @@ const BRIGHTEST: f32 = 1e10;
 const PARALLEL_PIXELS: usize = 1 << 18;
 
 impl ToneMapping {
+    /// For pictures of numbers, whose values are what a display is sent: they are clamped and nothing else.
+    pub const DATA: Self = Self { exposure_stops: 0.0, curve: Curve::None, transfer: Transfer::Identity };
+
     /// One colour: linear display light in [0, 1], whatever is fed; NaN and negative components count as 0.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
         self.exposed(radiance, self.exposure_stops.exp2())
@@ -54,14 +69,24 @@ impl ToneMapping {
 
 /// A picture of 8 bits a channel.
 pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
-    let pixels = map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8));
+    let pixels = match tone.transfer {
+        Transfer::Srgb => map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8)),
+        Transfer::Identity => {
+            map_pixels(image, tone, |color| color.to_array().map(|x| (x * 255.0 + 0.5) as u8))
+        }
+    };
     Picture { width: image.width, height: image.height, pixels }
 }
 
 /// A picture of 16 bits a channel.
 pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Picture16 {
-    let quantise = |x: f32| (linear_to_srgb(x) * 65535.0 + 0.5) as u16;
-    let pixels = map_pixels(image, tone, |color| color.to_array().map(quantise));
+    let quantise = |x: f32| (x * 65535.0 + 0.5) as u16;
+    let pixels = match tone.transfer {
+        Transfer::Srgb => {
+            map_pixels(image, tone, |color| color.to_array().map(|x| quantise(linear_to_srgb(x))))
+        }
+        Transfer::Identity => map_pixels(image, tone, |color| color.to_array().map(quantise)),
+    };
     Picture16 { width: image.width, height: image.height, pixels }
 }
 
@@ -86,7 +111,7 @@ mod tests {
     const CURVES: [Curve; 4] = [Curve::None, Curve::Reinhard, Curve::Aces, Curve::Agx];
 
     fn tone(curve: Curve) -> ToneMapping {
-        ToneMapping { exposure_stops: 0.0, curve }
+        ToneMapping { curve, ..Default::default() }
     }
 
     fn grey(curve: Curve, value: f32) -> f32 {
@@ -131,7 +156,7 @@ mod tests {
         let image = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::new(0.05, 0.1, 0.2)] };
         let brighter = RadianceImage { pixels: vec![Vec3::new(0.2, 0.4, 0.8)], width: 1, height: 1 };
         for curve in CURVES {
-            let exposed = ToneMapping { exposure_stops: 2.0, curve };
+            let exposed = ToneMapping { exposure_stops: 2.0, ..tone(curve) };
             assert_eq!(develop(&image, &exposed), develop(&brighter, &tone(curve)), "{curve:?}");
         }
     }
@@ -142,7 +167,7 @@ mod tests {
             [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1e30, f32::MAX, 0.0, 1e-45];
         for curve in CURVES {
             for exposure_stops in [0.0, 10.0, -10.0, 500.0, -500.0, f32::NAN] {
-                let mapping = ToneMapping { exposure_stops, curve };
+                let mapping = ToneMapping { exposure_stops, ..tone(curve) };
                 for [r, g, b] in hostile.iter().flat_map(|&a| hostile.map(|b| [a, b, 0.5])) {
                     let color = mapping.apply(Vec3::new(r, g, b));
                     assert!(color.is_finite(), "{mapping:?} of {r}, {g}, {b}: {color}");
@@ -154,6 +179,20 @@ mod tests {
             assert_eq!(develop(&image, &tone(curve)).pixels, [[0; 3], [255; 3]], "{curve:?}");
             assert_eq!(develop16(&image, &tone(curve)).pixels, [[0; 3], [65535; 3]], "{curve:?}");
         }
+    }
+
+    #[test]
+    fn data_is_clamped_and_nothing_else() {
+        let pixels = vec![
+            Vec3::new(0.5, 0.0, 1.0),
+            Vec3::new(-3.0, f32::NAN, 7.0),
+            Vec3::new(0.25, 0.1, f32::INFINITY),
+        ];
+        let image = RadianceImage { width: 3, height: 1, pixels };
+        let eight = develop(&image, &ToneMapping::DATA).pixels;
+        assert_eq!(eight, [[128, 0, 255], [0, 0, 255], [64, 26, 255]]);
+        let sixteen = develop16(&image, &ToneMapping::DATA).pixels;
+        assert_eq!(sixteen, [[32768, 0, 65535], [0, 0, 65535], [16384, 6554, 65535]]);
     }
 
     #[test]

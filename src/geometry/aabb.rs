@@ -59,6 +59,9 @@ impl Aabb {
     }
 }
 
+/// Factor on distances that makes up for the rounding of [`SlabRay::enter`].
+pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
+
 /// A ray made ready for many boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
@@ -76,17 +79,17 @@ impl SlabRay {
     /// the far distance is padded by the slab test's own rounding (Ize, *Robust BVH Ray Traversal*, JCGT
     /// 2013); a ray inside the plane of a face makes 0·∞ = NaN, which every comparison drops in favour of the
     /// interval so far, so that both zeros of a direction behave the same.
+    /// The ray's own end is padded alike, so that a box is not missed whose hit is exactly there.
     #[inline(always)]
     pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
-        const PAD: f32 = 1.0 + 2.0 * gamma(3);
         let a = (min - self.origin) * self.inverse;
         let b = (max - self.origin) * self.inverse;
         let mut near = 0.0_f32;
-        let mut far = t_max;
+        let mut far = t_max * SLAB_PAD;
         for axis in 0..3 {
             let (lo, hi) = if self.inverse[axis] < 0.0 { (b[axis], a[axis]) } else { (a[axis], b[axis]) };
             near = if lo > near { lo } else { near };
-            let hi = hi * PAD;
+            let hi = hi * SLAB_PAD;
             far = if hi < far { hi } else { far };
         }
         (near <= far).then_some(near)

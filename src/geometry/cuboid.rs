@@ -66,6 +66,7 @@ impl Cuboid {
             uv,
             self.axes * (u * width),
             self.axes * (v * height),
+            self.center.abs().max_element() + self.half.length(),
         )
     }
 

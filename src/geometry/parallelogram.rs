@@ -55,7 +55,8 @@ impl Parallelogram {
         let (s, t) =
             (from_corner.dot(self.dual_u).clamp(0.0, 1.0), from_corner.dot(self.dual_v).clamp(0.0, 1.0));
         let point = self.corner + self.u * s + self.v * t;
-        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v)
+        let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
+        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v, reach)
     }
 
     /// The box around it.

@@ -34,7 +34,8 @@ impl Plane {
         let offset = ray.at(f64::from(hit.t)) - self.point;
         let (s, t) = (offset.dot(self.u), offset.dot(self.v));
         let point = self.point + self.u * s + self.v * t;
-        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v)
+        let reach = self.point.abs().max_element() + s.abs() + t.abs();
+        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v, reach)
     }
 }
 

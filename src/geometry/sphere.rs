@@ -41,7 +41,9 @@ impl Sphere {
         let n =
             if outwards.length_squared() > 0.0 { outwards.normalize() } else { -ray.direction.normalize() };
         let (uv, dpdu, dpdv) = sphere_parametrisation(n);
-        SurfacePoint::exact(self.center + n * self.radius, n, uv, dpdu * self.radius, dpdv * self.radius)
+        let reach = self.center.abs().max_element() + self.radius;
+        let (dpdu, dpdv) = (dpdu * self.radius, dpdv * self.radius);
+        SurfacePoint::exact(self.center + n * self.radius, n, uv, dpdu, dpdv, reach)
     }
 
     /// The box around it.

@@ -44,13 +44,15 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
-    /// A point computed in double precision on a surface without shading normals: its error is that of rounding to `f32`.
-    pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3) -> Self {
+    /// A point computed in double precision on a surface without shading normals. Its error is that of rounding to `f32`
+    /// and, where the point is small beside the lengths that it and the next hit are computed from, theirs: `reach`
+    /// is the greatest of those.
+    pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
         let normal = normal.normalize().as_vec3();
         let point = point.as_vec3();
         Self {
             point,
-            error: rounding_error(point),
+            error: rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32),
             normal,
             shading_normal: normal,
             uv,
@@ -61,7 +63,10 @@ impl SurfacePoint {
     }
 }
 
-/// Twice the error of rounding a point to `f32`: the second half is for the `f64` arithmetic before it.
+/// Bound on the relative error of the `f64` arithmetic of a hit, its surface and the next test from there.
+const DOUBLE_ERROR: f64 = 32.0 * f64::EPSILON;
+
+/// Twice the error of rounding a point to `f32`.
 pub fn rounding_error(point: Vec3) -> Vec3 {
     point.abs() * f32::EPSILON + Vec3::splat(f32::MIN_POSITIVE)
 }

@@ -34,7 +34,8 @@ impl Triangle {
     pub fn surface(&self, hit: &ShapeHit) -> SurfacePoint {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let (ab, ac) = (self.b - self.a, self.c - self.a);
-        SurfacePoint::exact(self.a + ab * u + ac * v, ab.cross(ac), Vec2::new(hit.u, hit.v), ab, ac)
+        let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
+        SurfacePoint::exact(self.a + ab * u + ac * v, ab.cross(ac), Vec2::new(hit.u, hit.v), ab, ac, reach)
     }
 
     /// The box around it.

@@ -32,6 +32,16 @@ impl ShearedRay {
         Self { origin, axes: [x, y, z], shear: Vec3::new(direction[x] * scale, direction[y] * scale, scale) }
     }
 
+    /// The axes of the world that are its x, y and z.
+    pub fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// What is taken from x and y for each unit of z, and t for each unit of z.
+    pub fn shear(&self) -> Vec3 {
+        self.shear
+    }
+
     /// The hit at a t in (0, `t_max`], from either side. A t within the test's own error of 0 is none
     /// (*Physically Based Rendering*, 4th ed., section 6.8.7).
     #[inline(always)]
@@ -71,14 +81,16 @@ impl ShearedRay {
         Some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
 
-    /// Bound on the absolute error of t.
+    /// Bound on the absolute error of t. The sheared x and y err by lengths, z by units of t, which are the same for unit
+    /// directions only.
     fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> f32 {
         let greatest = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
         let x = greatest(|corner| corner.0.abs());
         let y = greatest(|corner| corner.1.abs());
-        let z = greatest(|corner| corner.2.abs()) * self.shear.z.abs();
+        let depth = greatest(|corner| corner.2.abs());
+        let z = depth * self.shear.z.abs();
         let error_z = gamma(3) * z;
-        let (error_x, error_y) = (gamma(5) * (x + z), gamma(5) * (y + z));
+        let (error_x, error_y) = (gamma(5) * (x + depth), gamma(5) * (y + depth));
         let error_edge = 2.0 * (gamma(2) * x * y + error_y * x + error_x * y);
         let edge = 2.0 * x * y;
         3.0 * (gamma(3) * edge * z + error_edge * z + error_z * edge) * inverse_determinant.abs()

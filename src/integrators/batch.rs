@@ -73,6 +73,13 @@ pub struct PathRay {
     pub medium: Medium,
 }
 
+impl PathRay {
+    /// Number of the path that goes on from here; `branch` tells the ways to go on apart.
+    pub fn next_path(&self, branch: u32) -> u32 {
+        (self.path ^ branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
+    }
+}
+
 impl RayQueue {
     /// Rays in it.
     pub fn len(&self) -> usize {

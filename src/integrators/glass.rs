@@ -55,17 +55,14 @@ impl Wave<'_> {
             (near, ior(world, left), left)
         };
         let eta = far / near;
-        let normal = facing_normal(surface, path.ray.direction);
-        let (reflectance, cos_transmitted) = dielectric(-normal.dot(path.ray.direction), eta);
-        let Some(cos_transmitted) = cos_transmitted else {
+        let (reflectance, Some(direction)) = boundary(surface, path.ray.direction, eta) else {
             return self.push_reflected(path, surface, 1.0);
         };
-        let direction = refract(path.ray.direction, normal, eta, cos_transmitted);
         // Radiance over the square of the index is what refraction conserves.
         let refracted = PathRay {
             ray: leaving(surface, direction),
             throughput: path.throughput / (eta * eta),
-            path: path.path.wrapping_mul(2) | 1,
+            path: path.next_path(2),
             medium: inside,
             ..*path
         };
@@ -101,9 +98,22 @@ impl Wave<'_> {
     }
 }
 
-/// The shading normal on the ray's side, or the geometric one where the shading normal looks away.
-fn facing_normal(surface: &SurfacePoint, direction: Vec3) -> Vec3 {
-    let side = if surface.normal.dot(direction) < 0.0 { 1.0 } else { -1.0 };
-    let shading = surface.shading_normal * side;
-    if shading.dot(direction) < 0.0 { shading } else { surface.normal * side }
+/// Reflectance and refracted direction by the shading normal. Where that looks away from the ray, or sends the refracted
+/// ray back to the side that it came from, by the geometric one: the ray must be where its medium says.
+fn boundary(surface: &SurfacePoint, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
+    let side = if surface.normal.dot(incident) < 0.0 { 1.0 } else { -1.0 };
+    let (shading, geometric) = (surface.shading_normal * side, surface.normal * side);
+    let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;
+    let by = |normal: Vec3| {
+        let (reflectance, cosine) = dielectric(-normal.dot(incident), eta);
+        (reflectance, cosine.map(|cosine| refract(incident, normal, eta, cosine)))
+    };
+    let shaded = if shading.dot(incident) < 0.0 { by(shading) } else { by(geometric) };
+    match shaded {
+        (_, Some(direction)) if !crosses(&direction) => {
+            let (reflectance, direction) = by(geometric);
+            (reflectance, direction.filter(crosses))
+        }
+        _ => shaded,
+    }
 }

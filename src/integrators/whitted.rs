@@ -155,7 +155,7 @@ pub(super) fn reflected(path: &PathRay, surface: &SurfacePoint, reflectance: Vec
     PathRay {
         ray: leaving(surface, direction.normalize()),
         throughput: path.throughput * reflectance,
-        path: path.path.wrapping_mul(2),
+        path: path.next_path(1),
         ..*path
     }
 }

@@ -6,15 +6,16 @@ use crate::math::Vec3;
 /// the side of the ray, `eta` = n(far side)/n(ray's side). Exact equations of both polarisations (Born and
 /// Wolf, *Principles of Optics*, section 1.5.2).
 pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
-    let cos_i = cos_incident.clamp(0.0, 1.0);
-    let sin2_t = (1.0 - cos_i) * (1.0 + cos_i) / (eta * eta);
-    if sin2_t >= 1.0 {
+    let (cos_i, eta) = (f64::from(cos_incident.clamp(0.0, 1.0)), f64::from(eta));
+    // 1 − sin²θₜ without the cancellation that grazing rays make of it.
+    let cos2_t = ((eta - 1.0) * (eta + 1.0) + cos_i * cos_i) / (eta * eta);
+    if !(cos2_t > 0.0) {
         return (1.0, None);
     }
-    let cos_t = (1.0 - sin2_t).sqrt();
+    let cos_t = cos2_t.sqrt();
     let parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     let perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    (0.5 * (parallel * parallel + perpendicular * perpendicular), Some(cos_t))
+    ((0.5 * (parallel * parallel + perpendicular * perpendicular)) as f32, Some(cos_t as f32))
 }
 
 /// The refracted direction of unit `incident`, given the unit normal on its own side and what [`dielectric`] said (Snell).

@@ -67,7 +67,7 @@ impl Texture {
         let tile = |x: f32| if x.is_finite() { x } else { 0.0 };
         let place = |x: f32, size: f32| self.wrap.fold(tile(x)) * size;
         let x = place(uv.x * self.repeat.x, size.x);
-        let y = place(1.0 - uv.y * self.repeat.y, size.y);
+        let y = place(uv.y * self.repeat.y, size.y);
         match self.filter {
             Filter::Nearest => self.texel(x.floor(), y.floor()),
             Filter::Bilinear => self.bilinear(x - 0.5, y - 0.5),
@@ -75,18 +75,18 @@ impl Texture {
     }
 
     fn bilinear(&self, x: f32, y: f32) -> Vec3 {
-        let (left, top) = (x.floor(), y.floor());
-        let (fx, fy) = (x - left, y - top);
-        let upper = self.texel(left, top).lerp(self.texel(left + 1.0, top), fx);
-        let lower = self.texel(left, top + 1.0).lerp(self.texel(left + 1.0, top + 1.0), fx);
-        upper.lerp(lower, fy)
+        let (left, bottom) = (x.floor(), y.floor());
+        let (fx, fy) = (x - left, y - bottom);
+        let lower = self.texel(left, bottom).lerp(self.texel(left + 1.0, bottom), fx);
+        let upper = self.texel(left, bottom + 1.0).lerp(self.texel(left + 1.0, bottom + 1.0), fx);
+        lower.lerp(upper, fy)
     }
 
-    /// A texel by whole numbers that may lie one outside.
+    /// A texel by whole numbers, counted from the left and from the bottom, that may lie one outside.
     fn texel(&self, x: f32, y: f32) -> Vec3 {
         let column = self.wrap.index(x as i64, i64::from(self.texels.width));
-        let row = self.wrap.index(y as i64, i64::from(self.texels.height));
-        self.texels.get(column, row)
+        let row_from_bottom = self.wrap.index(y as i64, i64::from(self.texels.height));
+        self.texels.get(column, self.texels.height - 1 - row_from_bottom)
     }
 }
 

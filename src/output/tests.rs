@@ -19,7 +19,7 @@ fn options(bit_depth: BitDepth) -> EncodeOptions {
         ("Scene".to_owned(), "scenes/cornell.toml".to_owned()),
         ("Source".to_owned(), "Grüße, 日本\nsecond line".to_owned()),
     ];
-    let tone = ToneMapping { exposure_stops: -0.5, curve: Curve::Reinhard };
+    let tone = ToneMapping { exposure_stops: -0.5, curve: Curve::Reinhard, ..Default::default() };
     EncodeOptions { tone, bit_depth, metadata }
 }
 

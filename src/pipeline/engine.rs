@@ -104,6 +104,7 @@ impl Engine {
         let (Some(canvas), Some(plan)) = (&self.canvas, &self.plan) else {
             return say_write_failed(sink, "there is no picture yet".to_owned());
         };
+        self.written.forget();
         if let Err(message) = write(canvas, plan, &mut self.written, &self.contents, sink) {
             say_write_failed(sink, message);
         }
@@ -201,10 +202,12 @@ impl Engine {
         let (plan, contents) = (&ready.plan, &self.contents);
         let written = std::cell::RefCell::new(&mut self.written);
         let pulse = |canvas: &Canvas| {
-            if (meanwhile.take_write)()
-                && let Err(message) = write(canvas, plan, &mut written.borrow_mut(), contents, sink)
-            {
-                say_write_failed(sink, message);
+            if (meanwhile.take_write)() {
+                let mut written = written.borrow_mut();
+                written.forget();
+                if let Err(message) = write(canvas, plan, &mut written, contents, sink) {
+                    say_write_failed(sink, message);
+                }
             }
         };
         let order = Order {

@@ -113,7 +113,7 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32, path: &Path) -> Resul
     }
 }
 
-/// Numbers that are no light are shown as they are.
+/// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
 fn tone(exposure: f32, tonemap: Tonemap, view: View) -> ToneMapping {
     let is_light = matches!(view, View::Beauty | View::Ambient | View::Diffuse | View::Specular);
     let curve = match tonemap {
@@ -122,10 +122,11 @@ fn tone(exposure: f32, tonemap: Tonemap, view: View) -> ToneMapping {
         Tonemap::Aces => Curve::Aces,
         Tonemap::Agx => Curve::Agx,
     };
-    if is_light {
-        ToneMapping { exposure_stops: exposure, curve }
-    } else {
-        ToneMapping { exposure_stops: 0.0, curve: Curve::None }
+    match (is_light, view.is_data()) {
+        (true, _) => ToneMapping { exposure_stops: exposure, curve, ..Default::default() },
+        (false, true) => ToneMapping::DATA,
+        // A share of light that arrives is linear, but no exposure makes it more than it is.
+        (false, false) => ToneMapping::default(),
     }
 }
 
@@ -224,5 +225,15 @@ mod tests {
         assert_eq!(planned(text, &Overrides::default()).tone.exposure_stops, 2.0);
         let normals = Overrides { view: Some(View::Normal), ..Default::default() };
         assert_eq!(planned(text, &normals).tone.exposure_stops, 0.0);
+    }
+
+    #[test]
+    fn only_display_values_skip_the_srgb_curve() {
+        use crate::film::tone::Transfer;
+        for view in View::ALL {
+            let overrides = Overrides { view: Some(view), ..Default::default() };
+            let transfer = planned("", &overrides).tone.transfer;
+            assert_eq!(transfer == Transfer::Identity, view.is_data(), "{}", view.name());
+        }
     }
 }

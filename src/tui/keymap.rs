@@ -14,7 +14,7 @@ pub(super) struct Binding {
     pub action: Action,
     /// What it does, for the help.
     pub help: &'static str,
-    /// One word for the bottom line; empty: not there.
+    /// One word for the bottom line; empty: not there. Those of the pane of errors are there while it is open.
     pub hint: &'static str,
 }
 
@@ -34,7 +34,7 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
     binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", "shadows"),
     binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", "dof"),
-    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on or off", ""),
+    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons: not in this version", ""),
     binding(&[KeyPress::plain('v')], "v", Action::NextView, "next view: normals, depth, …", "view"),
     binding(&[KeyPress::plain('V')], "V", Action::PreviousView, "previous view", ""),
     binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
@@ -47,7 +47,7 @@ pub(super) const KEYMAP: &[Binding] = &[
         "PgUp, up",
         Action::ScrollUp,
         "scroll the errors up",
-        "",
+        "scroll",
     ),
     binding(
         &[KeyPress::special(KeyCode::PageDown), KeyPress::special(KeyCode::Down)],
@@ -56,7 +56,13 @@ pub(super) const KEYMAP: &[Binding] = &[
         "scroll the errors down",
         "",
     ),
-    binding(&[KeyPress::special(KeyCode::Esc)], "Esc", Action::Close, "close the help or the errors", ""),
+    binding(
+        &[KeyPress::special(KeyCode::Esc)],
+        "Esc",
+        Action::Close,
+        "close the help or the errors",
+        "close",
+    ),
     binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "stop and go back to the shell", ""),
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];

@@ -117,6 +117,8 @@ pub(super) struct State {
     pub requested: Option<PreviewSize>,
     pub activity: Activity,
     pub paused: bool,
+    /// When the request under way was held.
+    pub paused_at: Option<Instant>,
     /// When to ask for another preview size.
     pub resize_due: Option<Instant>,
 
@@ -126,6 +128,10 @@ pub(super) struct State {
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
     pub unchanged: bool,
+    /// Requests that were rendered and finished.
+    pub renders: u64,
+    /// Whether the next picture that is written is one that was asked for.
+    pub asked_to_write: bool,
     pub written: Vec<Written>,
     pub picture: Option<Shown>,
 
@@ -161,6 +167,7 @@ impl State {
             requested: None,
             activity: Activity::Running { since: now },
             paused: false,
+            paused_at: None,
             resize_due: None,
             effective: None,
             stages: Default::default(),
@@ -168,6 +175,8 @@ impl State {
             progress: None,
             report: None,
             unchanged: false,
+            renders: 0,
+            asked_to_write: false,
             written: Vec::new(),
             picture: None,
             problems: None,
@@ -205,11 +214,25 @@ impl State {
         matches!(self.activity, Activity::Running { .. })
     }
 
-    /// How long the current request has been under way.
+    /// How long the current request has been at work; while it is held, the time stands still.
     pub(super) fn running_for(&self) -> Option<Duration> {
         match self.activity {
-            Activity::Running { since } => Some(self.now.saturating_duration_since(since)),
+            Activity::Running { since } => {
+                Some(self.paused_at.unwrap_or(self.now).saturating_duration_since(since))
+            }
             _ => None,
+        }
+    }
+
+    /// Hold the clock of the request or let it go on.
+    pub(super) fn set_paused(&mut self, paused: bool) {
+        self.paused = paused;
+        if paused {
+            self.paused_at = Some(self.now);
+        } else if let Some(held) = self.paused_at.take()
+            && let Activity::Running { since } = &mut self.activity
+        {
+            *since += self.now.saturating_duration_since(held);
         }
     }
 

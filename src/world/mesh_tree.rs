@@ -2,19 +2,17 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::accel::Bvh;
+use crate::accel::WideBvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-/// Triangles in the order of the tree's leaves, in the mesh's own coordinates.
+/// Triangles in the mesh's own coordinates, in the leaves of a tree.
 #[derive(Debug)]
 pub struct MeshTree {
     loaded: Arc<LoadedMesh>,
-    corners: Vec<[Vec3; 3]>,
-    tree: Bvh,
+    tree: WideBvh,
     /// Vertex normals, computed at their first use where the file has none.
     computed_normals: OnceLock<Vec<Vec3>>,
 }
@@ -26,12 +24,8 @@ impl MeshTree {
     /// [`Cancelled`].
     pub fn build(loaded: Arc<LoadedMesh>, token: &CancelToken) -> Result<Self, Cancelled> {
         let mesh = &loaded.mesh;
-        let boxes: Vec<Aabb> =
-            (0..mesh.triangles.len() as u32).map(|id| Aabb::around(mesh.corners(id))).collect();
-        token.check()?;
-        let tree = Bvh::build(&boxes, token)?;
-        let corners = tree.order().iter().map(|&id| mesh.corners(id)).collect();
-        Ok(Self { loaded, corners, tree, computed_normals: OnceLock::new() })
+        let tree = WideBvh::build(mesh.triangles.len() as u32, |id| mesh.corners(id), token)?;
+        Ok(Self { loaded, tree, computed_normals: OnceLock::new() })
     }
 
     /// The file's content.
@@ -53,31 +47,18 @@ impl MeshTree {
         }
     }
 
-    /// Bytes held by the tree and its copy of the triangles.
+    /// Bytes held by the tree with its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes() + size_of_val(self.corners.as_slice())
+        self.tree.memory_bytes()
     }
 
     /// The nearest hit of a ray in the mesh's coordinates; of hits at one distance the triangle of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
-        let sheared = ShearedRay::new(ray.origin, ray.direction);
-        let mut best: Option<ShapeHit> = None;
-        self.tree.closest(ray, |place, id, t_max| {
-            let hit = sheared.intersect(&self.corners[place as usize], t_max)?;
-            let nearer = best.is_none_or(|best| (hit.t, id) < (best.t, best.primitive));
-            nearer.then(|| {
-                best = Some(ShapeHit { primitive: id, ..hit });
-                hit.t
-            })
-        });
-        best
+        self.tree.closest(ray)
     }
 
     /// Whether the ray hits any triangle but `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
-        let sheared = ShearedRay::new(ray.origin, ray.direction);
-        self.tree.any(ray, |place, id| {
-            sheared.intersect(&self.corners[place as usize], ray.t_max).is_some() && Some(id) != except
-        })
+        self.tree.any(ray, except)
     }
 }

@@ -1,6 +1,7 @@
 //! The program as a whole: one crate, so that it links once.
 
 mod broken;
+mod closed_forms;
 mod desk;
 mod extremes;
 mod hostile;
@@ -8,3 +9,4 @@ mod house;
 mod once;
 mod options;
 mod output;
+mod terminal;

@@ -28,9 +28,8 @@ impl Reference {
     }
 }
 
-/// A subtree under construction; node indices count from its own start.
+/// A subtree that was built.
 struct Subtree {
-    nodes: Vec<Node>,
     root: Child,
     bounds: Aabb,
     /// Levels of nodes.
@@ -43,6 +42,14 @@ impl Bvh {
     /// # Errors
     /// [`Cancelled`].
     pub fn build(boxes: &[Aabb], token: &CancelToken) -> Result<Self, Cancelled> {
+        Self::build_for(boxes, 1, token)
+    }
+
+    /// The same, where `lanes` primitives of a leaf are tested in one go.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build_for(boxes: &[Aabb], lanes: usize, token: &CancelToken) -> Result<Self, Cancelled> {
         let mut references: Vec<Reference> = boxes
             .iter()
             .enumerate()
@@ -52,76 +59,83 @@ impl Bvh {
         if references.is_empty() {
             return Ok(Self { nodes: Vec::new(), order: Vec::new(), bounds: Aabb::EMPTY, depth: 0 });
         }
-        let mut tree = build_subtree(&mut references, 0, 0, token)?;
-        if tree.nodes.is_empty() {
-            tree.nodes.push(Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root, Child::NONE] });
+        // A tree over n boxes has fewer than n nodes; every subtree writes into a stretch of its own.
+        let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
+        let tree =
+            build_subtree(&mut references, &mut nodes, Start { place: 0, node: 0, depth: 0, lanes }, token)?;
+        if tree.root.count > 0 {
+            nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root, Child::NONE] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
-        Ok(Self { nodes: tree.nodes, order, bounds: tree.bounds, depth: tree.depth.max(1) })
+        Ok(Self { nodes, order, bounds: tree.bounds, depth: tree.depth.max(1) })
     }
 }
 
-/// Build over references that start at place `first` of the final order.
+/// Where a subtree is written.
+#[derive(Clone, Copy)]
+struct Start {
+    /// First place of the final order.
+    place: usize,
+    /// First node.
+    node: usize,
+    /// Levels above.
+    depth: usize,
+    /// Primitives of a leaf that are tested in one go.
+    lanes: usize,
+}
+
+/// Build over references, into at most one node fewer.
 fn build_subtree(
     references: &mut [Reference],
-    first: usize,
-    depth: usize,
+    nodes: &mut [Node],
+    start: Start,
     token: &CancelToken,
 ) -> Result<Subtree, Cancelled> {
     let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
-    let leaf = Child { first: first as u32, count: references.len() as u32 };
-    let Some(middle) = partition(references, bounds, depth) else {
-        return Ok(Subtree { nodes: Vec::new(), root: leaf, bounds, depth: 0 });
+    let Some(middle) = partition(references, bounds, &start) else {
+        let leaf = Child { first: start.place as u32, count: references.len() as u32 };
+        return Ok(Subtree { root: leaf, bounds, depth: 0 });
     };
     let parallel = references.len() > PARALLEL_SIZE;
     let (left, right) = references.split_at_mut(middle);
+    let Some((node, rest)) = nodes.split_first_mut() else {
+        return Ok(Subtree { root: Child::NONE, bounds, depth: 0 });
+    };
+    let (left_nodes, right_nodes) = rest.split_at_mut(left.len() - 1);
+    let depth = start.depth + 1;
+    let left_start = Start { node: start.node + 1, depth, ..start };
+    let right_start =
+        Start { place: start.place + middle, node: start.node + 1 + left_nodes.len(), depth, ..start };
     let (left, right) = if parallel {
         token.check()?;
-        let (left, right) = rayon::join(
-            || build_subtree(left, first, depth + 1, token),
-            || build_subtree(right, first + middle, depth + 1, token),
-        );
-        (left?, right?)
-    } else {
-        (
-            build_subtree(left, first, depth + 1, token)?,
-            build_subtree(right, first + middle, depth + 1, token)?,
+        rayon::join(
+            || build_subtree(left, left_nodes, left_start, token),
+            || build_subtree(right, right_nodes, right_start, token),
         )
+    } else {
+        let left = build_subtree(left, left_nodes, left_start, token);
+        (left, build_subtree(right, right_nodes, right_start, token))
     };
-    Ok(join(left, right, bounds))
-}
-
-/// A node over two subtrees: itself, the left one's nodes, the right one's.
-fn join(left: Subtree, right: Subtree, bounds: Aabb) -> Subtree {
-    let mut nodes = Vec::with_capacity(1 + left.nodes.len() + right.nodes.len());
-    let right_start = 1 + left.nodes.len() as u32;
-    let moved = |child: Child, by: u32| {
-        if child.count == 0 { Child { first: child.first + by, count: 0 } } else { child }
-    };
-    nodes.push(Node {
-        bounds: [left.bounds, right.bounds],
-        child: [moved(left.root, 1), moved(right.root, right_start)],
-    });
-    for (part, by) in [(left.nodes, 1), (right.nodes, right_start)] {
-        nodes.extend(part.into_iter().map(|mut node| {
-            node.child = node.child.map(|child| if child == Child::NONE { child } else { moved(child, by) });
-            node
-        }));
-    }
-    Subtree { nodes, root: Child { first: 0, count: 0 }, bounds, depth: 1 + left.depth.max(right.depth) }
+    let (left, right) = (left?, right?);
+    *node = Node { bounds: [left.bounds, right.bounds], child: [left.root, right.root] };
+    let root = Child { first: start.node as u32, count: 0 };
+    Ok(Subtree { root, bounds, depth: 1 + left.depth.max(right.depth) })
 }
 
 /// Sort the references into two halves; none where a leaf is cheaper.
-fn partition(references: &mut [Reference], bounds: Aabb, depth: usize) -> Option<usize> {
+fn partition(references: &mut [Reference], bounds: Aabb, start: &Start) -> Option<usize> {
     let count = references.len();
     if count == 1 {
         return None;
     }
     let centroids = Aabb::around(references.iter().map(Reference::centroid));
-    let split = (depth < SURFACE_AREA_LEVELS).then(|| best_split(references, centroids)).flatten();
-    let leaf_cost = count as f32;
+    let split = (start.depth < SURFACE_AREA_LEVELS).then(|| best_split(references, centroids)).flatten();
+    let leaf_cost = count.div_ceil(start.lanes) as f32;
     match split {
-        Some(split) if count > LEAF_SIZE || split.cost / bounds.half_area() + TRAVERSAL_COST < leaf_cost => {
+        Some(split)
+            if count > LEAF_SIZE
+                || split.cost / (bounds.half_area() * start.lanes as f32) + TRAVERSAL_COST < leaf_cost =>
+        {
             let middle = partition_by(references, |reference| split.is_left(reference));
             (middle > 0 && middle < count).then_some(middle).or(Some(count / 2))
         }

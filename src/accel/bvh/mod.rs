@@ -37,11 +37,24 @@ struct Node {
     child: [Child; 2],
 }
 
+impl Node {
+    /// No children.
+    const EMPTY: Self = Self { bounds: [Aabb::EMPTY; 2], child: [Child::NONE; 2] };
+}
+
 /// An inner node, or `count` > 0 places of [`Bvh::order`] from `first` on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Child {
     first: u32,
     count: u32,
+}
+
+/// A part of a tree, to be walked from outside.
+#[derive(Clone, Copy, Debug)]
+pub struct Subtree {
+    /// The box around it.
+    pub bounds: Aabb,
+    child: Child,
 }
 
 impl Child {
@@ -57,6 +70,33 @@ impl Bvh {
     /// Ids in the order of the leaves: data stored in this order is found at the place that traversal reports.
     pub fn order(&self) -> &[u32] {
         &self.order
+    }
+
+    /// The whole tree as a subtree; none where it is empty.
+    pub fn root(&self) -> Option<Subtree> {
+        let whole = Subtree { bounds: self.bounds, child: Child { first: 0, count: 0 } };
+        (!self.nodes.is_empty()).then_some(whole)
+    }
+
+    /// The two parts of a subtree, the second of which may be missing at the root; none of a leaf.
+    pub fn children(&self, subtree: &Subtree) -> Option<(Subtree, Option<Subtree>)> {
+        if subtree.child.count > 0 {
+            return None;
+        }
+        let node = &self.nodes[subtree.child.first as usize];
+        let part = |side: usize| Subtree { bounds: node.bounds[side], child: node.child[side] };
+        Some((part(0), (node.child[1] != Child::NONE).then(|| part(1))))
+    }
+
+    /// The ids in a leaf; none of an inner subtree.
+    pub fn ids(&self, subtree: &Subtree) -> Option<&[u32]> {
+        let Child { first, count } = subtree.child;
+        (count > 0).then(|| &self.order[first as usize..(first + count) as usize])
+    }
+
+    /// Nodes in all.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
     }
 
     /// Bytes held.

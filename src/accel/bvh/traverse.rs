@@ -2,7 +2,7 @@
 
 use super::{Bvh, Child, DEEP_STACK, SHALLOW_STACK};
 use crate::geometry::Ray;
-use crate::geometry::aabb::SlabRay;
+use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 
 impl Bvh {
     /// Visit the leaves that the ray may meet, near ones first. `test(place, id, t_max)` tests one primitive, where `place`
@@ -69,7 +69,7 @@ impl Bvh {
                 }
                 size -= 1;
                 let (t, child) = stack[size];
-                if t <= t_max {
+                if t <= t_max * SLAB_PAD {
                     current = child;
                     break;
                 }

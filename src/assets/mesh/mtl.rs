@@ -64,7 +64,6 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
         diffuse: color(found.diffuse, plain),
         specular: color(found.specular, 0.0),
         shininess: found.shininess.unwrap_or(0.0).max(0.0),
-        ambient: found.ambient.map(|ambient| color(Some(ambient), 0.0)),
         emission: color(found.emissive, 0.0),
         ior: found.optical_density.unwrap_or(1.0),
         illumination_model: found.illumination_model,
@@ -131,7 +130,6 @@ mod tests {
             diffuse: Vec3::new(0.5, 0.4, 0.0),
             specular: Vec3::splat(0.2),
             shininess: 25.0,
-            ambient: Some(Vec3::new(0.1, 0.2, 0.3)),
             emission: Vec3::new(4.0, 5.0, 6.0),
             ior: 1.5,
             illumination_model: Some(7),
@@ -140,7 +138,7 @@ mod tests {
             normal_texture: file("bumps.png"),
         };
         assert_eq!(materials[0], expected);
-        assert_eq!((materials[1].diffuse, materials[1].ambient), (Vec3::splat(0.6), None));
+        assert_eq!(materials[1].diffuse, Vec3::splat(0.6));
     }
 
     #[test]

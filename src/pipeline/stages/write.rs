@@ -18,6 +18,13 @@ use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
 
+impl Written {
+    /// Write everything next time: a person asked for it.
+    pub(in crate::pipeline) fn forget(&mut self) {
+        self.0.clear();
+    }
+}
+
 /// Look at all targets before work is put into a picture for them.
 ///
 /// # Errors
@@ -104,7 +111,8 @@ fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
     let SampleStats { min, mean, max } = canvas.film.samples();
     let mut key = Fingerprint::new("write");
     key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());
-    key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize).u64(plan.bit_depth.into());
+    key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
+    key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());
     key.path(path).finish()
 }
 

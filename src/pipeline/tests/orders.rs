@@ -156,6 +156,14 @@ fn write_during_a_render_writes_what_there_is() {
 }
 
 #[test]
+fn a_picture_that_is_on_disk_is_written_when_asked() {
+    let mut bench = Bench::new(SCENE);
+    bench.done();
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::Written { .. }));
+}
+
+#[test]
 fn write_without_a_picture_says_so() {
     let bench = Bench::new(SCENE);
     bench.worker.send(Command::Write);

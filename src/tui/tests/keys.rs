@@ -9,7 +9,7 @@ use crate::tui::action::Action;
 use crate::tui::color::ColorDepth;
 use crate::tui::event::{Effect, Event, KeyPress};
 use crate::tui::fixtures::*;
-use crate::tui::keymap::KEYMAP;
+use crate::tui::keymap::{Binding, KEYMAP};
 use crate::tui::state::PreviewKind;
 use crate::tui::{Changed, ExitStatus};
 
@@ -108,9 +108,18 @@ fn the_bottom_line_is_made_from_the_table_until_there_is_a_message() {
     let mut desk = Desk::new();
     let bottom = |desk: &mut Desk| desk.text().lines().last().map(str::to_owned).unwrap_or_default();
     let hints = bottom(&mut desk);
-    for binding in KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::ToggleHelp) {
-        assert!(hints.contains(&format!("{} {}", binding.label, binding.hint)), "{hints:?}");
+    let of_pane = |it: &&Binding| matches!(it.action, Action::Close | Action::ScrollUp);
+    let hint = |it: &Binding| format!("{} {}", it.label, it.hint);
+    let hinted = || KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::ToggleHelp);
+    for binding in hinted() {
+        assert_eq!(hints.contains(&hint(binding)), !of_pane(&binding), "{hints:?}");
     }
+    desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
+    for binding in hinted().filter(of_pane) {
+        assert!(bottom(&mut desk).contains(&hint(binding)), "{}", bottom(&mut desk));
+    }
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    assert_eq!(bottom(&mut desk), hints);
     desk.press('p');
     assert!(bottom(&mut desk).contains("photons come with"));
     desk.press('?');
@@ -139,7 +148,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
     let pinhole = || Box::new(protocol::Effective { dof: false, ..settings() });
     desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole() });
     assert!(desk.press('d').is_empty());
-    assert!(desk.text().contains("no aperture"));
+    assert!(desk.text().contains("no `aperture`"));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
@@ -147,7 +156,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
     desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole() });
     assert_eq!(request(&desk.press('d')).expect("a request").overrides.dof, Some(true));
     desk.worker(protocol::Event::Settings { generation: 2, settings: pinhole() });
-    assert!(desk.text().contains("no aperture"));
+    assert!(desk.text().contains("no `aperture`"));
 }
 
 #[test]
@@ -157,6 +166,20 @@ fn a_new_request_lets_a_paused_worker_go_on() {
     let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
     assert!(!desk.state.paused);
+}
+
+#[test]
+fn the_clock_stands_still_while_a_render_is_held() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
+    desk.wait(3000);
+    desk.press(' ');
+    assert!(desk.text().contains("3.0 s · paused"), "{}", desk.text());
+    desk.wait(5000);
+    assert!(desk.text().contains("3.0 s · paused"), "{}", desk.text());
+    desk.press(' ');
+    desk.wait(1000);
+    assert!(desk.text().contains("4.0 s · ETA"), "{}", desk.text());
 }
 
 #[test]

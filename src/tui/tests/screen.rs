@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use ratatui::style::Color;
 
 use super::{BLUE, RED, cells_of};
-use crate::pipeline::protocol::{self, Failure, Stage, Status};
+use crate::pipeline::protocol::{self, Failure, Stage, StageReport, Status};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
@@ -133,9 +133,57 @@ fn a_written_image_is_named_with_its_size() {
     desk.finish(RED);
     desk.worker(protocol::Event::Written { generation: 1, path: "out/cornell.png".into(), bytes: 210_400 });
     let text = desk.text();
-    for words in ["image out/cornell.png", "640×480 px, 210.4 kB", "wrote out/cornell.png"] {
+    for words in ["image out/cornell.png", "640×480 px, 210.4 kB"] {
         assert!(text.contains(words), "{words:?} is not in\n{text}");
     }
+    assert!(!text.contains("wrote"), "the keys stay in sight\n{text}");
+    desk.press('w');
+    desk.worker(protocol::Event::Written { generation: 1, path: "out/cornell.png".into(), bytes: 1 });
+    assert!(desk.text().contains("wrote out/cornell.png"));
+}
+
+#[test]
+fn words_beside_a_stage_are_not_cut_in_the_middle() {
+    let mut desk = Desk::new();
+    let stage = |why: &str| StageReport {
+        name: Stage::Meshes,
+        status: Status::Skipped,
+        seconds: 0.0,
+        why: why.to_owned(),
+    };
+    desk.worker(protocol::Event::Stage { generation: 1, stage: stage("no need") });
+    assert!(desk.text().contains("skipped  no need"), "{}", desk.text());
+    desk.worker(protocol::Event::Stage { generation: 1, stage: stage("the scene names none") });
+    assert!(!desk.text().contains("the sc"), "{}", desk.text());
+    desk.event(Event::Resize(window(140, 40)));
+    assert!(desk.text().contains("the scene nam…"), "{}", desk.text());
+    desk.event(Event::Resize(window(200, 60)));
+    assert!(desk.text().contains("the scene names none"), "{}", desk.text());
+}
+
+#[test]
+fn a_stage_that_failed_does_not_look_at_work() {
+    let mut desk = Desk::new();
+    let stage = StageReport { name: Stage::Parse, status: Status::Running, seconds: 0.0, why: String::new() };
+    desk.worker(protocol::Event::Stage { generation: 1, stage });
+    assert!(desk.text().contains("> parse"));
+    let failure = Failure::Scene(vec![diagnostic(Severity::Error, "wrong")]);
+    desk.worker(protocol::Event::Failed { generation: 1, failure });
+    assert!(desk.text().contains("✗ parse") && !desk.text().contains("> parse"), "{}", desk.text());
+}
+
+#[test]
+fn renders_are_counted_and_requests_that_change_nothing_are_not() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    assert!(desk.text().contains("· render 1"), "{}", desk.text());
+    desk.press('0');
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.worker(done(2, Vec::new(), true));
+    assert!(desk.text().contains("· unchanged"), "{}", desk.text());
+    desk.press('r');
+    desk.worker(done(3, Vec::new(), false));
+    assert!(desk.text().contains("· render 2"), "{}", desk.text());
 }
 
 #[test]

@@ -78,10 +78,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     match &state.effective {
         None => return told(state, "the scene has not been read yet"),
         Some(effective) if !effective.dof && !switched_off => {
-            return told(
-                state,
-                "no depth of field: the scene's camera has no aperture (set `aperture` and `focus`)",
-            );
+            return told(state, "no depth of field: the scene's camera has no `aperture`");
         }
         Some(_) => {}
     }
@@ -104,13 +101,14 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
     if !state.is_running() && !state.paused {
         return told(state, "nothing is rendering");
     }
-    state.paused = !state.paused;
+    state.set_paused(!state.paused);
     state.dirty = true;
     vec![Effect::Send(Command::Pause(state.paused))]
 }
 
 fn write_now(state: &mut State) -> Vec<Effect> {
     say(state, "writing the image as it is now");
+    state.asked_to_write = true;
     vec![Effect::Send(Command::Write)]
 }
 

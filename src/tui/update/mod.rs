@@ -54,7 +54,6 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.generation += 1;
     state.requested = state.preview_size();
     state.resize_due = None;
-    state.activity = Activity::Running { since: state.now };
     state.dirty = true;
     let request = Request {
         generation: state.generation,
@@ -65,9 +64,11 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
         force,
     };
     let mut effects = Vec::new();
-    if std::mem::take(&mut state.paused) {
+    if state.paused {
+        state.set_paused(false);
         effects.push(Effect::Send(Command::Pause(false)));
     }
+    state.activity = Activity::Running { since: state.now };
     effects.push(Effect::Send(Command::Render(Box::new(request))));
     effects
 }

@@ -23,13 +23,16 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             state.effective = Some(*settings);
             mended(state);
             if pinhole {
-                say(state, "no depth of field: the scene's camera has no aperture");
+                say(state, "no depth of field: the scene's camera has no `aperture`");
             }
         }
         Event::Progress { progress, .. } => state.progress = Some(progress),
         Event::Preview { .. } | Event::Files { .. } => {}
         Event::Written { path, bytes, .. } => wrote(state, Written { path, bytes }),
-        Event::WriteFailed { message, .. } => say(state, format!("error: {}", visible(&message))),
+        Event::WriteFailed { message, .. } => {
+            state.asked_to_write = false;
+            say(state, format!("error: {}", visible(&message)));
+        }
         Event::Done { report, warnings, unchanged, .. } => {
             return done(state, report, warnings, unchanged);
         }
@@ -84,7 +87,10 @@ fn asset(state: &mut State, progress: AssetProgress) {
 }
 
 fn wrote(state: &mut State, written: Written) {
-    say(state, format!("wrote {}", visible(&written.path.to_string_lossy())));
+    // What is written of itself stands beside the picture and does not cover the keys.
+    if std::mem::take(&mut state.asked_to_write) {
+        say(state, format!("wrote {}", visible(&written.path.to_string_lossy())));
+    }
     state.written.retain(|other| other.path != written.path);
     state.written.push(written);
 }
@@ -103,10 +109,11 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     }
     state.effective = Some(report.settings.clone());
     state.activity = Activity::Done;
-    state.paused = false;
+    state.set_paused(false);
     state.assets.retain(|asset| asset.finished.is_some());
     state.report = Some(report);
     state.unchanged = unchanged;
+    state.renders += u64::from(!unchanged);
     state.pane.open &= !warnings.is_empty();
     state.warnings = warnings;
     if unchanged && state.change.is_some_and(|change| change.generation == state.generation) {
@@ -118,7 +125,7 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
 
 fn failed(state: &mut State, failure: Failure) {
     state.activity = Activity::Broken;
-    state.paused = false;
+    state.set_paused(false);
     state.assets.clear();
     state.change = None;
     state.problems = Some(match failure {

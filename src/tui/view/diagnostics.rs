@@ -21,7 +21,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let tone = if state.problems.is_some() { Tone::Error } else { Tone::Warning };
     let mut title = title(state);
     if last > 0 {
-        title = format!("{title} · lines {}-{} of {} ", first + 1, first + page, text.len());
+        title = format!("{title}· lines {}-{} of {} ", first + 1, first + page, text.len());
     }
     let block = Block::bordered().border_style(tone.style(state.depth)).title(title);
     let inner = if bordered(area) { block.inner(area) } else { area };

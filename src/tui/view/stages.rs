@@ -29,7 +29,9 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// Mark, name, seconds, why.
 fn stage_line(state: &State, stage: Stage, report: Option<&StageReport>, area: Rect, buffer: &mut Buffer) {
+    let has_ended = !state.is_running();
     let (mark, tone) = match report.map(|report| report.status) {
+        Some(Status::Running) if has_ended => ("✗", Tone::Error),
         None => ("·", Tone::Faint),
         Some(Status::Running) => (">", Tone::Strong),
         Some(Status::Done) => ("✓", Tone::Good),
@@ -38,6 +40,7 @@ fn stage_line(state: &State, stage: Stage, report: Option<&StageReport>, area: R
     };
     let time = match report {
         Some(StageReport { status: Status::Done, seconds: time, .. }) => seconds(*time),
+        Some(StageReport { status: Status::Running, .. }) if has_ended => "stopped".to_owned(),
         Some(StageReport { status: Status::Running, .. }) => "…".to_owned(),
         Some(StageReport { status: Status::Reused, .. }) => "reused".to_owned(),
         Some(StageReport { status: Status::Skipped, .. }) => "skipped".to_owned(),
@@ -46,8 +49,27 @@ fn stage_line(state: &State, stage: Stage, report: Option<&StageReport>, area: R
     let why = report.map_or("", |report| report.why.as_str());
     let line = format!(" {:<8} {time:>8}", stage.name());
     let tone_of_text = if tone == Tone::Faint { Tone::Faint } else { Tone::Plain };
-    let why = format!("  {}", visible(why));
-    put(buffer, area, &[(mark, tone), (&line, tone_of_text), (&why, Tone::Faint)], state.depth);
+    let why = shortened(&visible(why), area.width.saturating_sub(columns(&line) + 3));
+    put(
+        buffer,
+        area,
+        &[(mark, tone), (&line, tone_of_text), ("  ", Tone::Faint), (&why, Tone::Faint)],
+        state.depth,
+    );
+}
+
+/// What fits of a text, with an ellipsis where it is cut; nothing where so little fits that it says nothing.
+fn shortened(text: &str, room: u16) -> String {
+    const LEAST: u16 = 12;
+    if columns(text) <= room {
+        return text.to_owned();
+    }
+    if room < LEAST {
+        return String::new();
+    }
+    let mut short = text.to_owned();
+    while columns(&short) >= room && short.pop().is_some() {}
+    format!("{}…", short.trim_end())
 }
 
 fn asset_line(state: &State, asset: &AssetBar, area: Rect, buffer: &mut Buffer) {
@@ -64,8 +86,8 @@ fn asset_line(state: &State, asset: &AssetBar, area: Rect, buffer: &mut Buffer) 
 fn results(state: &State) -> Vec<(String, Tone)> {
     let mut lines = Vec::new();
     if let Some(report) = &state.report {
-        let unchanged = if state.unchanged { " (unchanged)" } else { "" };
-        lines.push((format!("total {}{unchanged}", seconds(report.seconds)), Tone::Strong));
+        let what = if state.unchanged { "unchanged".to_owned() } else { format!("render {}", state.renders) };
+        lines.push((format!("total {} · {what}", seconds(report.seconds)), Tone::Strong));
     }
     if let Some(time) = state.first_change {
         lines.push((format!("first change after {}", duration(time)), Tone::Plain));

@@ -9,7 +9,7 @@ use super::layout::Layout;
 use super::text::{Tone, columns, duration, gauge, percent, put, put_right, seconds};
 use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
-use crate::tui::keymap::{self, KEYMAP};
+use crate::tui::keymap::{self, Binding, KEYMAP};
 use crate::tui::state::{Activity, PreviewKind, State};
 use crate::tui::update::shadows;
 
@@ -131,7 +131,10 @@ pub(super) fn bottom(state: &State, area: Rect, buffer: &mut Buffer) {
     }
     let mut rest = area;
     // The key of the help stands in the line above.
-    let hinted = KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::ToggleHelp);
+    let of_pane = |it: &&Binding| matches!(it.action, Action::Close | Action::ScrollUp | Action::ScrollDown);
+    let hinted = || KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::ToggleHelp);
+    let first = hinted().filter(|it| state.pane.open && of_pane(it));
+    let hinted = first.chain(hinted().filter(|it| !of_pane(it)));
     for binding in hinted {
         let hint = format!("{}  ", binding.hint);
         if columns(binding.label) + 1 + columns(binding.hint) > rest.width {

@@ -74,6 +74,7 @@ pub(super) fn row(area: Rect, index: u16) -> Rect {
 pub(super) fn seconds(seconds: f64) -> String {
     match seconds {
         s if !s.is_finite() || s < 0.0 => "?".to_owned(),
+        s if s > 0.0 && s < 0.000_005 => "<0.01 ms".to_owned(),
         s if s < 0.000_95 => format!("{:.2} ms", s * 1e3),
         s if s < 0.009_95 => format!("{:.1} ms", s * 1e3),
         s if s < 0.999_5 => format!("{:.0} ms", s * 1e3),
@@ -124,6 +125,8 @@ mod tests {
     #[test]
     fn times_in_words() {
         for (time, words) in [
+            (0.0, "0.00 ms"),
+            (0.000_001, "<0.01 ms"),
             (0.0004, "0.40 ms"),
             (0.0042, "4.2 ms"),
             (0.023, "23 ms"),

@@ -1,0 +1,243 @@
+//! A tree eight boxes wide over triangles, four in a pack.
+//!
+//! It is collapsed from the binary tree, largest boxes first. Whatever instructions traverse it, a ray gets the same hit,
+//! bit for bit: box tests may only let through too much, the arithmetic of the triangle test is one and the same,
+//! and of hits at one distance the lowest id wins.
+
+mod collapse;
+mod node;
+mod simd;
+
+use crate::accel::Bvh;
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::{Aabb, Ray, ShapeHit};
+use crate::math::Vec3;
+
+pub use simd::Instructions;
+
+use node::{Node, TrianglePack};
+
+/// A tree over triangles.
+#[derive(Clone, Debug)]
+pub struct WideBvh {
+    /// The root is node 0; empty where there are no triangles.
+    nodes: Vec<Node>,
+    packs: Vec<TrianglePack>,
+    bounds: Aabb,
+    instructions: Instructions,
+}
+
+impl WideBvh {
+    /// Build over `count` triangles that are known by their number; those with a NaN are never hit.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build(
+        count: u32,
+        corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        let boxes: Vec<Aabb> = (0..count).map(|id| Aabb::around(corners(id))).collect();
+        token.check()?;
+        let tree = Bvh::build_for(&boxes, node::PACK, token)?;
+        drop(boxes);
+        let (nodes, packs) = collapse::collapse(&tree, corners);
+        Ok(Self { nodes, packs, bounds: tree.bounds(), instructions: Instructions::best() })
+    }
+
+    /// The same tree, traversed by other instructions; those that the processor has not got give way to the best it has.
+    pub fn with(mut self, instructions: Instructions) -> Self {
+        self.instructions = instructions.available();
+        self
+    }
+
+    /// The box around all triangles.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.packs.as_slice())
+    }
+
+    /// The nearest hit; of hits at one distance the triangle of the lowest number.
+    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
+        if self.may_hit(ray) { simd::closest(self, ray) } else { None }
+    }
+
+    /// Whether the ray hits any triangle but `except`.
+    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
+        self.may_hit(ray) && simd::any(self, ray, except)
+    }
+
+    /// A ray that is not finite hits nothing; to the box tests it would be in every box, the empty ones too.
+    fn may_hit(&self, ray: &Ray) -> bool {
+        !self.nodes.is_empty() && ray.origin.is_finite() && ray.direction.is_finite()
+    }
+
+    /// Walks the tree and says what is wrong with it.
+    ///
+    /// # Errors
+    /// The first fault, in words.
+    pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
+        let mut seen = vec![false; count as usize];
+        let mut pending: Vec<(u32, Aabb)> =
+            if self.nodes.is_empty() { Vec::new() } else { vec![(0, self.bounds)] };
+        while let Some((index, outer)) = pending.pop() {
+            let node = &self.nodes[index as usize];
+            for slot in 0..node::WIDTH {
+                let Some(bounds) = node.bounds(slot) else { continue };
+                if bounds.union(outer) != outer {
+                    return Err(format!("a child of node {index} is larger than the node"));
+                }
+                match node.child(slot) {
+                    node::Child::Inner(child) => pending.push((child, bounds)),
+                    node::Child::Leaf { first, count } => {
+                        for pack in &self.packs[first as usize..(first + count) as usize] {
+                            for id in pack.ids() {
+                                if Aabb::around(corners(id)).union(bounds) != bounds {
+                                    return Err(format!("triangle {id} reaches out of its leaf"));
+                                }
+                                if std::mem::replace(&mut seen[id as usize], true) {
+                                    return Err(format!("triangle {id} is in two leaves"));
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        let lost = |id: &u32| !seen[*id as usize] && corners(*id).iter().all(|corner| corner.is_finite());
+        (0..count).find(lost).map_or(Ok(()), |id| Err(format!("triangle {id} is in no leaf")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::watertight::ShearedRay;
+
+    /// Random numbers in [−1, 1).
+    fn random(seed: u64) -> impl FnMut() -> f32 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
+        }
+    }
+
+    /// Meshes that break trees: noise, grids with coplanar and doubled faces, slivers, one, none, all alike, NaN.
+    fn meshes() -> Vec<Vec<[Vec3; 3]>> {
+        let mut next = random(5);
+        let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
+        let noise = (0..700).map(|_| {
+            let at = point(10.0);
+            [at, at + point(1.0), at + point(1.0)]
+        });
+        let noise: Vec<_> = noise.collect();
+        let slivers = (0..300).map(|_| {
+            let (at, along) = (point(5.0), point(8.0));
+            [at, at + along, at + along * 0.5 + point(1e-5)]
+        });
+        let slivers: Vec<_> = slivers.collect();
+        let grid = (0..400).flat_map(|i| {
+            let at = Vec3::new((i % 20) as f32 - 10.0, 0.0, (i / 20) as f32 - 10.0);
+            let square = [at, at + Vec3::X, at + Vec3::X + Vec3::Z, at + Vec3::Z];
+            let halves = [[square[0], square[1], square[2]], [square[0], square[2], square[3]]];
+            [halves[0], halves[1], halves[0]]
+        });
+        let stairs = (0..200).map(|i| {
+            let (x, y) = ((i / 2) as f32 * 0.1, (i % 2) as f32);
+            [Vec3::new(x, y, -5.0), Vec3::new(x, y, 5.0), Vec3::new(x + 0.1, y + 0.1, 0.0)]
+        });
+        let alike = vec![[Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 3.0]; 333];
+        let mut with_nan = noise[..50].to_vec();
+        with_nan[7][1].y = f32::NAN;
+        with_nan[30][0] = Vec3::INFINITY;
+        vec![
+            noise.clone(),
+            slivers,
+            grid.collect(),
+            stairs.collect(),
+            alike,
+            noise[..1].to_vec(),
+            Vec::new(),
+            with_nan,
+        ]
+    }
+
+    fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
+        let sheared = ShearedRay::new(ray.origin, ray.direction);
+        let hits = (0..).zip(mesh).filter_map(|(id, corners)| {
+            sheared.intersect(corners, ray.t_max).map(|hit| ShapeHit { primitive: id, ..hit })
+        });
+        hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.primitive.cmp(&b.primitive)))
+    }
+
+    fn built(mesh: &[[Vec3; 3]]) -> WideBvh {
+        let tree = WideBvh::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
+        let tree = tree.expect("nobody cancels");
+        tree.validate(mesh.len() as u32, |id| mesh[id as usize]).expect("a sound tree");
+        tree
+    }
+
+    /// Rays at random, at corners and edges, along axes with both zeros, and from corners.
+    fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
+        let mut next = random(11);
+        let mut rays = Vec::new();
+        for i in 0..2000 {
+            let origin = Vec3::new(next(), next(), next()) * 15.0;
+            let triangle = mesh.get(i % mesh.len().max(1)).copied().unwrap_or([Vec3::ZERO; 3]);
+            let target = match i % 5 {
+                0 => triangle[0],
+                1 => (triangle[0] + triangle[1]) * 0.5,
+                2 => (triangle[0] + triangle[1] + triangle[2]) / 3.0,
+                _ => Vec3::new(next(), next(), next()) * 5.0,
+            };
+            let zero = if i % 2 == 0 { 0.0 } else { -0.0 };
+            rays.push(Ray::new(origin, target - origin));
+            rays.push(Ray { t_max: 0.9, ..Ray::new(origin, target - origin) });
+            rays.push(Ray::new(Vec3::new(target.x, 20.0, target.z), Vec3::new(zero, -1.0, zero)));
+            rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
+        }
+        rays.push(Ray::new(Vec3::NAN, Vec3::X));
+        rays.push(Ray::new(Vec3::ZERO, Vec3::new(f32::INFINITY, 0.0, f32::NAN)));
+        rays.push(Ray::new(Vec3::ZERO, Vec3::ZERO));
+        rays
+    }
+
+    #[test]
+    fn every_way_to_traverse_gives_the_bits_of_testing_every_triangle() {
+        for (number, mesh) in meshes().iter().enumerate() {
+            let tree = built(mesh);
+            for instructions in Instructions::ALL {
+                let tree = tree.clone().with(instructions);
+                for ray in rays(mesh) {
+                    let expected = brute(mesh, &ray);
+                    let found = tree.closest(&ray);
+                    let bits = |hit: Option<ShapeHit>| {
+                        hit.map(|hit| (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()))
+                    };
+                    assert_eq!(bits(found), bits(expected), "mesh {number}, {instructions:?}, {ray:?}");
+                    assert_eq!(
+                        tree.any(&ray, None),
+                        expected.is_some(),
+                        "mesh {number}, {instructions:?}, {ray:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn any_hit_leaves_one_triangle_out() {
+        let mesh = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
+        let tree = built(&mesh);
+        let ray = Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z);
+        for instructions in Instructions::ALL {
+            let tree = tree.clone().with(instructions);
+            assert!(tree.any(&ray, None) && !tree.any(&ray, Some(0)));
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Nodes and packs of triangles, laid out for vector loads.
+
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+
+/// Children of a node.
+pub const WIDTH: usize = 8;
+
+/// Triangles in a pack.
+pub const PACK: usize = 4;
+
+/// Most packs of a leaf.
+const MOST_PACKS: u32 = 8;
+
+/// Marks a leaf in [`Node::children`]; the next three bits hold its packs less one, the others the first.
+const LEAF: u32 = 1 << 31;
+
+const FIRST_BITS: u32 = 28;
+
+/// Eight boxes as rows of their least and greatest x, y and z, and what is in them.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub struct Node {
+    /// Rows: least x, greatest x, least y, greatest y, least z, greatest z. Empty boxes are ∞ … −∞ and never met.
+    pub rows: [[f32; WIDTH]; 6],
+    /// See [`Child`].
+    pub children: [u32; WIDTH],
+}
+
+/// What a box holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Child {
+    /// A node.
+    Inner(u32),
+    /// Packs.
+    Leaf {
+        /// The first.
+        first: u32,
+        /// How many.
+        count: u32,
+    },
+}
+
+impl Child {
+    /// From how nodes hold it.
+    #[inline(always)]
+    pub fn decode(code: u32) -> Self {
+        if code & LEAF == 0 {
+            Self::Inner(code)
+        } else {
+            Self::Leaf { first: code & ((1 << FIRST_BITS) - 1), count: ((code & !LEAF) >> FIRST_BITS) + 1 }
+        }
+    }
+
+    fn encode(self) -> u32 {
+        match self {
+            Self::Inner(node) => node,
+            Self::Leaf { first, count } => {
+                debug_assert!(count <= MOST_PACKS && first < 1 << FIRST_BITS);
+                LEAF | (count - 1) << FIRST_BITS | first
+            }
+        }
+    }
+}
+
+impl Node {
+    /// Eight empty boxes.
+    pub const EMPTY: Self = {
+        let (least, greatest) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+        Self { rows: [least, greatest, least, greatest, least, greatest], children: [0; WIDTH] }
+    };
+
+    /// Fill a slot.
+    pub fn set(&mut self, slot: usize, bounds: Aabb, child: Child) {
+        for axis in 0..3 {
+            self.rows[2 * axis][slot] = bounds.min[axis];
+            self.rows[2 * axis + 1][slot] = bounds.max[axis];
+        }
+        self.children[slot] = child.encode();
+    }
+
+    /// The box of a slot; none where it is empty.
+    pub fn bounds(&self, slot: usize) -> Option<Aabb> {
+        let corner = |side: usize| {
+            Vec3::new(self.rows[side][slot], self.rows[2 + side][slot], self.rows[4 + side][slot])
+        };
+        Some(Aabb { min: corner(0), max: corner(1) }).filter(|bounds| !bounds.is_empty())
+    }
+
+    /// What a slot holds.
+    pub fn child(&self, slot: usize) -> Child {
+        Child::decode(self.children[slot])
+    }
+}
+
+/// Four triangles; lanes without one are NaN, which no ray hits.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
+pub struct TrianglePack {
+    /// Rows: x, y, z of the first corners, of the second, of the third.
+    pub rows: [[f32; PACK]; 9],
+    /// Numbers of the triangles; `u32::MAX` where there is none.
+    pub ids: [u32; PACK],
+}
+
+impl TrianglePack {
+    /// From at most four triangles.
+    pub fn new(triangles: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
+        let mut pack = Self { rows: [[f32::NAN; PACK]; 9], ids: [u32::MAX; PACK] };
+        for (lane, (id, corners)) in triangles.into_iter().take(PACK).enumerate() {
+            pack.ids[lane] = id;
+            for (corner, point) in corners.iter().enumerate() {
+                for axis in 0..3 {
+                    pack.rows[3 * corner + axis][lane] = point[axis];
+                }
+            }
+        }
+        pack
+    }
+
+    /// Corners of the triangle in a lane.
+    #[inline(always)]
+    pub fn corners(&self, lane: usize) -> [Vec3; 3] {
+        [0, 3, 6]
+            .map(|row| Vec3::new(self.rows[row][lane], self.rows[row + 1][lane], self.rows[row + 2][lane]))
+    }
+
+    /// Numbers of the triangles that are there.
+    pub fn ids(&self) -> impl Iterator<Item = u32> {
+        self.ids.into_iter().filter(|&id| id != u32::MAX)
+    }
+}

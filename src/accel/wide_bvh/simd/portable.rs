@@ -1,0 +1,84 @@
+//! The twin that every other way must equal.
+
+use super::super::WideBvh;
+use super::super::node::{Child, Node, PACK, TrianglePack, WIDTH};
+use crate::geometry::aabb::{SLAB_PAD, SlabRay};
+use crate::geometry::watertight::ShearedRay;
+use crate::geometry::{Ray, ShapeHit};
+use crate::math::Vec3;
+
+/// Nearest first, by a stack in memory of its own.
+pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
+    let (slabs, sheared) =
+        (SlabRay::new(ray.origin, ray.direction), ShearedRay::new(ray.origin, ray.direction));
+    let mut best: Option<ShapeHit> = None;
+    let mut t_max = ray.t_max;
+    let mut stack = vec![(0.0_f32, Child::Inner(0))];
+    while let Some((entry, child)) = stack.pop() {
+        if entry > t_max * SLAB_PAD {
+            continue;
+        }
+        match child {
+            Child::Inner(index) => {
+                let start = stack.len();
+                stack.extend(met(&tree.nodes[index as usize], &slabs, t_max));
+                stack[start..].sort_by(|a, b| b.0.total_cmp(&a.0));
+            }
+            Child::Leaf { first, count } => {
+                for pack in &tree.packs[first as usize..(first + count) as usize] {
+                    for lane in 0..PACK {
+                        nearer(pack, lane, &sheared, t_max, &mut best);
+                        t_max = best.map_or(t_max, |best| best.t);
+                    }
+                }
+            }
+        }
+    }
+    best
+}
+
+/// In any order, until one is hit.
+pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
+    let (slabs, sheared) =
+        (SlabRay::new(ray.origin, ray.direction), ShearedRay::new(ray.origin, ray.direction));
+    let mut stack = vec![Child::Inner(0)];
+    while let Some(child) = stack.pop() {
+        match child {
+            Child::Inner(index) => {
+                stack.extend(met(&tree.nodes[index as usize], &slabs, ray.t_max).map(|(_, child)| child));
+            }
+            Child::Leaf { first, count } => {
+                let packs = &tree.packs[first as usize..(first + count) as usize];
+                let hits = |pack: &TrianglePack, lane: usize| {
+                    Some(pack.ids[lane]) != except
+                        && sheared.intersect(&pack.corners(lane), ray.t_max).is_some()
+                };
+                if packs.iter().any(|pack| (0..PACK).any(|lane| hits(pack, lane))) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+/// The children that a ray meets, with where it enters them.
+fn met(node: &Node, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
+    (0..WIDTH).filter_map(move |slot| {
+        let corner = |side: usize| {
+            Vec3::new(node.rows[side][slot], node.rows[2 + side][slot], node.rows[4 + side][slot])
+        };
+        slabs.enter(corner(0), corner(1), t_max).map(|entry| (entry, node.child(slot)))
+    })
+}
+
+/// Take a lane's hit if it is nearer, or as near with a lower number.
+#[inline]
+pub fn nearer(pack: &TrianglePack, lane: usize, ray: &ShearedRay, t_max: f32, best: &mut Option<ShapeHit>) {
+    if let Some(hit) = ray.intersect(&pack.corners(lane), t_max) {
+        let id = pack.ids[lane];
+        if best.is_none_or(|best| (hit.t, id) < (best.t, best.primitive)) {
+            *best = Some(ShapeHit { primitive: id, ..hit });
+        }
+    }
+}

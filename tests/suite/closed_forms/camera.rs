@@ -1,0 +1,101 @@
+//! The camera: projection and the circle of confusion.
+
+use glimt::film::Rect;
+use glimt::math::{DVec3, Vec2};
+use glimt::scene::description::Camera;
+
+use super::scenes::{emitter, scene, tile};
+use super::{Random, assert_close, assert_mean, v};
+
+/// An aperture of .2 across, in focus at 5, 40° over 480 pixels, along −z.
+fn lens() -> Camera {
+    Camera::LookAt {
+        position: DVec3::ZERO,
+        look_at: v(0.0, 0.0, -5.0),
+        up: DVec3::Y,
+        fov: 40.0,
+        aperture: 0.1,
+        focus: 5.0,
+    }
+}
+
+const SIZE: u32 = 480;
+
+/// Pixels to a unit of length at distance d.
+fn pixels_per_length(d: f64) -> f64 {
+    f64::from(SIZE) / (2.0 * d * 20.0_f64.to_radians().tan())
+}
+
+#[test]
+fn rays_pass_through_what_is_projected_on_their_pixel() {
+    let mut random = Random(1);
+    for _ in 0..200 {
+        let (position, target) = (random.direction() * 7.0, random.direction() * 2.0);
+        let (up, fov) = (random.direction(), 20.0 + 80.0 * random.unit());
+        let (width, height) = (333, 200);
+        let build = scene().with(|scene| {
+            scene.camera = Camera::LookAt { position, look_at: target, up, fov, aperture: 0.0, focus: 1.0 };
+        });
+        let camera = build.world().camera;
+        // The view matrix of a textbook: rows s, u, −f; then the perspective division.
+        let f = (target - position).normalize();
+        let s = f.cross(up).normalize();
+        let u = s.cross(f);
+        let point = target + random.direction() * 2.0;
+        let eye = v(s.dot(point - position), u.dot(point - position), f.dot(point - position));
+        let scale = 1.0 / (0.5 * fov.to_radians()).tan();
+        let ndc = (eye.x * scale * f64::from(height) / f64::from(width) / eye.z, eye.y * scale / eye.z);
+        let (x, y) = ((ndc.0 + 1.0) / 2.0 * f64::from(width), (1.0 - ndc.1) / 2.0 * f64::from(height));
+        let ray = camera.ray(x, y, width, height, Vec2::ZERO);
+        let along = (point - ray.origin.as_dvec3()).normalize();
+        assert!((along - ray.direction.as_dvec3()).length() < 1e-6, "{point} is not on its ray");
+        assert_close("depth", camera.depth_of(point), eye.z);
+    }
+}
+
+#[test]
+fn the_extent_of_the_circle_of_confusion() {
+    // A point at d is spread over A·|d − d_f|/d_f·… = A·|d − d_f|/d on the plane in focus, in pixels of that plane.
+    let camera = scene().with(|scene| scene.camera = lens()).world().camera;
+    for (d, exact) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
+        let formula = 0.2 * f64::abs(d - 5.0) / d * pixels_per_length(5.0);
+        assert!((formula - exact).abs() < 1e-4);
+        // Where the ray through the middle pixel and a point of the lens meets the plane at d, in that plane's pixels.
+        let mut extent = DVec3::ZERO;
+        for step in 0..3600 {
+            let (sin, cos) = (f64::from(step) / 1800.0 * std::f64::consts::PI).sin_cos();
+            let ray = camera.ray(240.0, 240.0, SIZE, SIZE, Vec2::new(cos as f32, sin as f32));
+            let (o, k) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+            extent = extent.max((o + k * ((-d - o.z) / k.z)) * 2.0 * pixels_per_length(d));
+        }
+        assert_close(&format!("across at {d}"), extent.x, formula);
+        assert_close(&format!("down at {d}"), extent.y, formula);
+    }
+}
+
+#[test]
+fn the_blur_of_a_small_light() {
+    // Its picture is disk ∗ square ∗ pixel: the variance along an axis is D²/16 + s²/12 + 1/12, the sum of all pixels s².
+    for (d, diameter) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
+        let s = 3.0 / pixels_per_length(d);
+        let build = scene().quad(v(-s / 2.0, -s / 2.0, -d), v(s, 0.0, 0.0), v(0.0, s, 0.0), emitter(1.0));
+        let build = build.with(|scene| {
+            scene.camera = lens();
+            (scene.render.width, scene.render.height) = (SIZE, SIZE);
+        });
+        let world = build.world();
+        let half = (diameter / 2.0) as u32 + 4;
+        let rect = Rect { x: 240 - half, y: 240 - half, width: 2 * half, height: 2 * half };
+        let (mut sums, mut variances) = (Vec::new(), Vec::new());
+        for seed in 0..16 {
+            let pixels = tile(&world, &build.settings(seed), rect, 64);
+            let places = (0_u32..).zip(&pixels);
+            let offset = |i: u32| f64::from(i % (2 * half)) + 0.5 - f64::from(half);
+            sums.push(pixels.iter().map(|pixel| pixel.x).sum());
+            variances.push(places.map(|(i, pixel)| pixel.x * offset(i).powi(2)).sum::<f64>() / 9.0);
+        }
+        assert_mean(&format!("light at {d}"), &sums, 9.0);
+        let exact: f64 = diameter * diameter / 16.0 + 9.0 / 12.0 + 1.0 / 12.0;
+        assert_mean(&format!("variance at {d}"), &variances, exact);
+    }
+}

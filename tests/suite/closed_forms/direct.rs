@@ -1,0 +1,308 @@
+//! Direct light of every kind of light on a diffuse surface: L = ρ·E/π.
+
+use std::f64::consts::PI;
+
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::integrators::View;
+use glimt::math::DVec3;
+use glimt::scene::description::{Falloff, Shadows};
+
+use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, receiver};
+use super::{assert_close, assert_mean, lambert, v};
+
+/// With one and with several shadow rays at equal cost; `irradiance` is E for radiance 1.
+#[track_caller]
+fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
+    for (samples, shadow_samples) in [(256, 1), (16, 16)] {
+        let values = lit.clone().shadows(Shadows::Soft, shadow_samples).values(samples, 64);
+        assert_mean(&format!("{what}, {shadow_samples} shadow rays"), &values, 0.7 * irradiance / PI);
+    }
+}
+
+/// The value with one ray to the middle.
+#[track_caller]
+fn assert_hard(what: &str, lit: &Build, irradiance: f64) {
+    let value = lit.clone().shadows(Shadows::Hard, 4).value();
+    assert_close(&format!("{what}, hard"), value, 0.7 * irradiance / PI);
+}
+
+fn at_origin() -> Build {
+    receiver(DVec3::ZERO, 0.7)
+}
+
+/// A unit square that shines down on the origin from its height.
+fn square_above(height: f64) -> Build {
+    at_origin().quad(v(-0.5, height, -0.5), DVec3::X, DVec3::Z, emitter(1.0))
+}
+
+#[test]
+fn a_point_light_with_and_without_fall_off() {
+    // E = I·cos θ/d² = 10·(2/√5)/5 = 1.788854382; L = .7·E/π. Without fall-off E = I·cos θ.
+    let lit = |falloff| at_origin().point_light(v(1.0, 2.0, 0.0), 10.0, falloff);
+    for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
+        let value = |falloff| lit(falloff).shadows(shadows, 3).value();
+        assert_close("square", value(Falloff::Square), 0.398_587_024_3);
+        assert_close("none", value(Falloff::None), 0.7 / PI * 10.0 * 2.0 / 5.0_f64.sqrt());
+    }
+}
+
+#[test]
+fn the_shadow_of_a_point_is_sharp_and_where_it_belongs() {
+    // Light at height 4 over x = 0, blocker x < 0 at height 1: the shadow ends at x = 0 · 4/3 − 0 = 0; for a blocker that
+    // ends at x = b it ends at b·4/3.
+    let lit = |x: f64, b: f64| {
+        receiver(v(x, 0.0, 0.0), 0.7).point_light(v(0.0, 4.0, 0.0), 1.0, Falloff::None).quad(
+            v(b - 100.0, 1.0, -100.0),
+            v(100.0, 0.0, 0.0),
+            v(0.0, 0.0, 200.0),
+            matte(0.5),
+        )
+    };
+    for b in [0.0, 0.3, -0.7] {
+        let edge: f64 = b * 4.0 / 3.0;
+        let x = edge + 1e-5_f64;
+        let cosine = 4.0 / (16.0 + x * x).sqrt();
+        assert_close("lit", lit(x, b).value(), 0.7 / PI * cosine);
+        assert_eq!(lit(edge - 1e-5, b).value(), 0.0);
+        let off = lit(edge - 1e-5, b).shadows(Shadows::Off, 1).value();
+        assert_close("no shadows", off, 0.7 / PI * cosine);
+    }
+}
+
+#[test]
+fn parallel_squares() {
+    // A quarter of the square by the corner formula with A = B = ½/h, four times; E = π·F·L.
+    for (height, exact) in [(1.0, 0.752_274_688_5), (4.0, 0.061_225_761_1), (0.1, 3.042_128)] {
+        let a: f64 = 0.5 / height;
+        let w = (1.0 + a * a).sqrt();
+        let formula = 4.0 * PI * 2.0 * a / w * (a / w).atan() / (2.0 * PI);
+        assert_close("the formula", formula, exact);
+        assert_irradiance(&format!("{height} above"), &square_above(height), formula);
+        // From the middle: cos = cos' = 1, A = 1.
+        assert_hard("square", &square_above(height), 1.0 / (height * height));
+    }
+}
+
+#[test]
+fn a_perpendicular_square_that_touches_the_plane() {
+    // F = (atan 1 − atan(1/√2)/√2)/2π for all lengths 1.
+    let exact = 0.5 * (PI / 4.0 - 0.5_f64.sqrt().atan() / 2.0_f64.sqrt());
+    assert_close("the formula", exact, 0.175_094_143_9);
+    let lit = at_origin().quad(v(0.0, 0.0, 1.0), DVec3::Y, DVec3::X, emitter(1.0));
+    assert_irradiance("perpendicular", &lit, exact);
+    // Middle (½, ½, 1): d² = 3/2, cos = ½/d, cos' = 1/d.
+    assert_hard("perpendicular", &lit, 0.5 / (1.5 * 1.5));
+    let behind = at_origin().quad(v(0.0, 0.0, 1.0), DVec3::X, DVec3::Y, emitter(1.0));
+    assert_eq!(behind.value(), 0.0);
+}
+
+#[test]
+fn rectangles_near_and_far_long_and_grazing() {
+    // Lambert's formula for rectangles that float anywhere above the plane, turned towards the origin.
+    for (corner, u, w) in [
+        (v(0.3, 0.01, -0.5), v(0.0, 0.0, 1.0), v(0.0, 2.0, 0.0)),
+        (v(0.02, 0.5, -5.0), v(0.0, 0.0, 10.0), v(0.1, 0.1, 0.0)),
+        (v(-3.0, 2.0, 1.0), v(0.3, 0.0, 0.4), v(0.4, 0.5, -0.3)),
+        (v(-20.0, 7.0, -30.0), v(40.0, 0.0, 0.0), v(0.0, 0.0, 60.0)),
+        (v(-200.0, 0.5, -300.0), v(400.0, 0.0, 0.0), v(0.0, 0.0, 600.0)),
+        (v(2.0, 1.4, 0.0), v(0.25, 0.0, 0.0), v(0.0, 0.0, 0.5)),
+        (v(-0.5, 0.001, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0)),
+        (v(0.01, 0.02, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0)),
+    ] {
+        let (u, w) = if u.cross(w).dot(corner) < 0.0 { (u, w) } else { (w, u) };
+        let polygon = [corner, corner + u, corner + u + w, corner + w];
+        let exact = lambert(DVec3::ZERO, DVec3::Y, &polygon);
+        let lit = at_origin().quad(corner, u, w, emitter(1.0));
+        assert_irradiance(&format!("rectangle at {corner} {u} {w}"), &lit, exact);
+    }
+}
+
+#[test]
+fn a_parallelogram_and_a_triangle() {
+    let (corner, u, w) = (v(-0.4, 1.2, -0.3), v(1.0, 0.2, 0.3), v(0.4, -0.1, 1.1));
+    let parallelogram = [corner, corner + u, corner + u + w, corner + w];
+    let exact = lambert(DVec3::ZERO, DVec3::Y, &parallelogram);
+    assert_irradiance("parallelogram", &at_origin().quad(corner, u, w, emitter(1.0)), exact);
+
+    let triangle = [corner, corner + u, corner + w];
+    let exact = lambert(DVec3::ZERO, DVec3::Y, &triangle);
+    let lit = at_origin().triangle(triangle, emitter(1.0));
+    assert_irradiance("triangle", &lit, exact);
+    // From the centre c: E = A·cos·cos'/d², A·cos' = (u × w)/2·c/d.
+    let c = corner + (u + w) / 3.0;
+    let seen = 0.5 * u.cross(w).dot(c).abs() / c.length();
+    assert_hard("triangle", &lit, seen * (c.y / c.length()) / c.length_squared());
+    let turned = at_origin().triangle([corner, corner + w, corner + u], emitter(1.0));
+    assert_eq!(turned.value(), 0.0);
+}
+
+/// E at the origin from the faces of a convex polyhedron that look at it.
+fn convex(faces: impl IntoIterator<Item = Vec<DVec3>>) -> f64 {
+    let visible = faces.into_iter().filter(|face| {
+        let normal = (face[1] - face[0]).cross(face[2] - face[0]);
+        normal.dot(face[0]) < 0.0
+    });
+    visible.map(|face| lambert(DVec3::ZERO, DVec3::Y, &face)).sum()
+}
+
+#[test]
+fn an_emissive_box_shines_from_the_faces_that_are_seen() {
+    let (center, half) = (v(0.9, 1.5, -0.4), v(0.4, 0.5, 0.3));
+    let face = |axis: usize, sign: f64| {
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        let corner = |a: f64, b: f64| {
+            let mut p = DVec3::ZERO;
+            (p[axis], p[i], p[j]) = (sign * half[axis], a * half[i], b * half[j]);
+            center + p
+        };
+        let ring = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        if sign > 0.0 { ring.to_vec() } else { ring.into_iter().rev().collect() }
+    };
+    let exact = convex((0..3).flat_map(|axis| [face(axis, 1.0), face(axis, -1.0)]));
+    let lit = at_origin().cuboid(center, half * 2.0, DVec3::ZERO, emitter(1.0));
+    assert_irradiance("box", &lit, exact);
+    // Turned by quarters about y the box has its x and z edges exchanged.
+    let turned = v(half.z, half.y, half.x) * 2.0;
+    let lit = at_origin().cuboid(center, turned, v(0.0, 90.0, 0.0), emitter(1.0));
+    assert_irradiance("turned box", &lit, exact);
+}
+
+#[test]
+fn an_emissive_mesh_placed_and_mirrored() {
+    // A closed ball of triangles: each triangle that looks at the origin counts, whole, since the ball is convex.
+    let ball = lat_long_sphere(6, 8, 0.5, DVec3::ZERO);
+    let place = v(0.6, 1.6, 0.2);
+    for scale in [v(1.0, 1.0, 1.0), v(1.0, 0.6, -1.3)] {
+        let corner = |p: glimt::math::Vec3| p.as_dvec3() * scale + place;
+        let faces = ball.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(|i| corner(ball.positions[i as usize]));
+            if scale.z < 0.0 { vec![a, c, b] } else { vec![a, b, c] }
+        });
+        let exact = convex(faces);
+        let lit = at_origin().mesh(ball.clone(), [scale, DVec3::ZERO, place], emitter(1.0));
+        assert_irradiance(&format!("ball of scale {scale}"), &lit, exact);
+    }
+}
+
+#[test]
+fn parts_of_a_mesh_hide_one_another() {
+    // Two squares of one mesh, shining down: the lower one, twice as wide at half the height, hides the upper one from the
+    // origin altogether.
+    let mut mesh = TriangleMesh::default();
+    for (half, y) in [(0.5_f32, 1.0_f32), (0.5, 2.0)] {
+        let first = mesh.positions.len() as u32;
+        for (x, z) in [(-half, -half), (half, -half), (half, half), (-half, half)] {
+            mesh.positions.push(glimt::math::Vec3::new(x, y, z));
+        }
+        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    let lit = at_origin().mesh(mesh, AS_IT_IS, emitter(1.0));
+    assert_irradiance("two squares", &lit, 0.752_274_688_5);
+}
+
+#[test]
+fn spheres_at_every_height_over_the_horizon() {
+    // E/πL = cos θ/H² where the whole sphere is above the horizon; else the integral of the table, H = 2.
+    for (cosine, exact) in
+        [(1.0, 0.25), (0.2, 0.059_345_832_4), (0.0, 0.028_834_442_8), (-0.3, 0.003_715_430_7)]
+    {
+        let center = v((1.0_f64 - cosine * cosine).sqrt(), cosine, 0.0) * 2.0;
+        let lit = at_origin().sphere(center, 1.0, emitter(1.0));
+        assert_irradiance(&format!("cos θ = {cosine}"), &lit, PI * exact);
+        if cosine > 0.0 {
+            // From the centre: πR²/d²·cos θ.
+            assert_hard("sphere", &lit, PI * cosine / 4.0);
+        }
+    }
+}
+
+#[test]
+fn spheres_far_away_and_close() {
+    for (h, cosine) in [(1000.0, 0.6), (1e5, 0.6), (1.01, 1.0), (1.0001, 1.0), (1.25, 0.9)] {
+        let direction = v((1.0_f64 - cosine * cosine).sqrt(), cosine, 0.0);
+        let lit = at_origin().sphere(direction * h, 1.0, emitter(1.0));
+        assert_irradiance(&format!("H = {h}"), &lit, PI * cosine / (h * h));
+    }
+}
+
+/// A unit square at height 4, half of the sky hidden by a blocker x < 0 at height 1.
+fn penumbra(x: f64, blocker: bool) -> Build {
+    let lit = receiver(v(x, 0.0, 0.0), 0.7).quad(v(-0.5, 4.0, -0.5), DVec3::X, DVec3::Z, emitter(1.0));
+    let hide =
+        |lit: Build| lit.quad(v(-1000.0, 1.0, -1000.0), v(1000.0, 0.0, 0.0), v(0.0, 0.0, 2000.0), matte(0.5));
+    if blocker { hide(lit) } else { lit }
+}
+
+#[test]
+fn the_penumbra_of_a_half_plane() {
+    // The line of sight over the edge meets the light at x' = −3x: what is right of it is seen.
+    for (x, exact) in [
+        (-1.0_f64 / 6.0, 0.0),
+        (-1.0 / 12.0, 0.015_059_393_9),
+        (0.0, 0.030_612_880_6),
+        (1.0 / 12.0, 0.046_115_392_9),
+        (1.0 / 6.0, 0.061_022_237_3),
+    ] {
+        let left = (-3.0 * x).clamp(-0.5, 0.5);
+        let part = [v(left, 4.0, -0.5), v(0.5, 4.0, -0.5), v(0.5, 4.0, 0.5), v(left, 4.0, 0.5)];
+        let formula = lambert(v(x, 0.0, 0.0), DVec3::Y, &part);
+        assert!((formula - exact).abs() < 1e-9);
+        assert_irradiance(&format!("penumbra at {x}"), &penumbra(x, true), formula);
+        let off = |blocker| penumbra(x, blocker).shadows(Shadows::Off, 4).values(8, 16);
+        assert_eq!(off(true), off(false));
+        // The middle is hidden from x < 0; from x > 0, d² = 16 + x², E = 16/d⁴.
+        let d2 = 16.0 + x * x;
+        let hard = if x > 0.0 { 16.0 / (d2 * d2) } else { 0.0 };
+        if x != 0.0 {
+            assert_hard("penumbra", &penumbra(x, true), hard);
+        }
+    }
+}
+
+#[test]
+fn the_view_of_shadows_is_the_part_that_arrives() {
+    // In the middle of the penumbra half of the light is seen, by symmetry.
+    for shadow_samples in [1, 16] {
+        let view = penumbra(0.0, true).viewed(View::Shadow).shadows(Shadows::Soft, shadow_samples);
+        assert_mean("half", &view.values(64, 64), 0.5);
+    }
+    assert_eq!(penumbra(0.3, true).viewed(View::Shadow).value(), 1.0);
+    // Two point lights, the one of E = 3/2² hidden, the one of E = 5/1 not: 5/(5 + ¾).
+    let lit = at_origin()
+        .point_light(v(0.0, 2.0, 0.0), 3.0, Falloff::Square)
+        .point_light(v(0.0, 1.0, 0.0), 5.0, Falloff::Square)
+        .quad(v(-1.0, 1.5, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), matte(0.5));
+    assert_close("two lights", lit.viewed(View::Shadow).value(), 5.0 / 5.75);
+}
+
+#[test]
+fn inside_a_box_of_uniform_light_a_diffuse_surface_sends_its_reflectance() {
+    // L = 1 over the whole hemisphere: E = π, so that L = ρ, wherever and however the surface is.
+    for (point, size) in [(v(0.0, 0.0, 0.0), 2.0), (v(0.6, -0.7, 0.3), 1.0), (v(0.3, 0.9, -0.2), 1.0)] {
+        let mut lit = receiver(point, 0.7);
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0] {
+                let (mut u, mut w, mut corner) = (DVec3::ZERO, DVec3::ZERO, DVec3::splat(-size));
+                (u[(axis + 1) % 3], w[(axis + 2) % 3]) = (2.0 * size, 2.0 * size);
+                corner[axis] = sign * size;
+                let (u, w) = if sign > 0.0 { (w, u) } else { (u, w) };
+                lit = lit.quad(corner, u, w, emitter(1.0));
+            }
+        }
+        assert_irradiance(&format!("at {point}"), &lit, PI);
+    }
+}
+
+#[test]
+fn many_lights_add_up() {
+    let one = |build: Build, i: u32| {
+        let x = f64::from(i) * 0.9 - 1.5;
+        build.quad(v(x, 1.0, -0.3), v(0.5, 0.0, 0.0), v(0.0, 0.0, 0.5), emitter(1.0))
+    };
+    let polygon = |i: u32| {
+        let x = f64::from(i) * 0.9 - 1.5;
+        [v(x, 1.0, -0.3), v(x + 0.5, 1.0, -0.3), v(x + 0.5, 1.0, 0.2), v(x, 1.0, 0.2)]
+    };
+    let exact = (0..4).map(|i| lambert(DVec3::ZERO, DVec3::Y, &polygon(i))).sum();
+    assert_irradiance("four squares", &(0..4).fold(at_origin(), one), exact);
+}

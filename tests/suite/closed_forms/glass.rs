@@ -1,0 +1,280 @@
+//! Glass: Fresnel and Snell at slabs, prisms and balls; absorption; nesting.
+
+use glimt::geometry::Ray;
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::geometry::ray::offset_origin;
+use glimt::materials::fresnel::{dielectric, refract};
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{MaterialKind, Shape};
+use glimt::world::Geometry;
+
+use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, scene};
+use super::{assert_close, assert_mean, v};
+
+/// Horizontal and downward step of a ray at an angle to the vertical.
+fn tilted(degrees: f64) -> DVec3 {
+    v(degrees.to_radians().sin(), -degrees.to_radians().cos(), 0.0)
+}
+
+/// A slab of thickness 1 between y = −1 and 0, entered at the origin.
+fn slab(degrees: f64, material: MaterialKind) -> Build {
+    scene()
+        .cuboid(v(0.0, -0.5, 0.0), v(1000.0, 1.0, 1000.0), DVec3::ZERO, material)
+        .seen(-tilted(degrees) * 2.0, DVec3::ZERO)
+}
+
+/// Light from below everywhere.
+fn lit_from_below(build: Build) -> Build {
+    build.quad(v(-1e4, -2.0, 1e4), v(2e4, 0.0, 0.0), v(0.0, 0.0, -2e4), emitter(1.0))
+}
+
+/// Unpolarised reflectance at n = 1.5 by Fresnel's sine and tangent laws.
+fn reflectance(degrees: f64) -> f64 {
+    let i = degrees.to_radians();
+    let t = (i.sin() / 1.5).asin();
+    if i == 0.0 {
+        return 0.04;
+    }
+    (((i - t).sin() / (i + t).sin()).powi(2) + ((i - t).tan() / (i + t).tan()).powi(2)) / 2.0
+}
+
+#[test]
+fn a_slab_with_all_its_inner_reflections() {
+    // T = (1 − R)²·Σ R²ⁱ = (1 − R)/(1 + R).
+    for (degrees, exact) in
+        [(0.0, 0.923_076_923_1), (45.0, 0.904_326_79), (60.0, 0.836_232_46), (80.0, 0.441_229_17)]
+    {
+        let r = reflectance(degrees);
+        assert_close("the formula", (1.0 - r) / (1.0 + r), exact);
+        let values = lit_from_below(slab(degrees, glass(1.5))).depth(100).values(64, 64);
+        assert_mean(&format!("{degrees}°"), &values, (1.0 - r) / (1.0 + r));
+    }
+}
+
+#[test]
+fn each_order_of_a_slab_has_its_power_of_the_reflectance() {
+    // Depth 2: straight through, (1 − R)²; depth 1: nothing from below; the sky above by reflection alone, R.
+    for degrees in [0.0, 45.0, 60.0] {
+        let r = reflectance(degrees);
+        let through = lit_from_below(slab(degrees, glass(1.5)));
+        assert_eq!(through.clone().depth(1).value(), 0.0);
+        assert_close("through", through.depth(2).value(), (1.0 - r).powi(2));
+        let sky = slab(degrees, glass(1.5)).quad(
+            v(-1e4, 9.0, -1e4),
+            v(2e4, 0.0, 0.0),
+            v(0.0, 0.0, 2e4),
+            emitter(1.0),
+        );
+        assert_close("reflected", sky.depth(1).value(), r);
+    }
+}
+
+#[test]
+fn the_lateral_shift_of_a_slab() {
+    // t·sin θ·(1 − cos θ/√(n² − sin²θ)): where the edge of a light below must be to be just seen straight through.
+    for (degrees, exact) in [(45.0, 0.329_142_31), (60.0, 0.512_472_01), (80.0, 0.833_663_85)] {
+        let seen = |edge: f64| {
+            let half = v(1e4, 0.0, 0.0);
+            let build = slab(degrees, glass(1.5)).depth(2);
+            build.quad(v(edge, -2.0, 1e4), half, v(0.0, 0.0, -2e4), emitter(1.0)).value() > 0.0
+        };
+        let straight = 2.0 * f64::tan(degrees.to_radians());
+        let (mut low, mut high) = (straight - 10.0, straight);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if seen(middle) { low = middle } else { high = middle }
+        }
+        assert_close(&format!("{degrees}°"), (straight - low) * degrees.to_radians().cos(), exact);
+    }
+}
+
+/// A ray refracted at every surface of glass of n = 1.5 until it leaves; none where all is reflected.
+fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
+    while let Some(hit) = geometry.closest(&ray) {
+        let surface = geometry.surface(&ray, &hit);
+        let entering = surface.normal.dot(ray.direction) < 0.0;
+        let (normal, eta) = if entering { (surface.normal, 1.5) } else { (-surface.normal, 1.0 / 1.5) };
+        let (_, cosine) = dielectric(-normal.dot(ray.direction), eta);
+        let direction = refract(ray.direction, normal, eta, cosine?);
+        ray = Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction);
+    }
+    Some(ray)
+}
+
+#[test]
+fn a_prism_s_least_deviation() {
+    // 2·asin(n·sin 30°) − 60° = 37.180756°, at the symmetric passage.
+    let mut mesh = TriangleMesh::default();
+    for z in [-10.0, 10.0] {
+        for degrees in [90.0_f64, 210.0, 330.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            mesh.positions.push(v(cos, sin, z).as_vec3());
+        }
+    }
+    for [a, b] in [[0, 1], [1, 2], [2, 0]] {
+        mesh.triangles.extend([[a, b, b + 3], [a, b + 3, a + 3]]);
+    }
+    let world = scene().mesh(mesh, AS_IT_IS, glass(1.5)).world();
+    // Towards the left face, whose normal points 150° from +x.
+    let deviation = |incidence: f64| {
+        let heading = (incidence - 30.0).to_radians();
+        let direction = v(heading.cos(), heading.sin(), 0.0);
+        let target = v(-3.0_f64.sqrt() / 4.0, 0.25, 0.1);
+        let out = through(&world.geometry, Ray::new((target - direction).as_vec3(), direction.as_vec3()));
+        out.map_or(f64::INFINITY, |ray| {
+            let out = ray.direction.as_dvec3();
+            out.cross(direction).length().atan2(out.dot(direction)).to_degrees()
+        })
+    };
+    let angles = (300..900).map(|tenths| deviation(f64::from(tenths) / 10.0));
+    let least = angles.fold(f64::INFINITY, f64::min).min(deviation(0.75_f64.asin().to_degrees()));
+    assert_close("least deviation", least, 37.180_756);
+}
+
+#[test]
+fn a_ball_lens_s_focus() {
+    // sin θ = h, sin θ' = h/n: the ray leaves turned by 2(θ − θ') and meets the axis at h/sin(2(θ − θ')) from the centre.
+    let world = scene().sphere(DVec3::ZERO, 1.0, glass(1.5)).world();
+    for (h, exact) in [(1e-3_f64, 1.5), (0.5, 1.391_572_9), (0.9, 1.104_445_6)] {
+        let formula = h / (2.0 * (h.asin() - (h / 1.5).asin())).sin();
+        assert_close("the formula", formula, exact);
+        let start = Vec3::new(h as f32, 0.0, 3.0);
+        let out = through(&world.geometry, Ray::new(start, Vec3::NEG_Z)).expect("no total reflection");
+        let (o, d) = (out.origin.as_dvec3(), out.direction.as_dvec3());
+        assert_close(&format!("h = {h}"), -(o.z - d.z * o.x / d.x), formula);
+    }
+}
+
+#[test]
+fn lossless_glass_under_a_uniform_sky_is_invisible() {
+    // Radiance over n² is conserved, reflections and refractions share it without loss, and every path ends in the sky:
+    // exactly 1, in every pixel.
+    let ball = lat_long_sphere(8, 10, 1.0, v(0.0, -2.2, -6.0));
+    let seen = scene()
+        .sphere(v(-1.2, 0.0, -5.0), 1.0, glass(1.5))
+        .sphere(v(1.2, 0.0, -5.0), 1.0, glass(2.4))
+        .sphere(v(1.2, 0.0, -5.0), 0.6, glass(1.0))
+        .cuboid(v(0.0, 2.0, -5.0), v(1.5, 1.0, 1.0), v(10.0, 20.0, 30.0), glass(1.33))
+        .mesh(ball, AS_IT_IS, glass(1.5))
+        .background(1.0)
+        .depth(2000);
+    for target in [
+        v(-1.2, 0.0, -5.0),
+        v(-0.5, 0.2, -5.0),
+        v(-0.25, 0.1, -5.0),
+        v(1.2, 0.0, -5.0),
+        v(1.5, -0.7, -5.0),
+        v(0.1, 2.1, -5.0),
+        v(0.3, -2.0, -6.0),
+    ] {
+        let values = seen.clone().seen(v(0.1, 0.05, 0.2), target).values(32, 32);
+        assert_mean(&format!("towards {target}"), &values, 1.0);
+    }
+}
+
+#[test]
+fn absorption_along_a_slab_and_a_ball() {
+    // Straight through d of tint a: (1 − R)²·aᵈ, R = .04; with all reflections (1 − R)²aᵈ/(1 − R²a²ᵈ).
+    let tint = Vec3::new(0.5, 0.9, 0.25);
+    let tinted = MaterialKind::Glass { ior: 1.5, tint };
+    let ball = scene().sphere(v(0.0, -0.75, 0.0), 0.75, tinted.clone()).seen(v(0.0, 2.0, 0.0), DVec3::ZERO);
+    for (build, d) in [(slab(0.0, tinted), 1.0), (ball, 1.5)] {
+        let lit = lit_from_below(build);
+        let straight = lit.clone().depth(2).color();
+        let all: Vec<DVec3> = (0..64).map(|seed| lit.clone().depth(60).picture(16, seed)[0]).collect();
+        for channel in 0..3 {
+            let a = f64::from(tint[channel]).powf(d);
+            assert_close("straight through", straight[channel], 0.96 * 0.96 * a);
+            let all: Vec<f64> = all.iter().map(|color| color[channel]).collect();
+            assert_mean("all", &all, 0.96 * 0.96 * a / (1.0 - 0.0016 * a * a));
+        }
+    }
+    // Through a ball at the angle θ: the chord is 2R·cos θ', T = (1 − R(θ))²·a^chord.
+    let h = 0.7_f64;
+    let ball = scene()
+        .sphere(DVec3::ZERO, 1.0, MaterialKind::Glass { ior: 1.5, tint })
+        .background(1.0)
+        .depth(2)
+        .seen(v(h, 3.0, 0.0), v(h, 0.0, 0.0));
+    let r = reflectance(h.asin().to_degrees());
+    let chord = 2.0 * (1.0 - (h / 1.5).powi(2)).sqrt();
+    for channel in 0..3 {
+        // The sky is seen by the reflection, straight through, and by nothing else at depth 2.
+        let exact = r + (1.0 - r).powi(2) * f64::from(tint[channel]).powf(chord);
+        assert_close("chord", ball.color()[channel], exact);
+    }
+}
+
+#[test]
+fn a_glass_of_its_surroundings_index_is_invisible() {
+    // No reflection and no bending where n does not change: the pictures with and without it are the same, up to its rim.
+    let behind = |build: Build| {
+        (0..10).fold(build.background(0.1), |build, i| {
+            let x = f64::from(i) * 0.4 - 2.0;
+            build.quad(v(x, -3.0, -8.0), v(0.2, 0.0, 0.0), v(0.0, 6.0, 0.0), emitter(1.0 + i as f32))
+        })
+    };
+    let plain = behind(scene());
+    let ball = behind(scene().sphere(v(0.0, 0.0, -5.0), 1.0, glass(1.0)));
+    let mut random = super::Random(5);
+    for i in 0..3000 {
+        // Rays at the rim, at distances 1 − 10⁻¹ … 1 − 10⁻⁷ from the middle of the ball as the eye sees it.
+        let rim = 1.0 / (1.0 - 1.0 / 25.0_f64).sqrt();
+        let r = rim * (1.0 - 10.0_f64.powf(-1.0 - 6.0 * random.unit()));
+        let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
+        let target = v(r * cos, r * sin, -5.0);
+        let look = |build: &Build| build.clone().depth(2).seen(DVec3::ZERO, target).value();
+        assert_eq!(look(&ball), look(&plain), "towards {target}");
+    }
+}
+
+#[test]
+fn nested_glass() {
+    // In a slab of n = 1.5 a ball of the same n changes nothing: at depth 4 the path through both is (1 − R)².
+    let r = reflectance(30.0);
+    let inside = slab(30.0, glass(1.5)).sphere(v(0.2, -0.5, 0.05), 0.3, glass(1.5));
+    assert_close("equal", lit_from_below(inside).depth(4).value(), (1.0 - r).powi(2));
+    // A ball of air along the axis: four surfaces at normal incidence, (1 − .04)⁴.
+    let bubble = slab(0.0, glass(1.5)).sphere(v(0.0, -0.5, 0.0), 0.25, glass(1.0));
+    assert_close("bubble", lit_from_below(bubble).depth(4).value(), 0.96_f64.powi(4));
+    // A ball of n = 2 in it: the inner surfaces have ((2 − 1.5)/(2 + 1.5))².
+    let dense = slab(0.0, glass(1.5)).sphere(v(0.0, -0.5, 0.0), 0.25, glass(2.0));
+    let inner = 1.0 - 1.0 / 49.0;
+    assert_mean("dense", &lit_from_below(dense).depth(4).values(64, 64), (0.96 * inner) * (0.96 * inner));
+    // From within the slab one surface is left.
+    let within = slab(0.0, glass(1.5)).seen(v(0.0, -0.5, 0.0), v(0.0, -1.0, 0.0));
+    assert_close("from within", lit_from_below(within).depth(1).value(), 0.96 * 2.25);
+}
+
+#[test]
+fn bent_normals_make_no_light() {
+    // Reflection and refraction share a ray's radiance over n², the choice of one of them by chance keeps it whole, and each
+    // part that leaves sees the sky once: at most n²·1 inside the glass. Rays that the smooth normal refracts along
+    // the outside, but not through the facet, must not count as having left.
+    let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
+    ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
+    let seen = scene().mesh(ball, AS_IT_IS, glass(1.5)).background(1.0).depth(50).with(|scene| {
+        if let Shape::Mesh { smooth, .. } = &mut scene.objects[0].shape {
+            *smooth = true;
+        }
+    });
+    let geometry = seen.world().geometry;
+    let mut random = super::Random(77);
+    let mut along = 0;
+    for _ in 0..30_000 {
+        let eye = (random.direction() * 0.85).as_vec3();
+        let direction = random.direction().as_vec3();
+        let ray = Ray::new(eye, direction);
+        let hit = geometry.closest(&ray).expect("inside a closed mesh");
+        let surface = geometry.surface(&ray, &hit);
+        let (_, cosine) = dielectric(surface.shading_normal.dot(direction), 1.0 / 1.5);
+        let refracted = cosine.map(|c| refract(direction, -surface.shading_normal, 1.0 / 1.5, c));
+        if refracted.is_none_or(|refracted| refracted.dot(surface.normal) > 0.0) {
+            continue;
+        }
+        along += 1;
+        let value = seen.clone().seen(eye.as_dvec3(), (eye + direction).as_dvec3()).value();
+        assert!(value <= 2.25 * (1.0 + 1e-5), "from {eye} along {direction}: {value}");
+    }
+    assert!(along > 50, "{along}");
+}

@@ -1,0 +1,75 @@
+//! The tracer against closed forms: each comment derives the right answer.
+
+mod camera;
+mod direct;
+mod glass;
+mod mirror;
+mod robust;
+mod scenes;
+mod shading;
+mod speckle;
+
+use glimt::math::DVec3;
+
+/// A point or direction.
+pub const fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+/// Mean and its standard error over independent values.
+pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// |mean − exact| ≤ max(3·SE, 1e-5·exact), the mean over seeds.
+#[track_caller]
+pub fn assert_mean(what: &str, values: &[f64], exact: f64) {
+    assert!(values.len() >= 16, "too few seeds");
+    let (mean, error) = mean_and_error(values);
+    let allowed = (3.0 * error).max(1e-5 * exact.abs());
+    assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error} is not {exact}");
+}
+
+/// Equal within 1e-5 of the right value.
+#[track_caller]
+pub fn assert_close(what: &str, value: f64, exact: f64) {
+    assert!((value - exact).abs() <= 1e-5 * exact.abs(), "{what}: {value} is not {exact}");
+}
+
+/// Irradiance per radiance of a polygon in clear sight above the horizon, whatever its orientation: ½·|Σ Θᵢ(Γᵢ·n)|, Θᵢ
+/// the angle that an edge fills and Γᵢ the unit normal of its plane through the point (Lambert, *Photometria*, 1760).
+pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
+    let corners: Vec<DVec3> = polygon.iter().map(|&corner| (corner - point).normalize()).collect();
+    let edges = corners.iter().zip(corners.iter().cycle().skip(1));
+    let sum = edges.map(|(a, b)| {
+        let across = a.cross(*b);
+        across.length().atan2(a.dot(*b)) * across.normalize_or_zero().dot(normal)
+    });
+    (0.5 * sum.sum::<f64>()).abs()
+}
+
+/// A small generator for aimed rays.
+pub struct Random(pub u64);
+
+impl Random {
+    /// In [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64) / (1_u64 << 53) as f64
+    }
+
+    /// In [−1, 1).
+    pub fn signed(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+
+    /// Uniform over directions.
+    pub fn direction(&mut self) -> DVec3 {
+        let (z, phi) = (self.signed(), std::f64::consts::TAU * self.unit());
+        let r = (1.0 - z * z).sqrt();
+        v(r * phi.cos(), r * phi.sin(), z)
+    }
+}

@@ -1,0 +1,311 @@
+//! Rays that leave surfaces, aim at edges, are huge, tiny or not a number.
+
+use glimt::control::CancelToken;
+use glimt::film::Rect;
+use glimt::geometry::ray::offset_origin;
+use glimt::geometry::{Ray, SurfacePoint};
+use glimt::integrators::render_tile;
+use glimt::lights::Source;
+use glimt::materials::fresnel::dielectric;
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{Falloff, Shape};
+use glimt::world::{Geometry, Hit};
+
+use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
+use super::{Random, v};
+
+/// Where a ray from outside towards a point meets the geometry.
+fn aimed(geometry: &Geometry, random: &mut Random, at: DVec3, far: f64) -> Option<SurfacePoint> {
+    let origin = (at + random.direction() * far).as_vec3();
+    let ray = Ray::new(origin, (at - origin.as_dvec3()).as_vec3().normalize());
+    geometry.closest(&ray).map(|hit| geometry.surface(&ray, &hit))
+}
+
+/// A ray from a surface into the half-space of `side`, often close to its border.
+fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
+    let across = random.direction();
+    let n = side.as_dvec3();
+    let flat = across - n * n.dot(across);
+    let direction = (flat.normalize() + n * 10.0_f64.powf(-3.0 * random.unit())).as_vec3().normalize();
+    Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction)
+}
+
+/// Rays that leave a convex shape outwards and hit it again, of all that were tried.
+fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
+    let world = build.world();
+    let (mut hits, mut tried) = (0, 0);
+    for _ in 0..tries {
+        let at = center + random.direction() * size * random.unit();
+        let Some(surface) = aimed(&world.geometry, random, at, size * 4.0) else { continue };
+        let ray = leaving(random, &surface, surface.normal);
+        tried += 1;
+        hits += u32::from(world.geometry.closest(&ray).is_some());
+    }
+    (hits, tried)
+}
+
+/// Places within 10⁶ in every direction, the first such that the shape passes near the origin.
+fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
+    let mut places = vec![v(0.0, -size, 0.0), random.direction() * size, DVec3::ZERO];
+    for far in [1.0, 1e2, 1e4, 1e6] {
+        if far < size * 1e6 {
+            places.push(random.direction() * far);
+        }
+    }
+    places
+}
+
+#[test]
+fn no_convex_shape_hits_itself() {
+    // A convex body lies on one side of the tangent plane: what leaves on the other side never meets it.
+    let mut random = Random(11);
+    for size in [1e-3, 1.0, 1e3, 1e6] {
+        for center in places(&mut random, size) {
+            let angles = v(17.0, 33.0, -71.0);
+            let triangle = [0, 1, 2].map(|_| center + random.direction() * size);
+            let octahedron = lat_long_sphere(2, 4, size, center);
+            let unit = lat_long_sphere(2, 4, 1.0, DVec3::ZERO);
+            let shapes = [
+                ("sphere", scene().sphere(center, size, matte(0.5))),
+                ("box", scene().cuboid(center, DVec3::splat(size * 1.2), DVec3::ZERO, matte(0.5))),
+                ("turned box", scene().cuboid(center, DVec3::splat(size * 1.2), angles, matte(0.5))),
+                ("quad", scene().quad(center, triangle[0] - center, triangle[1] - center, matte(0.5))),
+                ("triangle", scene().triangle(triangle, matte(0.5))),
+                ("mesh", scene().mesh(octahedron, AS_IT_IS, matte(0.5))),
+                ("instance", scene().mesh(unit, [v(size, size * 0.7, -size), angles, center], matte(0.5))),
+            ];
+            for (what, build) in shapes {
+                let (hits, tried) = self_hits(&build, &mut random, center, size, 4000);
+                assert!(tried > 0, "{what} of size {size} at {center} is never hit");
+                assert_eq!(hits, 0, "of {tried} rays, {what} of size {size} at {center}");
+            }
+        }
+    }
+}
+
+#[test]
+fn shapes_through_the_origin_do_not_hit_themselves_there() {
+    // The coordinates of the hit are nearly 0 though the shape is large: the error of the sums is that of their terms.
+    let mut random = Random(3);
+    for _ in 0..200 {
+        let (u, w) = (random.direction() * 1e4, random.direction() * 1e4);
+        let corner = -(u * random.unit() + w * random.unit());
+        let n = random.direction();
+        let radius = 10.0_f64.powf(6.0 * random.unit());
+        let plane = Shape::Plane { point: n.cross(u), normal: n };
+        for (what, build) in [
+            ("quad", scene().quad(corner, u, w, matte(0.5))),
+            ("triangle", scene().triangle([corner, corner + u * 2.0, corner + w * 2.0], matte(0.5))),
+            ("box", scene().cuboid(v(0.0, 0.0, -1e4), DVec3::splat(2e4), DVec3::ZERO, matte(0.5))),
+            ("box", scene().cuboid(-u, DVec3::splat(2e4), v(0.0, u.z.atan2(u.x), 0.0), matte(0.5))),
+            ("sphere", scene().sphere(n * radius, radius, matte(0.5))),
+            ("plane", scene().shape(plane, matte(0.5))),
+        ] {
+            for _ in 0..10 {
+                let size = 10.0_f64.powf(-14.0 * random.unit());
+                let (hits, tried) = self_hits(&build, &mut random, DVec3::ZERO, size, 6);
+                assert_eq!(hits, 0, "of {tried} rays, {what} {u} {w} {n} {radius} within {size}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_enters_a_ball_meets_its_other_side_and_leaves() {
+    // Inside, the next hit is the back of the sphere; beyond it there is nothing.
+    let mut random = Random(17);
+    for radius in [1e-3, 0.75, 1.0, 1e3, 1e6] {
+        for center in places(&mut random, radius) {
+            let world = scene().sphere(center, radius, glass(1.5)).world();
+            for _ in 0..500 {
+                let at = center + random.direction() * radius * 0.9;
+                let Some(surface) = aimed(&world.geometry, &mut random, at, radius * 4.0) else { continue };
+                let inner = leaving(&mut random, &surface, -surface.normal);
+                let hit = world.geometry.closest(&inner);
+                let Some(hit) = hit else { panic!("out of the ball {radius} at {center} without a hit") };
+                let back = world.geometry.surface(&inner, &hit);
+                assert!(back.normal.dot(inner.direction) > 0.0, "ball {radius} at {center}");
+                let outer = leaving(&mut random, &back, back.normal);
+                assert_eq!(world.geometry.closest(&outer), None, "ball {radius} at {center}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_closed_mesh_has_no_leaks() {
+    // From inside every ray hits; aimed at vertices and points of edges the test itself decides nothing but ties.
+    let mut random = Random(23);
+    let far = v(148_376.0, 1234.0, -223_423.0);
+    let at_origin = lat_long_sphere(16, 16, 2.0, DVec3::ZERO);
+    let baked = lat_long_sphere(16, 16, 2.0, far);
+    for (mesh, placed, center) in [
+        (&at_origin, AS_IT_IS, DVec3::ZERO),
+        (&baked, AS_IT_IS, far),
+        (&at_origin, [DVec3::ONE, DVec3::ZERO, far], far),
+        (&at_origin, [v(1.0, 1.2, -0.9), v(10.0, 20.0, 30.0), v(3.0, -7.0, 1.0)], v(3.0, -7.0, 1.0)),
+    ] {
+        let build = scene().mesh(mesh.clone(), placed, matte(0.5));
+        let world = build.world();
+        let corner = |i: u32| {
+            let p = mesh.positions[i as usize].as_dvec3();
+            let moved =
+                glimt::math::transform::Transform::scale_rotate_translate(placed[0], placed[1], placed[2]);
+            moved.point(p)
+        };
+        let mut leaks = 0;
+        for i in 0..200_000 {
+            let triangle = mesh.triangles[i % mesh.triangles.len()];
+            let (a, b) = (corner(triangle[i % 3]), corner(triangle[(i + 1) % 3]));
+            let target = if i % 2 == 0 { a } else { a.lerp(b, random.unit()) };
+            let origin = (center + random.direction() * random.unit()).as_vec3();
+            let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
+            leaks += u32::from(world.geometry.closest(&ray).is_none());
+            leaks += u32::from(!world.geometry.occluded(&ray, Source::Nothing));
+        }
+        assert_eq!(leaks, 0, "at {center}");
+    }
+}
+
+/// One of everything, of size 2ᵏ.
+fn of_everything(k: i32) -> Build {
+    let s = 2.0_f64.powi(k);
+    let intensity = (8.0 * 4.0_f64.powi(k)) as f32;
+    let ball = lat_long_sphere(6, 9, 0.5 * s, DVec3::ZERO);
+    scene()
+        .quad(
+            v(-4.0, -1.0, -1.0) * s,
+            v(8.0, 0.0, 0.0) * s,
+            v(0.0, 0.0, -8.0) * s,
+            phong(0.6, 0.2, 10.0, 0.0),
+        )
+        .sphere(v(-1.2, -0.3, -5.0) * s, 0.7 * s, mirror(0.9))
+        .sphere(v(0.3, -0.4, -4.0) * s, 0.6 * s, glass(1.5))
+        .cuboid(v(1.5, -0.5, -5.5) * s, v(0.8, 1.0, 0.7) * s, v(0.0, 30.0, 5.0), matte(0.4))
+        .triangle([v(-2.0, -1.0, -7.0) * s, v(2.0, -1.0, -7.0) * s, v(0.1, 2.0, -7.5) * s], matte(0.8))
+        .mesh(ball, [DVec3::ONE, v(10.0, 0.0, 0.0), v(1.0, 0.6, -5.0) * s], matte(0.7))
+        .quad(v(-0.5, 3.0, -5.0) * s, DVec3::X * s, DVec3::Z * s, emitter(4.0))
+        .quad(v(-2.5, 1.0, -6.0) * s, v(0.5, 0.1, 0.0) * s, v(0.3, 0.5, 0.4) * s, emitter(4.0))
+        .sphere(v(2.0, 2.0, -4.0) * s, 0.3 * s, emitter(6.0))
+        .point_light(v(-2.0, 2.0, -2.0) * s, intensity, Falloff::Square)
+        .background(0.25)
+        .shadows(glimt::scene::description::Shadows::Soft, 2)
+        .pictured(v(0.1, 0.3, 0.5) * s, v(0.0, 0.0, -5.0) * s, 50.0, 24, 20)
+}
+
+#[test]
+fn a_scene_of_any_scale_gives_the_same_bits() {
+    // Powers of two scale every number without rounding; nothing may depend on the unit of length.
+    let picture = of_everything(0).picture(4, 9);
+    for k in [-30, -7, 1, 12, 30] {
+        let scaled = of_everything(k).picture(4, 9);
+        let different = picture.iter().zip(&scaled).filter(|(a, b)| a != b).count();
+        assert_eq!(different, 0, "pixels that differ at 2^{k}");
+    }
+}
+
+#[test]
+fn no_split_of_the_work_changes_a_bit() {
+    // A sample is a function of the scene, its pixel, its number and the seed.
+    let build = of_everything(0);
+    let (world, settings, token) = (build.world(), build.settings(4), CancelToken::new());
+    let render = |x, y, width, height, samples| {
+        let rect = Rect { x, y, width, height };
+        let tile = render_tile(&world, &settings, rect, samples, &token).expect("nobody cancels");
+        tile.0.radiance
+    };
+    let whole = render(0, 0, 24, 20, 0..6);
+    for (x, y, width, height, first, last) in
+        [(0, 0, 24, 7, 0, 6), (5, 3, 1, 1, 2, 3), (7, 11, 13, 9, 0, 4), (23, 19, 1, 1, 5, 6)]
+    {
+        let part = render(x, y, width, height, first..last);
+        for (i, radiance) in (0_u32..).zip(&part) {
+            let (pixel, sample) = (i / (last - first), i % (last - first) + first);
+            let (px, py) = (x + pixel % width, y + pixel / width);
+            assert_eq!(*radiance, whole[((py * 24 + px) * 6 + sample) as usize]);
+        }
+    }
+    let mut other = settings;
+    other.seed = 5;
+    let rect = Rect { x: 0, y: 0, width: 24, height: 20 };
+    let reseeded = render_tile(&world, &other, rect, 0..6, &token).expect("nobody cancels").0.radiance;
+    assert_ne!(whole, reseeded);
+}
+
+#[test]
+fn rays_that_are_no_rays_hit_nothing() {
+    let world = of_everything(0).with(|_| ()).world();
+    let good = Ray::new(Vec3::new(0.1, 0.3, 0.5), Vec3::NEG_Z);
+    assert!(world.geometry.closest(&good).is_some());
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for axis in 0..3 {
+            let (mut origin, mut direction) = (good, good);
+            origin.origin[axis] = bad;
+            direction.direction[axis] = bad;
+            for ray in [origin, direction] {
+                assert_eq!(world.geometry.closest(&ray), None, "{ray:?}");
+                assert!(!world.geometry.occluded(&ray, Source::Nothing), "{ray:?}");
+            }
+        }
+    }
+    let still = Ray::new(good.origin, Vec3::ZERO);
+    assert_eq!(world.geometry.closest(&still), None);
+}
+
+#[test]
+fn the_tree_finds_what_a_look_at_every_shape_finds() {
+    // Many shapes at the same distance: the lowest number wins, in any order that the tree has them.
+    let mut random = Random(31);
+    let mut build = scene();
+    for _ in 0..60 {
+        let corner = v(random.signed(), random.signed(), 0.0) * 3.0;
+        let (x, y) = (random.unit() * 2.0, random.unit() * 2.0);
+        build = build.quad(corner, v(x, 0.0, 0.1 * x), v(0.0, y, 0.3 * y), matte(0.5));
+        let z = 0.1 * corner.x + 0.3 * corner.y;
+        let moved = corner + v(0.0, 0.0, z);
+        build = build.quad(moved, v(x, 0.0, 0.1 * x), v(0.0, y, 0.3 * y), matte(0.5));
+        let flat = v(corner.x, corner.y, -1.0 / 3.0);
+        build = build.quad(flat, v(x, 0.0, 0.0), v(0.0, y, 0.0), matte(0.5));
+        build = build.cuboid(flat - v(0.0, 0.0, 0.5), v(x, y, 1.0), DVec3::ZERO, matte(0.5));
+        build = build.triangle([flat, flat + v(x, 0.0, 0.0), flat + v(0.0, y, 0.0)], matte(0.5));
+    }
+    let world = build.world();
+    let mut found = 0;
+    for i in 0..40_000 {
+        let origin = v(random.signed() * 4.0, random.signed() * 4.0, 3.0 + random.unit());
+        let direction = if i % 2 == 0 { DVec3::NEG_Z } else { v(random.signed(), random.signed(), -1.0) };
+        let ray = Ray::new(origin.as_vec3(), direction.normalize().as_vec3());
+        let one_by_one = (0_u32..)
+            .zip(world.geometry.shapes())
+            .filter_map(|(object, shape)| Some(Hit { shape: shape.closest(&ray, &ray.to_f64())?, object }));
+        let nearest = one_by_one.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
+        found += u32::from(nearest.is_some());
+        assert_eq!(world.geometry.closest(&ray), nearest, "{ray:?}");
+        assert_eq!(world.geometry.occluded(&ray, Source::Nothing), nearest.is_some());
+    }
+    assert!(found > 20_000);
+}
+
+#[test]
+fn fresnel_at_every_angle_and_index() {
+    // Both polarisations in double precision from the same f32 cosine and index; where the index does not change, 0.
+    let mut random = Random(41);
+    for _ in 0..100_000 {
+        let cosine = 10.0_f64.powf(-6.0 * random.unit()) as f32;
+        let eta = [1.0, 1.0001, 1.0 / 1.0001, 1.5, 1.0 / 1.5, 2.4, 1.0 / 2.4][(random.unit() * 7.0) as usize];
+        let (reflectance, transmitted) = dielectric(cosine, eta);
+        let (c, n) = (f64::from(cosine), f64::from(eta));
+        let cos2 = 1.0 - (1.0 - c * c) / (n * n);
+        let exact = if cos2 <= 0.0 {
+            1.0
+        } else {
+            let t = cos2.sqrt();
+            (((n * c - t) / (n * c + t)).powi(2) + ((c - n * t) / (c + n * t)).powi(2)) / 2.0
+        };
+        assert!(
+            (f64::from(reflectance) - exact).abs() < 1e-6,
+            "R = {reflectance}, not {exact}, at {cosine}, {eta}"
+        );
+        assert!(eta != 1.0 || transmitted.is_some_and(|t| (t / cosine - 1.0).abs() < 1e-6), "at {cosine}");
+    }
+}

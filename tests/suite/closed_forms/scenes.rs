@@ -1,0 +1,292 @@
+//! Scenes put together in code, and what their pixels are.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glimt::assets::LoadedMesh;
+use glimt::control::CancelToken;
+use glimt::film::Rect;
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::integrators::{RenderSettings, View, render_tile};
+use glimt::materials::texels::{TexelData, Texels};
+use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::{
+    Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Located, Material, MaterialKind, Object,
+    Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
+};
+use glimt::world::{MeshTree, Parts, World, textures_needed};
+
+use super::v;
+
+/// A scene under construction, with settings of its pictures.
+#[derive(Clone)]
+pub struct Build {
+    pub scene: Scene,
+    pub parts: Parts,
+    pub view: View,
+    texels: Vec<Arc<Texels>>,
+}
+
+/// Nothing, seen from (0, 0, 0) along −z through a single narrow pixel.
+pub fn scene() -> Build {
+    let render = Render {
+        width: 1,
+        height: 1,
+        samples: 1,
+        shadow_samples: 1,
+        max_depth: 8,
+        integrator: Integrator::Whitted,
+        shadows: Shadows::Soft,
+        ambient: Vec3::ZERO,
+        background: Vec3::ZERO,
+        filter: PixelFilter::Box,
+        exposure: 0.0,
+        tonemap: Tonemap::None,
+        accel: Accel::Bvh,
+        seed: 0,
+        output: None,
+    };
+    let scene = Scene {
+        render,
+        camera: look_at(DVec3::ZERO, DVec3::NEG_Z, NARROW),
+        photons: Photons { enabled: false, count: 1, radius: 0.0, bounces: 1 },
+        textures: Vec::new(),
+        materials: Vec::new(),
+        mesh_files: Vec::new(),
+        objects: Vec::new(),
+        lights: Vec::new(),
+    };
+    Build { scene, parts: Parts::default(), view: View::Beauty, texels: Vec::new() }
+}
+
+/// An angle of view in which a pixel is a point.
+const NARROW: f64 = 1e-6;
+
+fn look_at(position: DVec3, look_at: DVec3, fov: f64) -> Camera {
+    let along = (look_at - position).normalize();
+    let up = if along.y.abs() > 0.9 { DVec3::X } else { DVec3::Y };
+    Camera::LookAt { position, look_at, up, fov, aperture: 0.0, focus: (look_at - position).length() }
+}
+
+impl Build {
+    /// One pixel that sees a point.
+    pub fn seen(self, from: DVec3, at: DVec3) -> Self {
+        self.pictured(from, at, NARROW, 1, 1)
+    }
+
+    pub fn pictured(mut self, from: DVec3, at: DVec3, fov: f64, width: u32, height: u32) -> Self {
+        self.scene.camera = look_at(from, at, fov);
+        (self.scene.render.width, self.scene.render.height) = (width, height);
+        self
+    }
+
+    pub fn with(mut self, change: impl FnOnce(&mut Scene)) -> Self {
+        change(&mut self.scene);
+        self
+    }
+
+    pub fn viewed(mut self, view: View) -> Self {
+        self.view = view;
+        self
+    }
+
+    pub fn shadows(self, shadows: Shadows, samples: u32) -> Self {
+        self.with(|scene| (scene.render.shadows, scene.render.shadow_samples) = (shadows, samples))
+    }
+
+    pub fn depth(self, max_depth: u32) -> Self {
+        self.with(|scene| scene.render.max_depth = max_depth)
+    }
+
+    pub fn background(self, radiance: f32) -> Self {
+        self.with(|scene| scene.render.background = Vec3::splat(radiance))
+    }
+
+    pub fn point_light(self, position: DVec3, intensity: f32, falloff: Falloff) -> Self {
+        let light = PointLight { position, intensity: Vec3::splat(intensity), falloff };
+        self.with(|scene| scene.lights.push(light))
+    }
+
+    pub fn shape(mut self, shape: Shape, kind: MaterialKind) -> Self {
+        self.scene.materials.push(Material { name: String::new(), kind });
+        let material = Some(self.scene.materials.len() - 1);
+        self.scene.objects.push(Object { shape, material, span: 0..0 });
+        self
+    }
+
+    pub fn sphere(self, center: DVec3, radius: f64, kind: MaterialKind) -> Self {
+        self.shape(Shape::Sphere { center, radius }, kind)
+    }
+
+    pub fn quad(self, corner: DVec3, u: DVec3, v: DVec3, kind: MaterialKind) -> Self {
+        self.shape(Shape::Quad { corner, u, v }, kind)
+    }
+
+    pub fn cuboid(self, center: DVec3, size: DVec3, rotate: DVec3, kind: MaterialKind) -> Self {
+        self.shape(Shape::Box { center, size, rotate }, kind)
+    }
+
+    pub fn triangle(self, [a, b, c]: [DVec3; 3], kind: MaterialKind) -> Self {
+        self.shape(Shape::Triangle { a, b, c }, kind)
+    }
+
+    /// An instance without smoothing: (scale, rotate, translate).
+    pub fn mesh(mut self, mesh: TriangleMesh, placed: [DVec3; 3], kind: MaterialKind) -> Self {
+        let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
+        let tree = MeshTree::build(Arc::new(loaded), &CancelToken::new()).expect("nobody cancels");
+        self.parts.meshes.push(Arc::new(tree));
+        self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
+        let [scale, rotate, translate] = placed;
+        let file = self.parts.meshes.len() - 1;
+        self.shape(Shape::Mesh { file, scale, rotate, translate, smooth: false }, kind)
+    }
+
+    /// A texture by rows from the top; its number.
+    pub fn texture(&mut self, rows: &[&[Vec3]], filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> usize {
+        let number = self.texels.len();
+        self.texels.push(Arc::new(Texels {
+            width: rows[0].len() as u32,
+            height: rows.len() as u32,
+            data: TexelData::Float(rows.concat()),
+        }));
+        self.scene.textures.push(Texture {
+            name: format!("{number}"),
+            file: Located { value: PathBuf::from(format!("{number}.exr")), span: 0..0 },
+            filter,
+            wrap,
+            repeat,
+            encoding: Encoding::Linear,
+        });
+        number
+    }
+
+    pub fn world(&self) -> World {
+        let mut parts = self.parts.clone();
+        for needed in textures_needed(&self.scene, &[]) {
+            let texels = &self.texels[needed.declared.expect("declared in the scene")];
+            parts.textures.insert(needed.source, Arc::clone(texels));
+        }
+        World::assemble(&self.scene, &parts, None, &CancelToken::new()).expect("nobody cancels")
+    }
+
+    pub fn settings(&self, seed: u32) -> RenderSettings {
+        let render = &self.scene.render;
+        RenderSettings {
+            width: render.width,
+            height: render.height,
+            max_depth: render.max_depth,
+            shadows: render.shadows,
+            shadow_samples: render.shadow_samples,
+            filter: render.filter,
+            dof: true,
+            seed,
+            view: self.view,
+        }
+    }
+
+    /// The whole picture, means of the samples.
+    pub fn picture(&self, samples: u32, seed: u32) -> Vec<DVec3> {
+        let (width, height) = (self.scene.render.width, self.scene.render.height);
+        tile(&self.world(), &self.settings(seed), Rect { x: 0, y: 0, width, height }, samples)
+    }
+
+    /// The only pixel, by one sample.
+    pub fn color(&self) -> DVec3 {
+        self.picture(1, 0)[0]
+    }
+
+    /// The only pixel where all is grey, by one sample.
+    pub fn value(&self) -> f64 {
+        self.color().x
+    }
+
+    /// The only pixel by each of many seeds.
+    pub fn values(&self, samples: u32, seeds: u32) -> Vec<f64> {
+        let world = self.world();
+        let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
+        (0..seeds).map(|seed| tile(&world, &self.settings(seed), rect, samples)[0].x).collect()
+    }
+}
+
+/// Mean of the samples of each pixel.
+pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
+    let (tile, _) =
+        render_tile(world, settings, rect, 0..samples, &CancelToken::new()).expect("nobody cancels");
+    let sums = tile.radiance.chunks(samples as usize);
+    sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
+}
+
+pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> MaterialKind {
+    let grey = |x| ColorSource::Constant(Vec3::splat(x));
+    MaterialKind::Phong {
+        diffuse: grey(diffuse),
+        specular: grey(specular),
+        shininess,
+        ambient: None,
+        emission: Vec3::splat(emission),
+        normal_map: None,
+    }
+}
+
+pub fn matte(reflectance: f32) -> MaterialKind {
+    phong(reflectance, 0.0, 1.0, 0.0)
+}
+
+pub fn emitter(radiance: f32) -> MaterialKind {
+    phong(0.0, 0.0, 1.0, radiance)
+}
+
+pub fn mirror(reflectance: f32) -> MaterialKind {
+    MaterialKind::Mirror { reflectance: Vec3::splat(reflectance) }
+}
+
+pub fn glass(ior: f32) -> MaterialKind {
+    MaterialKind::Glass { ior, tint: Vec3::ONE }
+}
+
+/// A receiver of reflectance ρ around a point, facing up, seen from close by: nothing comes between.
+pub fn receiver(at: DVec3, reflectance: f32) -> Build {
+    let half = 0.125;
+    let corner = at + v(-half, 0.0, half);
+    scene()
+        .quad(corner, v(2.0 * half, 0.0, 0.0), v(0.0, 0.0, -2.0 * half), matte(reflectance))
+        .seen(at + v(2e-5, 5e-5, 3e-5), at)
+}
+
+/// A closed latitude-longitude sphere with outward faces.
+pub fn lat_long_sphere(rings: u32, steps: u32, radius: f64, center: DVec3) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    let at = |ring: u32, step: u32| {
+        let (theta, phi) = (
+            std::f64::consts::PI * f64::from(ring) / f64::from(rings),
+            std::f64::consts::TAU * f64::from(step) / f64::from(steps),
+        );
+        (center + v(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()) * radius).as_vec3()
+    };
+    mesh.positions.push((center + v(0.0, radius, 0.0)).as_vec3());
+    for ring in 1..rings {
+        mesh.positions.extend((0..steps).map(|step| at(ring, step)));
+    }
+    mesh.positions.push((center - v(0.0, radius, 0.0)).as_vec3());
+    let id = |ring: u32, step: u32| match ring {
+        0 => 0,
+        ring if ring == rings => 1 + (rings - 1) * steps,
+        ring => 1 + (ring - 1) * steps + step % steps,
+    };
+    for ring in 0..rings {
+        for step in 0..steps {
+            let (a, b) = (id(ring, step), id(ring, step + 1));
+            let (c, d) = (id(ring + 1, step), id(ring + 1, step + 1));
+            if ring > 0 {
+                mesh.triangles.push([a, b, d]);
+            }
+            if ring + 1 < rings {
+                mesh.triangles.push([a, d, c]);
+            }
+        }
+    }
+    mesh
+}
+
+/// Leaves a mesh where it is.
+pub const AS_IT_IS: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];

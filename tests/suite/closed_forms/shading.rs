@@ -1,0 +1,176 @@
+//! The Phong material, its parts as views, and textures.
+
+use std::f64::consts::PI;
+
+use glimt::integrators::View;
+use glimt::materials::Material;
+use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::{ColorSource, Falloff, MaterialKind, TextureFilter, Wrap};
+
+use super::scenes::{Build, emitter, phong, scene};
+use super::{assert_close, v};
+
+/// A square of a material at the origin, facing up, under a light of E = 3·cos 20° from 20° beside the normal, seen from
+/// `degrees` beside the normal on the other side.
+fn lobe(kind: MaterialKind, degrees: f64) -> Build {
+    let at = |degrees: f64| v(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
+    scene()
+        .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), kind)
+        .point_light(at(-20.0) * 5.0, 3.0, Falloff::None)
+        .seen(at(degrees) * 2.0, DVec3::ZERO)
+}
+
+#[test]
+fn the_normalised_lobe() {
+    // f = kd/π + ks·(α + 2)/2π·cosᵅ of the angle between the eye and the mirrored light, which is at 20°.
+    for (kd, ks, alpha, degrees) in
+        [(0.0, 1.0, 50.0, 30.0), (0.3, 0.5, 10.0, 45.0), (0.2, 0.8, 100.0, 21.0), (0.4, 0.6, 0.0, -50.0)]
+    {
+        let cosine = f64::to_radians(degrees - 20.0).cos();
+        let f = f64::from(kd) / PI
+            + f64::from(ks) * (f64::from(alpha) + 2.0) / (2.0 * PI) * cosine.powf(f64::from(alpha));
+        let irradiance = 3.0 * 20.0_f64.to_radians().cos();
+        assert_close(
+            &format!("α = {alpha}"),
+            lobe(phong(kd, ks, alpha, 0.0), degrees).value(),
+            f * irradiance,
+        );
+    }
+    // 100° from the mirrored light there is no highlight.
+    assert_eq!(lobe(phong(0.0, 1.0, 3.0, 0.0), -80.0).value(), 0.0);
+}
+
+#[test]
+fn the_parts_add_up_to_the_picture() {
+    // Lₐ = ka·Isa; the picture at depth 0 is the emission alone.
+    let mut kind = phong(0.3, 0.5, 20.0, 0.25);
+    if let MaterialKind::Phong { ambient, .. } = &mut kind {
+        *ambient = Some(ColorSource::Constant(Vec3::splat(0.6)));
+    }
+    let lit = lobe(kind, 35.0).with(|scene| scene.render.ambient = Vec3::splat(0.2));
+    let view = |view| lit.clone().viewed(view).value();
+    let parts = [view(View::Ambient), view(View::Diffuse), view(View::Specular)];
+    let emitted = lit.clone().depth(0).value();
+    let cosine = 20.0_f64.to_radians().cos();
+    assert_close("ambient", parts[0], 0.12);
+    assert_close("diffuse", parts[1], 0.3 / PI * 3.0 * cosine);
+    assert_close(
+        "specular",
+        parts[2],
+        0.5 * 22.0 / (2.0 * PI) * 15.0_f64.to_radians().cos().powi(20) * 3.0 * cosine,
+    );
+    assert_close("emitted", emitted, 0.25);
+    assert_close("the picture", view(View::Beauty), parts.iter().sum::<f64>() + emitted);
+    // From behind there is neither light nor emission, but ambient light.
+    let behind = lit.seen(v(0.5, -2.0, 0.3), DVec3::ZERO);
+    assert_close("from behind", behind.value(), 0.12);
+}
+
+#[test]
+fn ambient_light_defaults_to_the_diffuse_colour() {
+    let dark = scene()
+        .sphere(v(0.0, 0.0, -5.0), 1.0, phong(0.35, 0.1, 3.0, 0.0))
+        .with(|scene| scene.render.ambient = Vec3::new(0.5, 1.0, 2.0));
+    let color = dark.color();
+    for (channel, exact) in [0.175, 0.35, 0.7].into_iter().enumerate() {
+        assert_close("ambient", color[channel], exact);
+    }
+}
+
+#[test]
+fn emission_is_seen_from_the_front_only_and_at_any_depth() {
+    let square = |from| {
+        scene()
+            .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), emitter(3.0))
+            .depth(0)
+            .background(0.5)
+            .seen(from, DVec3::ZERO)
+    };
+    assert_eq!(square(v(0.3, 2.0, 0.1)).value(), 3.0);
+    assert_eq!(square(v(0.3, -2.0, 0.1)).value(), 0.0);
+    assert_eq!(square(v(0.3, 2.0, 0.1)).seen(v(5.0, 1.0, 0.0), v(5.0, 0.0, 0.0)).value(), 0.5);
+}
+
+const RED: Vec3 = Vec3::new(1.0, 0.0, 0.0);
+const GREEN: Vec3 = Vec3::new(0.0, 1.0, 0.0);
+const BLUE: Vec3 = Vec3::new(0.0, 0.0, 1.0);
+const GREY: Vec3 = Vec3::new(0.5, 0.5, 0.5);
+
+/// Whose diffuse colour, by ambient light 1, is the picture
+/// red green
+/// blue grey.
+fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, MaterialKind) {
+    let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
+    let texture = build.texture(&[&[RED, GREEN], &[BLUE, GREY]], filter, wrap, repeat);
+    let mut kind = phong(0.0, 0.0, 1.0, 0.0);
+    if let MaterialKind::Phong { diffuse, .. } = &mut kind {
+        *diffuse = ColorSource::Texture(texture);
+    }
+    (build, kind)
+}
+
+#[test]
+fn a_picture_on_a_quad_stands_on_its_v_axis() {
+    let at = |filter, wrap, repeat, (s, t): (f64, f64)| {
+        let (build, kind) = pictured(filter, wrap, repeat);
+        let (corner, u, w) = (v(-1.0, -2.0, -5.0), v(3.0, 0.5, 0.0), v(-0.5, 4.0, 1.0));
+        let point = corner + u * s + w * t;
+        build.quad(corner, u, w, kind).seen(v(0.2, 0.1, 1.0), point).color().as_vec3()
+    };
+    let nearest = |place| at(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE, place);
+    assert_eq!(nearest((0.2, 0.1)), BLUE);
+    assert_eq!(nearest((0.9, 0.4)), GREY);
+    assert_eq!(nearest((0.1, 0.6)), RED);
+    assert_eq!(nearest((0.6, 0.9)), GREEN);
+    // Three tiles across, two up: (.2, .1)·(3, 2) = (.6, .2), (.5, .85)·(3, 2) = (1.5, 1.7) → (.5, .7).
+    let tiled = |place| at(TextureFilter::Nearest, Wrap::Repeat, Vec2::new(3.0, 2.0), place);
+    assert_eq!(tiled((0.2, 0.1)), GREY);
+    assert_eq!(tiled((0.52, 0.85)), GREEN);
+    // Mirrored, the second tile runs backwards: 1.56 → .44 and 1.7 → .3; clamped both are 1.
+    let place = (0.52, 0.85);
+    assert_eq!(at(TextureFilter::Nearest, Wrap::Mirror, Vec2::new(3.0, 2.0), place), BLUE);
+    assert_eq!(at(TextureFilter::Nearest, Wrap::Clamp, Vec2::new(3.0, 2.0), place), GREEN);
+    // Bilinear in the middle is the mean of all; at a texel's centre the texel.
+    let smooth = |place| at(TextureFilter::Bilinear, Wrap::Clamp, Vec2::ONE, place);
+    let mean = (RED + GREEN + BLUE + GREY) / 4.0;
+    assert!((smooth((0.5, 0.5)) - mean).length() < 1e-5);
+    assert!((smooth((0.25, 0.25)) - BLUE).length() < 1e-5);
+    assert!((smooth((0.5, 0.75)) - (RED + GREEN) / 2.0).length() < 1e-5);
+}
+
+#[test]
+fn the_border_belongs_to_the_row_and_column_that_begin_there() {
+    // u = 0 is in the left column, v = 0 in the bottom row: texels are half-open intervals from 0 on.
+    let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
+    let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
+    let world = square.world();
+    let Material::Phong(phong) = &world.materials[0] else { panic!("a phong material") };
+    let at = |u, w| phong.diffuse.at(Vec2::new(u, w), &mut 0);
+    assert_eq!([at(0.0, 0.0), at(0.5, 0.0), at(0.0, 0.5), at(0.5, 0.5)], [BLUE, GREY, RED, GREEN]);
+}
+
+#[test]
+fn a_sphere_s_coordinates() {
+    // u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π: (1, 1, 1)/√3 is at (.625, .6959133).
+    let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
+    let center = v(3.0, -1.0, 2.0);
+    let ball = build.sphere(center, 2.0, kind);
+    let from = |direction: DVec3| ball.clone().seen(center + direction * 6.0, center);
+    for direction in [v(1.0, 1.0, 1.0), v(-1.0, 0.3, 0.2), v(0.2, -0.9, -0.5), v(-0.7, 0.1, -0.9)] {
+        let n = direction.normalize();
+        let (u, w) = (0.5 + n.z.atan2(n.x) / (2.0 * PI), 0.5 + n.y.asin() / PI);
+        let uv = from(n).viewed(View::Uv).color();
+        assert_close("u", uv.x, u);
+        assert_close("v", uv.y, w);
+        let color = match (u < 0.5, w < 0.5) {
+            (true, true) => BLUE,
+            (false, true) => GREY,
+            (true, false) => RED,
+            (false, false) => GREEN,
+        };
+        assert_eq!(from(n).color().as_vec3(), color);
+    }
+    let known = from(DVec3::ONE.normalize()).viewed(View::Uv).color();
+    assert_close("u", known.x, 0.625);
+    assert_close("v", known.y, 0.695_913_3);
+}

@@ -1,0 +1,68 @@
+//! How the program ends, and what it leaves.
+
+use nix::sys::signal::Signal;
+
+use super::pty::{Folder, SCENE};
+
+#[test]
+fn keys_and_signals_end_it_and_the_terminal_is_given_back() {
+    let folder = Folder::new();
+    for (key, code) in [("q", 0), ("\x03", 130)] {
+        let mut terminal = folder.terminal();
+        terminal.wait_for_color("red");
+        terminal.press(key);
+        assert_eq!(terminal.end(), code, "{key:?}");
+    }
+    for (signal, code) in [(Signal::SIGTERM, 143), (Signal::SIGINT, 130), (Signal::SIGHUP, 129)] {
+        let terminal = folder.terminal();
+        terminal.wait_for_color("red");
+        terminal.signal(signal);
+        assert_eq!(terminal.end(), code, "{signal}");
+    }
+}
+
+#[test]
+fn it_ends_in_the_middle_of_a_render_and_leaves_the_last_picture() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let before = folder.bytes("scene.png");
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    terminal.wait_for("rendering");
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+    assert_eq!(folder.bytes("scene.png"), before);
+}
+
+#[test]
+fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal_with(&["/bin/sh", "-i"], &[("PS1", "shell> ")]);
+    terminal.wait_for("shell> ");
+    terminal.press(&format!("{} scene.toml\n", folder.program()));
+    terminal.wait_for_color("red");
+    terminal.press("\x1a");
+    terminal.wait("the shell", |screen| {
+        let is_asked = screen.contents().trim_end().ends_with("shell>");
+        !screen.alternate_screen() && !screen.hide_cursor() && is_asked
+    });
+    // The shell answers, so that the terminal's modes are its own; the sum is not in what was typed.
+    terminal.press("echo $((40 + 2))th\n");
+    terminal.wait_for("42th");
+    terminal.press("fg\n");
+    terminal.wait("the picture", |screen| screen.alternate_screen());
+    terminal.wait_for_color("red");
+    terminal.press("q");
+    terminal.wait("the shell", |screen| !screen.alternate_screen());
+    terminal.press("exit\n");
+    assert_eq!(terminal.end(), 0);
+}
+
+#[test]
+fn ctrl_z_without_a_shell_says_so() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_color("red");
+    terminal.press("\x1a");
+    terminal.wait_for("no shell to go back to");
+}

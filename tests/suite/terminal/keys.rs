@@ -1,0 +1,152 @@
+//! What each key does, as seen on the screen and on disk.
+
+use std::fs;
+
+use super::pty::{Folder, SCENE, cells};
+
+const ESCAPE: &str = "\x1b";
+const PAGE_UP: &str = "\x1b[5~";
+const PAGE_DOWN: &str = "\x1b[6~";
+const UP: &str = "\x1b[A";
+const DOWN: &str = "\x1b[B";
+
+#[test]
+fn settings_change_and_go_back() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let own = folder.bytes("scene.png");
+    let mut renders = 1;
+    for (key, words, options) in [
+        ("s", "shadows hard", ["--shadows", "hard"]),
+        ("s", "shadows off", ["--shadows", "off"]),
+        ("s", "shadows soft", ["--shadows", "soft"]),
+        ("d", "dof off", ["--dof", "off"]),
+        ("d", "dof on", ["--dof", "on"]),
+    ] {
+        terminal.press(key);
+        renders += 1;
+        terminal.wait_for_render(renders);
+        terminal.wait_for(words);
+        let expected = folder.once(&options);
+        assert_eq!(folder.bytes("scene.png"), expected, "{words}");
+        let is_own = matches!(words, "shadows soft" | "dof on");
+        assert_eq!(expected == own, is_own, "{words} shows");
+    }
+    terminal.press("s");
+    terminal.wait_for_render(renders + 1);
+    terminal.press("0");
+    terminal.wait_for_render(renders + 2);
+    terminal.wait_for("back to the scene's own settings");
+    terminal.wait_for("shadows soft");
+    assert_eq!(folder.bytes("scene.png"), own);
+    terminal.press("0");
+    terminal.wait_for("the keys have changed nothing");
+    terminal.press("p");
+    terminal.wait_for("photons come with a later version");
+    terminal.press("r");
+    terminal.wait_for_render(renders + 3);
+    assert_eq!(folder.bytes("scene.png"), own);
+}
+
+#[test]
+fn views_are_shown_as_they_are_and_written_when_asked() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let beauty = folder.bytes("scene.png");
+
+    terminal.press("v");
+    terminal.wait_for("view normal: shown, not written");
+    terminal.wait_for_render(2);
+    // The board faces the eye: (0, 0, 1) is shown as (n + 1)/2, without a curve.
+    let board = vt100::Color::Rgb(128, 128, 255);
+    terminal.wait("normals", |screen| cells(screen).filter(|cell| cell.fgcolor() == board).count() > 100);
+    assert_eq!(folder.bytes("scene.png"), beauty);
+    terminal.press("w");
+    terminal.wait_for("wrote scene.png");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "normal"]));
+
+    for (number, view) in ["depth", "barycentric", "uv", "albedo", "ambient", "diffuse", "specular", "shadow"]
+        .iter()
+        .enumerate()
+    {
+        terminal.press("v");
+        terminal.wait_for(&format!("· view {view} "));
+        terminal.wait_for_render(3 + number);
+    }
+    terminal.press("V");
+    terminal.wait_for("· view specular ");
+    terminal.wait_for_render(11);
+    terminal.press("vv");
+    terminal.wait_for("· view beauty ");
+    terminal.wait_for("done");
+    terminal.wait("the picture on disk again", |_| {
+        fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == beauty)
+    });
+}
+
+#[test]
+fn a_render_is_held_and_goes_on_and_is_written_meanwhile() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    let mut terminal = folder.terminal();
+    terminal.wait_for_color("red");
+    terminal.wait_for("ETA");
+    terminal.press(" ");
+    terminal.wait("a held render", |screen| {
+        let text = screen.contents();
+        text.lines().next().is_some_and(|line| line.ends_with("paused")) && !text.contains("ETA")
+    });
+    terminal.press("w");
+    terminal.wait_for("wrote scene.png");
+    assert!(folder.path("scene.png").is_file());
+    terminal.press(" ");
+    terminal.wait_for("ETA");
+    fs::remove_file(folder.path("scene.png")).expect("removed");
+    terminal.press("w");
+    terminal.wait("the picture on disk", |_| folder.path("scene.png").is_file());
+    folder.write("scene.toml", SCENE);
+    terminal.wait_for_render(1);
+    terminal.press(" ");
+    terminal.wait_for("nothing is rendering");
+    fs::remove_file(folder.path("scene.png")).expect("removed");
+    terminal.press("w");
+    terminal.wait_for("wrote scene.png");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
+}
+
+#[test]
+fn help_and_errors_open_scroll_and_close() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let gone = |text: &'static str| move |screen: &vt100::Screen| !screen.contents().contains(text);
+    terminal.press("?");
+    terminal.wait_for("show or hide this help");
+    terminal.press("?");
+    terminal.wait("no help", gone("show or hide this help"));
+    terminal.press("?");
+    terminal.wait_for("show or hide this help");
+    terminal.press(ESCAPE);
+    terminal.wait("no help", gone("show or hide this help"));
+    terminal.press("e");
+    terminal.wait_for("no errors and no warnings");
+
+    folder.write("scene.toml", &SCENE.replace("[0", "[\"0\"").replace("radius =", "radios ="));
+    terminal.wait_for("errors · the last good picture stays");
+    terminal.wait_for("lines 1-");
+    for (forth, back) in [(PAGE_DOWN, PAGE_UP), (DOWN, UP)] {
+        terminal.press(forth);
+        terminal.wait("the next page", gone("lines 1-"));
+        terminal.press(back);
+        terminal.wait_for("lines 1-");
+    }
+    terminal.press("e");
+    terminal.wait("no errors in sight", gone("lines 1-"));
+    terminal.press("e");
+    terminal.wait_for("lines 1-");
+    terminal.press(ESCAPE);
+    terminal.wait("no errors in sight", gone("lines 1-"));
+    terminal.wait_for("broken");
+}

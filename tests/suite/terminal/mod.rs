@@ -1,0 +1,163 @@
+//! The live program in a pseudo-terminal, as a person sees it.
+
+mod endings;
+mod keys;
+mod pty;
+
+use std::fs;
+
+use pty::{BLUE, Colors, Folder, GREEN, RED, SCENE, cells};
+
+#[test]
+fn the_picture_appears_and_is_the_one_that_is_written() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_color("red");
+    terminal.wait_for_render(1);
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
+}
+
+#[test]
+fn every_way_of_saving_gives_one_render_and_its_picture() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let path = folder.path("scene.toml");
+
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    terminal.wait_for_color("green");
+    terminal.wait_for_render(2);
+
+    folder.write(".scene.tmp", &SCENE.replace(RED, BLUE));
+    fs::rename(folder.path(".scene.tmp"), &path).expect("renamed");
+    terminal.wait_for_color("blue");
+    terminal.wait_for_render(3);
+
+    // As vim does it: the old file becomes the backup, a new one is written, the backup goes.
+    fs::rename(&path, folder.path("scene.toml~")).expect("renamed");
+    folder.write("scene.toml", SCENE);
+    fs::remove_file(folder.path("scene.toml~")).expect("removed");
+    terminal.wait_for_color("red");
+    terminal.wait_for_render(4);
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
+
+    // A save of what is there already, and a file beside it, are no reason to render.
+    folder.write("scene.toml", SCENE);
+    folder.write("notes.txt", "nothing");
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    terminal.wait_for_color("green");
+    terminal.wait_for_render(5);
+}
+
+#[test]
+fn after_many_fast_saves_the_last_one_is_shown_and_written() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    for i in 0..40 {
+        folder.write("scene.toml", &SCENE.replace(RED, [RED, GREEN][i % 2]));
+    }
+    folder.write("scene.toml", &SCENE.replace(RED, BLUE));
+    terminal.wait_for_color("blue");
+    let expected = folder.once(&[]);
+    terminal.wait("the last picture on disk", |_| {
+        fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == expected)
+    });
+}
+
+#[test]
+fn a_broken_file_shows_the_place_and_the_picture_stays() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let before = (folder.bytes("scene.png"), modified(&folder));
+
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
+    terminal.wait_for("scene.toml:4:11");
+    terminal.wait_for("broken");
+    let colors = terminal.look(Colors::of);
+    assert!(colors.red > 100 && colors.green + colors.blue == 0, "{colors:?}");
+    assert_eq!((folder.bytes("scene.png"), modified(&folder)), before);
+
+    folder.write("scene.toml", SCENE);
+    terminal.wait("no error", |screen| !screen.contents().contains("error"));
+    terminal.wait_for("done");
+    assert_eq!((folder.bytes("scene.png"), modified(&folder)), before, "nothing changed after all");
+
+    folder.write("scene.toml", "[render");
+    terminal.wait_for("scene.toml:1:");
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    terminal.wait_for_color("green");
+    terminal.wait_for_render(2);
+}
+
+fn modified(folder: &Folder) -> std::time::SystemTime {
+    let metadata = fs::metadata(folder.path("scene.png")).expect("a picture");
+    metadata.modified().expect("a time")
+}
+
+#[test]
+fn a_scene_that_goes_and_comes_back_is_shown_again() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    fs::remove_file(folder.path("scene.toml")).expect("removed");
+    terminal.wait_for("broken");
+    folder.write("scene.toml", &SCENE.replace(RED, BLUE));
+    terminal.wait_for_color("blue");
+    terminal.wait_for_render(2);
+}
+
+#[test]
+fn an_asset_that_changes_is_a_reason_to_render() {
+    let folder = Folder::new();
+    let texture = "[textures.paint]\nfile = \"paint.ppm\"\n";
+    let scene = SCENE
+        .replace(RED, "{ texture = \"paint\" }")
+        .replace("[materials]", &format!("{texture}[materials]"));
+    folder.write("scene.toml", &scene);
+    folder.write("paint.ppm", "P3\n1 1\n255\n230 20 20\n");
+    let terminal = folder.terminal();
+    terminal.wait_for_color("red");
+    terminal.wait_for_render(1);
+    folder.write("paint.ppm", "P3\n1 1\n255\n20 20 230\n");
+    terminal.wait_for_color("blue");
+    terminal.wait_for_render(2);
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
+}
+
+#[test]
+fn the_picture_follows_the_size_of_the_window() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let small = terminal.look(Colors::of).red;
+    terminal.resize(200, 60);
+    let is_at = |screen: &vt100::Screen, row: usize| {
+        screen.contents().lines().nth(row).is_some_and(|line| line.starts_with("q quit"))
+    };
+    terminal.wait("a large picture", |screen| is_at(screen, 59) && Colors::of(screen).red > 3 * small);
+    terminal.resize(60, 10);
+    terminal.wait("a small picture", |screen| {
+        let red = Colors::of(screen).red;
+        is_at(screen, 9) && (1..small).contains(&red) && screen.contents().contains("stages hidden")
+    });
+    terminal.resize(80, 24);
+    terminal.wait("the picture as at first", |screen| is_at(screen, 23) && Colors::of(screen).red == small);
+}
+
+#[test]
+fn without_colours_the_picture_is_made_of_characters() {
+    let folder = Folder::new();
+    let terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
+    let is_ink = |cell: &vt100::Cell| "=+*#%@".contains(cell.contents()) && cell.has_contents();
+    terminal.wait("a picture", |screen| cells(screen).filter(|cell| is_ink(cell)).count() > 100);
+    terminal.wait_for("done");
+    terminal.look(|screen| {
+        for cell in cells(screen) {
+            assert_ne!(cell.contents(), "▀");
+            let colors = (cell.fgcolor(), cell.bgcolor());
+            assert_eq!(colors, (vt100::Color::Default, vt100::Color::Default), "{:?}", cell.contents());
+        }
+    });
+}

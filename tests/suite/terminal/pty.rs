@@ -1,0 +1,281 @@
+//! A person's terminal: the program inside, what is on its screen, keys.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::num::NonZeroU16;
+use std::path::{Path, PathBuf};
+use std::process::Command as Process;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::sys::termios::LocalFlags;
+use nix::unistd::Pid;
+use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
+
+/// Nothing takes this long, on however busy a machine.
+const LIMIT: Duration = Duration::from_secs(60);
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_glimt");
+
+/// A picture of a red board with a ball in front of it, under a lamp.
+pub const SCENE: &str = r#"[render]
+width = 64
+height = 48
+samples = 4
+ambient = [0.5, 0.5, 0.5]
+
+[camera]
+position = [0, 0, 4]
+look_at = [0, 0, 0]
+aperture = 0.2
+focus = 4.0
+
+[materials]
+board = { diffuse = [0.8, 0.02, 0.02] }
+ball = { diffuse = [0.02, 0.02, 0.02] }
+lamp = { diffuse = [0, 0, 0], emission = [20, 20, 20] }
+
+[[quad]]
+corner = [-1, -1, 0]
+u = [2, 0, 0]
+v = [0, 2, 0]
+material = "board"
+
+[[sphere]]
+center = [0.5, 0.2, 0.8]
+radius = 0.2
+material = "ball"
+
+[[sphere]]
+center = [2, 2, 5]
+radius = 0.6
+material = "lamp"
+"#;
+
+pub const RED: &str = "[0.8, 0.02, 0.02]";
+pub const GREEN: &str = "[0.02, 0.8, 0.02]";
+pub const BLUE: &str = "[0.02, 0.02, 0.8]";
+
+/// A scratch folder with the scene in it.
+pub struct Folder(tempfile::TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        let folder = Self(tempfile::tempdir().expect("a scratch folder"));
+        folder.write("scene.toml", SCENE);
+        folder
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Writes in place: truncates first.
+    pub fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("written");
+    }
+
+    pub fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).expect(name)
+    }
+
+    /// The bytes of the picture that a headless run makes of the scene as it is.
+    pub fn once(&self, options: &[&str]) -> Vec<u8> {
+        let mut process = Process::new(PROGRAM);
+        process.current_dir(self.0.path()).args(["scene.toml", "--once", "-o", "once.png"]).args(options);
+        let output = process.output().expect("it runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        self.bytes("once.png")
+    }
+
+    /// The program at work on the scene, in a terminal of 80×24 cells.
+    pub fn terminal(&self) -> Terminal {
+        self.terminal_with(&[PROGRAM, "scene.toml"], &[])
+    }
+
+    pub fn terminal_with(&self, command: &[&str], variables: &[(&str, &str)]) -> Terminal {
+        Terminal::open(command, variables, self.0.path())
+    }
+
+    pub fn program(&self) -> &'static str {
+        PROGRAM
+    }
+}
+
+/// A terminal with a program inside.
+pub struct Terminal {
+    master: Box<dyn MasterPty + Send>,
+    // Held so that the terminal's modes can be looked at when the program is gone.
+    _slave: Box<dyn SlavePty + Send>,
+    child: Box<dyn Child + Send + Sync>,
+    keys: Box<dyn Write + Send>,
+    screen: Arc<Mutex<vt100::Parser>>,
+}
+
+impl Terminal {
+    fn open(command: &[&str], variables: &[(&str, &str)], folder: &Path) -> Self {
+        let size = size(80, 24);
+        let pair = native_pty_system().openpty(size).expect("a pseudo-terminal");
+        let mut builder = CommandBuilder::new(command[0]);
+        builder.args(&command[1..]);
+        builder.cwd(folder);
+        for name in ["NO_COLOR", "TMUX", "TERM_PROGRAM", "ENV"] {
+            builder.env_remove(name);
+        }
+        builder.env("TERM", "xterm-256color");
+        builder.env("COLORTERM", "truecolor");
+        for (name, value) in variables {
+            builder.env(name, value);
+        }
+        let child = pair.slave.spawn_command(builder).expect("the program starts");
+        let mut output = pair.master.try_clone_reader().expect("a reader");
+        let screen = Arc::new(Mutex::new(vt100::Parser::new(side(size.rows), side(size.cols), 0)));
+        let shared = screen.clone();
+        std::thread::spawn(move || {
+            let mut bytes = [0; 1 << 16];
+            while let Ok(count @ 1..) = output.read(&mut bytes) {
+                shared.lock().expect("a parser does not panic").process(&bytes[..count]);
+            }
+        });
+        let keys = pair.master.take_writer().expect("a writer");
+        Self { master: pair.master, _slave: pair.slave, child, keys, screen }
+    }
+
+    pub fn press(&mut self, keys: &str) {
+        self.keys.write_all(keys.as_bytes()).expect("keys are taken");
+    }
+
+    pub fn resize(&mut self, columns: u16, rows: u16) {
+        let mut screen = self.screen.lock().expect("a parser does not panic");
+        screen.screen_mut().set_size(side(rows), side(columns));
+        self.master.resize(size(columns, rows)).expect("resized");
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        let id = self.child.process_id().expect("an id");
+        kill(Pid::from_raw(i32::try_from(id).expect("a process id")), signal).expect("sent");
+    }
+
+    /// What is on the screen.
+    pub fn text(&self) -> String {
+        self.look(|screen| screen.contents())
+    }
+
+    pub fn look<T>(&self, what: impl FnOnce(&vt100::Screen) -> T) -> T {
+        what(self.screen.lock().expect("a parser does not panic").screen())
+    }
+
+    /// Waits until the screen is as told.
+    #[track_caller]
+    pub fn wait(&self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) {
+        let deadline = Instant::now() + LIMIT;
+        while !self.look(&holds) {
+            assert!(Instant::now() < deadline, "not seen: {what}\n{}", self.text());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    #[track_caller]
+    pub fn wait_for(&self, text: &str) {
+        self.wait(text, |screen| screen.contents().contains(text));
+    }
+
+    /// Waits until this many renders are finished and no other is under way.
+    #[track_caller]
+    pub fn wait_for_render(&self, number: usize) {
+        let words = format!("· render {number}");
+        self.wait(&words, |screen| {
+            let text = screen.contents();
+            let is_done = text.lines().next().is_some_and(|line| line.trim_end().ends_with("done"));
+            is_done && text.lines().any(|line| line.trim_end().ends_with(&words))
+        });
+    }
+
+    /// Waits for the picture to be of this colour.
+    #[track_caller]
+    pub fn wait_for_color(&self, name: &str) {
+        self.wait(name, |screen| {
+            let counts = Colors::of(screen);
+            counts.most().is_some_and(|most| most == name)
+        });
+    }
+
+    /// Waits for the end; gives the exit code after checking that the terminal is as it was before.
+    #[track_caller]
+    pub fn end(mut self) -> u32 {
+        let deadline = Instant::now() + LIMIT;
+        let status = loop {
+            if let Some(status) = self.child.try_wait().expect("a child") {
+                break status;
+            }
+            assert!(Instant::now() < deadline, "it does not end\n{}", self.text());
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        self.wait("the screen from before, with a cursor", |screen| {
+            !screen.alternate_screen() && !screen.hide_cursor()
+        });
+        let modes = self.master.get_termios().expect("modes").local_flags.bits();
+        for (name, flag) in
+            [("ECHO", LocalFlags::ECHO), ("ICANON", LocalFlags::ICANON), ("ISIG", LocalFlags::ISIG)]
+        {
+            assert_ne!(modes & flag.bits(), 0, "{name} is off");
+        }
+        status.exit_code()
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        // Where a test failed the program is still there; else it is gone already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn size(columns: u16, rows: u16) -> PtySize {
+    PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 }
+}
+
+fn side(length: u16) -> NonZeroU16 {
+    NonZeroU16::new(length).expect("not zero")
+}
+
+/// Cells by the channel that is far above the others.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Colors {
+    pub red: usize,
+    pub green: usize,
+    pub blue: usize,
+}
+
+impl Colors {
+    /// Those of half blocks.
+    pub fn of(screen: &vt100::Screen) -> Self {
+        let mut colors = Self::default();
+        for cell in cells(screen).filter(|cell| cell.contents() == "▀") {
+            let vt100::Color::Rgb(r, g, b) = cell.fgcolor() else { continue };
+            let above = |a: u8, b: u8, c: u8| a > 90 && a / 2 > b.max(c);
+            colors.red += usize::from(above(r, g, b));
+            colors.green += usize::from(above(g, r, b));
+            colors.blue += usize::from(above(b, r, g));
+        }
+        colors
+    }
+
+    pub fn total(&self) -> usize {
+        self.red + self.green + self.blue
+    }
+
+    /// The colour of nearly all of them, if they are enough for a picture.
+    fn most(&self) -> Option<&'static str> {
+        let total = self.total();
+        let all = [(self.red, "red"), (self.green, "green"), (self.blue, "blue")];
+        all.into_iter().find(|(count, _)| total > 100 && count * 10 > total * 9).map(|(_, name)| name)
+    }
+}
+
+pub fn cells(screen: &vt100::Screen) -> impl Iterator<Item = &vt100::Cell> {
+    let (rows, columns) = screen.size();
+    (0..rows.get()).flat_map(move |row| (0..columns.get()).filter_map(move |column| screen.cell(row, column)))
+}
