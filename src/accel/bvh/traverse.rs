@@ -40,10 +40,8 @@ impl Bvh {
                 }
             } else {
                 let node = &self.nodes[current.first as usize];
-                let [left, right] = [0, 1].map(|side| {
-                    let bounds = &node.bounds[side];
-                    slabs.enter(bounds.min, bounds.max, t_max)
-                });
+                let enter = |side: usize| slabs.enter(node.bounds[side].min, node.bounds[side].max, t_max);
+                let (left, right) = (enter(0), enter(1));
                 match (left, right) {
                     (Some(left), Some(right)) => {
                         let (near, far) = if right < left { (1, 0) } else { (0, 1) };
