@@ -7,6 +7,7 @@ use clap::builder::styling::{AnsiColor, Styles};
 use clap::{Parser, ValueEnum};
 
 use crate::film::Rect;
+use crate::scene::description::MOST_SCATTERINGS;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -115,7 +116,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Method")]
     pub integrator: Option<Integrator>,
     /// Scatterings along one path; 0: emitted light only, 1: direct light
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, help_heading = "Method")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = depth, help_heading = "Method")]
     pub max_depth: Option<u32>,
     /// Shadows; hard: one ray to the middle of an area light
     #[arg(long, value_enum, value_name = "HOW", help_heading = "Method")]
@@ -269,6 +270,10 @@ fn side(text: &str) -> Result<u32, String> {
 
 fn samples(text: &str) -> Result<u32, String> {
     whole(text, 1..=u32::MAX)
+}
+
+fn depth(text: &str) -> Result<u32, String> {
+    whole(text, 0..=MOST_SCATTERINGS)
 }
 
 fn any_whole(text: &str) -> Result<u32, String> {

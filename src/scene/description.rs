@@ -38,6 +38,9 @@ pub struct Located<T> {
     pub span: Range<usize>,
 }
 
+/// Most scatterings along one path that a scene may ask for: between perfect mirrors a path ends nowhere else.
+pub const MOST_SCATTERINGS: u32 = 10_000;
+
 /// Settings of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Render {

@@ -208,7 +208,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (3, 9, "`width` must be a whole number between 1 and 65536; found 0"),
             (4, 10, "`height` must be a whole number between 1 and 65536; found 65537"),
             (5, 11, "`samples` must be a whole number between 1 and 4294967295; found 0"),
-            (6, 13, "`max_depth` must be a whole number between 0 and 4294967295; found -1"),
+            (6, 13, "`max_depth` must be a whole number between 0 and 10000; found -1"),
             (7, 12, "`exposure` must be between -100 and 100; found 101"),
             (8, 18, "`shadow_samples` must be a whole number between 1 and 4096; found 5000"),
             (9, 8, "`seed` must be a whole number between 0 and 4294967295; found 4294967296"),

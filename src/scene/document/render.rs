@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::description::{Accel, Integrator, PixelFilter, Render, Shadows, Tonemap};
+use super::super::description::{Accel, Integrator, MOST_SCATTERINGS, PixelFilter, Render, Shadows, Tonemap};
 use super::context::Issue;
 use super::limits::Limits;
 use super::table::Table;
@@ -45,7 +45,7 @@ pub(super) fn read(root: &Table<'_>) -> Option<Render> {
         height: key("height").whole(1..=MAX_SIDE).unwrap_or(default.height),
         samples: key("samples").whole(1..=MAX_U32).unwrap_or(default.samples),
         shadow_samples: key("shadow_samples").whole(1..=4096).unwrap_or(default.shadow_samples),
-        max_depth: key("max_depth").whole(0..=MAX_U32).unwrap_or(default.max_depth),
+        max_depth: key("max_depth").whole(0..=i128::from(MOST_SCATTERINGS)).unwrap_or(default.max_depth),
         integrator: key("integrator").choice(&INTEGRATORS, &["path"]).unwrap_or(default.integrator),
         shadows: key("shadows").choice(&SHADOWS, &[]).unwrap_or(default.shadows),
         ambient: key("ambient").color().unwrap_or(default.ambient),
