@@ -85,7 +85,8 @@ impl Tracer<'_> {
                 stopped.fetch_or(!go_on, Ordering::Relaxed);
             }
         });
-        self.token.check()
+        // Not `check`, which would wait here while the work is held, deaf to orders.
+        if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 }
 

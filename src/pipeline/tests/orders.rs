@@ -155,6 +155,43 @@ fn write_during_a_render_writes_what_there_is() {
     while !matches!(bench.next(), Event::Written { .. }) {}
 }
 
+static HELD: AtomicBool = AtomicBool::new(false);
+
+/// Holds the work when the tiles of a pass are done, and at no other time.
+fn held_between_passes(
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    token.check()?;
+    let first = samples.start == 0;
+    let done = KERNEL(world, settings, tile, samples, &CancelToken::new());
+    if first {
+        // Long enough for every tile of the pass to be begun.
+        std::thread::sleep(Duration::from_millis(50));
+        token.set_paused(true);
+        HELD.store(true, Ordering::SeqCst);
+    }
+    done
+}
+
+#[test]
+fn write_is_heard_while_the_render_is_held_between_two_passes() {
+    let mut bench = Bench::with(SCENE, held_between_passes);
+    let of = bench.send();
+    while !HELD.load(Ordering::SeqCst) {
+        std::thread::yield_now();
+    }
+    // Time for the pass to end.
+    std::thread::sleep(Duration::from_millis(200));
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::Written { .. }) {}
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+}
+
 #[test]
 fn a_picture_that_is_on_disk_is_written_when_asked() {
     let mut bench = Bench::new(SCENE);

@@ -188,7 +188,9 @@ impl Terminal {
         self.wait(&words, |screen| {
             let text = screen.contents();
             let is_done = text.lines().next().is_some_and(|line| line.trim_end().ends_with("done"));
-            is_done && text.lines().any(|line| line.trim_end().ends_with(&words))
+            // Frames arrive in pieces, from the top: the bar below the picture says that all of it is there.
+            let is_whole = text.contains("· total ");
+            is_done && is_whole && text.lines().any(|line| line.trim_end().ends_with(&words))
         });
     }
 
