@@ -190,7 +190,7 @@ fn wrong_values_are_answered_with_what_is_expected() {
         ("--width 0", "expected a whole number from 1 to 65536"),
         ("--height 65537", "expected a whole number from 1 to 65536"),
         ("--seed -1", "expected a whole number from 0 to 4294967295"),
-        ("--max-depth 1.5", "expected a whole number from 0 to 4294967295"),
+        ("--max-depth 1.5", "expected a whole number from 0 to 10000"),
         ("--time -3", "expected a number of seconds above 0"),
         ("--time nan", "expected a number of seconds above 0"),
         ("--threads -2", "expected a number from 0 to 4096"),
