@@ -10,7 +10,7 @@
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
-//! | [`accel`] | trees over boxes and ids; a closure tests the shape |
+//! | [`accel`] | trees over boxes and ids, a closure tests the shape; over triangles, by vector instructions |
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | phong, mirror, glass; texture lookup, normal maps, Fresnel |
 //! | [`lights`] | point and area lights |
@@ -55,6 +55,7 @@
 //! - Rays travel in batches; a hit carries a bound on its error; no epsilon constants.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
 //! - Files are touched in `assets`, `output`, `scene` (the scene itself) and `pipeline::watch` alone.
+//! - `unsafe` code is in `accel::wide_bvh::simd` alone, with a portable twin that gives the same bits.
 //! - `tui` does not know `world`; `world` does not know pixels or time.
 
 pub mod accel;
