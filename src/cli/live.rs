@@ -12,7 +12,7 @@ use super::report;
 use crate::pipeline::protocol::Event;
 use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
-use crate::tui::{self, Changed, ColorChoice, Options, PreviewChoice};
+use crate::tui::{self, Changed, ColorChoice, Options, PreviewChoice, TuiError};
 
 /// How long a file that is being written may take at the end.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -20,12 +20,12 @@ const PATIENCE: Duration = Duration::from_secs(2);
 pub(super) fn run(order: Order, console: &Console) -> Exit {
     match live(order) {
         Ok(exit) => exit,
-        Err(message) => console.fail(Exit::FAILED, &message),
+        Err((exit, message)) => console.fail(exit, &message),
     }
 }
 
-fn live(order: Order) -> Result<Exit, String> {
-    let no_thread = |error| format!("cannot start a thread: {error}");
+fn live(order: Order) -> Result<Exit, (Exit, String)> {
+    let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
     let mut worker = start().map_err(no_thread)?;
     let (sender, changes) = channel();
     let watcher = Watcher::start(order.poll, move |changed| {
@@ -51,7 +51,10 @@ fn live(order: Order) -> Result<Exit, String> {
         changes,
     });
     worker.finish(PATIENCE);
-    outcome.map(|status| Exit(status.0)).map_err(|error| error.to_string())
+    outcome.map(|status| Exit(status.0)).map_err(|error| {
+        let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
+        (exit, error.to_string())
+    })
 }
 
 /// Hand events on, and see to files and reports on the way.

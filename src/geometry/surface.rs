@@ -31,6 +31,8 @@ pub struct SurfacePoint {
     pub error: Vec3,
     /// Unit geometric normal of the front side.
     pub normal: Vec3,
+    /// Where shadow rays start on the side of the eye: the point, or above it where facets stand for a surface that bulges.
+    pub shadow_point: Vec3,
     /// Unit interpolated normal on the same side.
     pub shading_normal: Vec3,
     /// Texture coordinates.
@@ -52,6 +54,7 @@ impl SurfacePoint {
         let point = point.as_vec3();
         Self {
             point,
+            shadow_point: point,
             error: rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32),
             normal,
             shading_normal: normal,

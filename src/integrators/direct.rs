@@ -19,7 +19,9 @@ pub(super) struct PhongVertex<'a> {
     bsdf: PhongBsdf,
     /// Geometric normal on the eye's side.
     normal: Vec3,
-    /// Shading normal on the eye's side.
+    /// Interpolated normal on the same side.
+    smooth_normal: Vec3,
+    /// Shading normal on the same side: the interpolated one, bent by a normal map.
     shading_normal: Vec3,
     to_eye: Vec3,
 }
@@ -38,19 +40,20 @@ impl<'a> PhongVertex<'a> {
             surface,
             bsdf,
             normal: surface.normal * side,
+            smooth_normal: surface.shading_normal * side,
             shading_normal: shading_normal * side,
             to_eye,
         }
     }
 
-    /// What a sample of a light brings unoccluded; 0 where the light is behind the surface or its shading.
+    /// What a sample of a light brings unoccluded; 0 where the light is behind the smooth surface or its bent normal.
     fn reflected(&self, sample: &LightSample, view: View) -> Vec3 {
         let cosine = self.shading_normal.dot(sample.direction);
-        let geometric = self.normal.dot(sample.direction);
-        if !(cosine > 0.0 && geometric > 0.0) {
+        let smooth = self.smooth_normal.dot(sample.direction);
+        if !(cosine > 0.0 && smooth > 0.0) {
             return Vec3::ZERO;
         }
-        let arriving = sample.weight * (cosine * self.terminator(cosine, geometric));
+        let arriving = sample.weight * (cosine * self.terminator(cosine, smooth));
         let specular = || self.bsdf.specular_value(self.shading_normal, self.to_eye, sample.direction);
         match view {
             View::Diffuse => arriving * self.bsdf.diffuse_value(),
@@ -60,16 +63,16 @@ impl<'a> PhongVertex<'a> {
         }
     }
 
-    /// Softens the edge of the shadow that the facets of a smooth-shaded surface throw on themselves; 1 where the two
-    /// normals are one (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
-    fn terminator(&self, cosine: f32, geometric: f32) -> f32 {
-        let between = self.normal.dot(self.shading_normal);
-        let g = (geometric / (cosine * between)).min(1.0);
+    /// Softens the edge where bent normals leave the light of the surface that they are on; 1 where nothing bends them
+    /// (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+    fn terminator(&self, cosine: f32, smooth: f32) -> f32 {
+        let between = self.smooth_normal.dot(self.shading_normal);
+        let g = (smooth / (cosine * between)).min(1.0);
         if !(between > 0.0) { 1.0 } else { -g * g * g + g * g + g }
     }
 
     fn shadow_origin(&self) -> Vec3 {
-        offset_origin(self.surface.point, self.surface.error, self.normal, self.normal)
+        offset_origin(self.surface.shadow_point, self.surface.error, self.normal, self.normal)
     }
 }
 

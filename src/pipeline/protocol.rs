@@ -251,7 +251,7 @@ pub struct RenderProgress {
     pub elapsed_seconds: f64,
     /// Seconds still to go, from the work done; none until it can be told.
     pub eta_seconds: Option<f64>,
-    /// Samples per pixel of the passes that are complete.
+    /// Samples per pixel so far, on average.
     pub samples: u32,
     /// Samples per pixel asked for.
     pub total_samples: u32,

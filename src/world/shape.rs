@@ -70,7 +70,7 @@ impl Shape {
             Self::Plane(plane) => plane.surface(&ray, hit),
             Self::Box(cuboid) => cuboid.surface(&ray, hit),
             Self::Triangle(triangle) => triangle.surface(hit),
-            Self::Mesh(mesh) => mesh.surface(hit),
+            Self::Mesh(mesh) => mesh.surface(&ray, hit),
         }
     }
 
@@ -127,7 +127,7 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
-    fn surface(&self, hit: &ShapeHit) -> SurfacePoint {
+    fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
@@ -140,6 +140,7 @@ impl MeshInstance {
         let (uv, dpdu, dpdv) = self.parametrisation(vertices, barycentric, ab, ac);
         SurfacePoint {
             point,
+            shadow_point: self.shadow_point(vertices, barycentric, normal, local, ray.direction),
             error: self.error(point, local),
             normal,
             shading_normal: self.shading_normal(vertices, barycentric, normal),
@@ -174,6 +175,33 @@ impl MeshInstance {
             Some(bent) => bent,
             None => normal,
         }
+    }
+
+    /// The point, lifted towards the eye to the tangent planes of the vertices where those are above it, so that the
+    /// facets of a smooth-shaded surface do not shadow what its normals say is lit (Hanika, *Hacking the Shadow
+    /// Terminator*, Ray Tracing Gems II, chapter 4).
+    fn shadow_point(
+        &self,
+        vertices: [usize; 3],
+        barycentric: Vec3,
+        normal: Vec3,
+        local: DVec3,
+        direction: DVec3,
+    ) -> Vec3 {
+        let point = self.transform.point(local);
+        if !self.smooth {
+            return point.as_vec3();
+        }
+        let (normal, normals) = (normal.as_dvec3(), self.tree.normals());
+        let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        let lift = |(vertex, weight): (usize, f32)| {
+            let own = self.transform.normal(normals[vertex].as_dvec3()).normalize_or_zero();
+            let own = own * side * if own.dot(normal) < 0.0 { -1.0 } else { 1.0 };
+            let corner = self.transform.point(self.tree.loaded().mesh.positions[vertex].as_dvec3());
+            own * (f64::from(weight) * (corner - point).dot(own).max(0.0))
+        };
+        let lifted = vertices.into_iter().zip(barycentric.to_array()).map(lift).sum::<DVec3>();
+        (point + lifted).as_vec3()
     }
 
     /// Texture coordinates and their tangents; without any the barycentrics.

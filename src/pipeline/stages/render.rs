@@ -217,7 +217,7 @@ impl<'a> Painter<'a> {
             fraction,
             elapsed_seconds,
             eta_seconds,
-            samples: self.canvas.samples(),
+            samples: (self.units / self.canvas.units(|_| 1).max(1)) as u32,
             total_samples: self.order.plan.samples,
         });
     }

@@ -63,9 +63,15 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
 
 fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
     let (diffuse_key, specular_key) = (table.optional("diffuse"), table.optional("specular"));
-    let diffuse = diffuse_key.color_or_texture(textures).unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
-    let specular = specular_key.color_or_texture(textures).unwrap_or(ColorSource::Constant(Vec3::ZERO));
-    warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
+    let (diffuse, specular) =
+        (diffuse_key.color_or_texture(textures), specular_key.color_or_texture(textures));
+    let is_wrong = |key: &Key<'_>, color: &Option<ColorSource>| key.is_given() && color.is_none();
+    let untold = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
+    let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
+    let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
+    if !untold {
+        warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
+    }
     let normal_map = table.optional("normal_map").name_in(textures);
     let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
     MaterialKind::Phong {

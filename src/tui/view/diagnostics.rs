@@ -15,6 +15,7 @@ use crate::tui::state::State;
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     let text = text(state, area);
+    let area = fitting(area, text.len());
     let (page, last) = span(&text, area);
     let first = state.pane.scroll.min(last);
     Clear.render(area, buffer);
@@ -32,6 +33,12 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
         put(buffer, row(inner, index), &pieces, state.depth);
     }
+}
+
+/// The lower part of an area that this many lines and a border need.
+fn fitting(area: Rect, lines: usize) -> Rect {
+    let height = u16::try_from(lines + 2).unwrap_or(u16::MAX).clamp(area.height.min(4), area.height);
+    Rect { y: area.bottom() - height, height, ..area }
 }
 
 /// Lines on a page of the pane, and the furthest line that it can be scrolled to.

@@ -30,6 +30,7 @@ fn activity(state: &State) -> (&'static str, Tone) {
         _ if state.paused => ("paused", Tone::Warning),
         Activity::Running { .. } => ("rendering", Tone::Strong),
         Activity::Done => ("done", Tone::Good),
+        Activity::Broken if !state.pane.open => ("broken (e shows why)", Tone::Error),
         Activity::Broken => ("broken", Tone::Error),
         Activity::Cancelled => ("stopped", Tone::Warning),
     }
