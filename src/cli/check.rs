@@ -27,7 +27,7 @@ fn summary(scene: &Path, checked: &Checked) -> String {
         count(checked.objects, "object"),
         count(checked.triangles, "triangle"),
         count(checked.textures, "texture"),
-        count(checked.point_lights, "point light"),
+        count(checked.lights, "light"),
     ];
     let warnings = match checked.warnings.len() as u64 {
         0 => String::new(),
@@ -47,9 +47,8 @@ mod tests {
 
     #[test]
     fn the_summary_counts_in_english() {
-        let checked =
-            Checked { objects: 1, triangles: 0, textures: 2, point_lights: 3, warnings: Vec::new() };
+        let checked = Checked { objects: 1, triangles: 0, textures: 2, lights: 3, warnings: Vec::new() };
         let text = summary(Path::new("a.toml"), &checked);
-        assert_eq!(text, "ok: a.toml: 1 object, 0 triangles, 2 textures, 3 point lights");
+        assert_eq!(text, "ok: a.toml: 1 object, 0 triangles, 2 textures, 3 lights");
     }
 }

@@ -8,7 +8,8 @@ use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
 use super::stages::parse::Parsed;
 use super::trace::Kernel;
-use crate::scene::description::{Encoding, Shape};
+use crate::math::Vec3;
+use crate::scene::description::{Encoding, MaterialKind, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
 use crate::world::{NeededTexture, SourceEncoding, TextureSource};
 
@@ -21,8 +22,8 @@ pub struct Checked {
     pub triangles: u64,
     /// Image files read, each reading of its numbers counted.
     pub textures: u64,
-    /// Lights without extent.
-    pub point_lights: u64,
+    /// Lights without extent, and objects that emit.
+    pub lights: u64,
     /// What is probably not meant.
     pub warnings: Vec<Diagnostic>,
 }
@@ -42,11 +43,19 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
         Shape::Triangle { .. } => 1,
         _ => 0,
     };
+    let emits =
+        |object: &&Object| match (object.material.map(|index| &scene.materials[index].kind), &object.shape) {
+            (Some(MaterialKind::Phong { emission, .. }), _) => *emission != Vec3::ZERO,
+            (None, Shape::Mesh { file, .. }) => {
+                meshes[*file].mesh.materials.iter().any(|own| own.emission != Vec3::ZERO)
+            }
+            _ => false,
+        };
     Ok(Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
         textures: textures.texels.len() as u64,
-        point_lights: scene.lights.len() as u64,
+        lights: (scene.lights.len() + scene.objects.iter().filter(emits).count()) as u64,
         warnings,
     })
 }
