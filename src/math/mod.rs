@@ -5,4 +5,4 @@ pub mod float;
 pub mod frame;
 pub mod transform;
 
-pub use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
+pub use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3, Vec4};

@@ -1,19 +1,18 @@
 //! A tree eight boxes wide over triangles, four in a pack.
 //!
-//! It is collapsed from the binary tree, largest boxes first. Whatever instructions traverse it, a ray gets the same hit,
+//! Whatever instructions traverse it, a ray gets the same hit,
 //! bit for bit: box tests may only let through too much, the arithmetic of the triangle test is one and the same,
 //! and of hits at one distance the lowest id wins.
 
-mod collapse;
+mod build;
 mod node;
 mod simd;
 
-use crate::accel::Bvh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-pub use simd::Instructions;
+pub use simd::{Instructions, PACKET};
 
 use node::{Node, TrianglePack};
 
@@ -37,18 +36,19 @@ impl WideBvh {
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        let boxes: Vec<Aabb> = (0..count).map(|id| Aabb::around(corners(id))).collect();
-        token.check()?;
-        let tree = Bvh::build_for(&boxes, node::PACK, token)?;
-        drop(boxes);
-        let (nodes, packs) = collapse::collapse(&tree, corners);
-        Ok(Self { nodes, packs, bounds: tree.bounds(), instructions: Instructions::best() })
+        let build::Built { nodes, packs, bounds } = build::build(count, corners, token)?;
+        Ok(Self { nodes, packs, bounds, instructions: Instructions::best() })
     }
 
     /// The same tree, traversed by other instructions; those that the processor has not got give way to the best it has.
     pub fn with(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions.available();
         self
+    }
+
+    /// What it is traversed by.
+    pub fn instructions(&self) -> Instructions {
+        self.instructions
     }
 
     /// The box around all triangles.
@@ -61,6 +61,24 @@ impl WideBvh {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.packs.as_slice())
     }
 
+    /// What a random line that meets the box around all is expected to visit, by surface areas: nodes, and packs of
+    /// triangles.
+    pub fn expected_visits(&self) -> (f64, f64) {
+        let whole = f64::from(self.bounds.half_area());
+        let mut visits = (f64::from(!self.nodes.is_empty()), 0.0);
+        for node in &self.nodes {
+            for slot in 0..node::WIDTH {
+                let Some(bounds) = node.bounds(slot) else { continue };
+                let share = f64::from(bounds.half_area()) / whole;
+                match node.child(slot) {
+                    node::Child::Inner(_) => visits.0 += share,
+                    node::Child::Leaf { count, .. } => visits.1 += share * f64::from(count),
+                }
+            }
+        }
+        visits
+    }
+
     /// The nearest hit; of hits at one distance the triangle of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         if self.may_hit(ray) { simd::closest(self, ray) } else { None }
@@ -69,6 +87,28 @@ impl WideBvh {
     /// Whether the ray hits any triangle but `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         self.may_hit(ray) && simd::any(self, ray, except)
+    }
+
+    /// [`WideBvh::closest`] of at most [`PACKET`] rays; faster where they go much the same way, as those of neighbouring
+    /// pixels do.
+    pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<ShapeHit>]) {
+        debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
+        if self.nodes.is_empty() || rays.len() < 2 || !simd::closest_packet(self, rays, hits) {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.closest(ray);
+            }
+        }
+    }
+
+    /// [`WideBvh::any`] of at most [`PACKET`] rays: a bit for each that hits. `except` has one for each ray.
+    pub fn any_packet(&self, rays: &[Ray], except: &[Option<u32>]) -> u32 {
+        debug_assert!(rays.len() <= PACKET && rays.len() == except.len());
+        let done =
+            if self.nodes.is_empty() || rays.len() < 2 { None } else { simd::any_packet(self, rays, except) };
+        done.unwrap_or_else(|| {
+            let bits = rays.iter().zip(except).enumerate();
+            bits.map(|(i, (ray, &except))| u32::from(self.any(ray, except)) << i).sum()
+        })
     }
 
     /// A ray that is not finite hits nothing; to the box tests it would be in every box, the empty ones too.
@@ -225,6 +265,65 @@ mod tests {
                         expected.is_some(),
                         "mesh {number}, {instructions:?}, {ray:?}"
                     );
+                }
+            }
+        }
+    }
+
+    /// Packets of rays that go much the same way, and some that do not, of all sizes.
+    fn packets(mesh: &[[Vec3; 3]]) -> Vec<Vec<Ray>> {
+        let mut next = random(17);
+        let mut packets: Vec<Vec<Ray>> = rays(mesh).chunks(PACKET).map(<[Ray]>::to_vec).collect();
+        for i in 0..600 {
+            let origin = Vec3::new(next(), next(), next()) * 15.0;
+            let triangle = mesh.get(i * 7 % mesh.len().max(1)).copied().unwrap_or([Vec3::ZERO; 3]);
+            let spread = [0.0, 0.01, 0.3, 3.0][i % 4];
+            let ray = |k: usize| {
+                let target = triangle[k % 3] + Vec3::new(next(), next(), next()) * spread;
+                let start =
+                    origin + if i % 3 == 0 { Vec3::new(next(), next(), next()) * 0.1 } else { Vec3::ZERO };
+                let ray = Ray::new(start, target - start);
+                if k % 5 == 0 { Ray { t_max: 1.0, ..ray } } else { ray }
+            };
+            packets.push((0..1 + i % PACKET).map(ray).collect());
+        }
+        packets
+    }
+
+    #[test]
+    fn a_packet_gives_the_bits_of_its_rays_one_by_one() {
+        for (number, mesh) in meshes().iter().enumerate() {
+            let mut tree = built(mesh);
+            for instructions in Instructions::ALL {
+                tree = tree.with(instructions);
+                for rays in packets(mesh) {
+                    let mut found = vec![None; rays.len()];
+                    tree.closest_packet(&rays, &mut found);
+                    let expected: Vec<_> = rays.iter().map(|ray| brute(mesh, ray)).collect();
+                    let bits = |hits: &[Option<ShapeHit>]| -> Vec<_> {
+                        let bits = |hit: &ShapeHit| {
+                            (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits())
+                        };
+                        hits.iter().map(|hit| hit.as_ref().map(bits)).collect()
+                    };
+                    assert_eq!(bits(&found), bits(&expected), "mesh {number}, {instructions:?}, {rays:?}");
+                    let except: Vec<_> = (0..rays.len())
+                        .map(|i| expected[i].filter(|_| i % 3 == 0).map(|hit| hit.primitive))
+                        .collect();
+                    let any = tree.any_packet(&rays, &except);
+                    for (i, ray) in rays.iter().enumerate() {
+                        let others = mesh.iter().zip(0..).filter(|&(_, id)| Some(id) != except[i]);
+                        let sheared = ShearedRay::new(ray.origin, ray.direction);
+                        let hit = others
+                            .clone()
+                            .any(|(corners, _)| sheared.intersect(corners, ray.t_max).is_some());
+                        let hit = hit && expected[i].is_some();
+                        assert_eq!(
+                            any & 1 << i != 0,
+                            hit,
+                            "mesh {number}, {instructions:?}, ray {i} of {rays:?}"
+                        );
+                    }
                 }
             }
         }

@@ -10,7 +10,7 @@ pub const WIDTH: usize = 8;
 pub const PACK: usize = 4;
 
 /// Most packs of a leaf.
-const MOST_PACKS: u32 = 8;
+pub const MOST_PACKS: u32 = 8;
 
 /// Marks a leaf in [`Node::children`]; the next three bits hold its packs less one, the others the first.
 const LEAF: u32 = 1 << 31;
@@ -19,7 +19,7 @@ const FIRST_BITS: u32 = 28;
 
 /// Eight boxes as rows of their least and greatest x, y and z, and what is in them.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub struct Node {
     /// Rows: least x, greatest x, least y, greatest y, least z, greatest z. Empty boxes are ∞ … −∞ and never met.
     pub rows: [[f32; WIDTH]; 6],
@@ -76,6 +76,11 @@ impl Node {
             self.rows[2 * axis][slot] = bounds.min[axis];
             self.rows[2 * axis + 1][slot] = bounds.max[axis];
         }
+        self.set_child(slot, child);
+    }
+
+    /// Change what a slot holds.
+    pub fn set_child(&mut self, slot: usize, child: Child) {
         self.children[slot] = child.encode();
     }
 

@@ -4,8 +4,21 @@
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
-mod avx2;
+mod lanes;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod packet;
+#[allow(unsafe_code)]
+pub mod pages;
 mod portable;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod single;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod stack;
+#[cfg(target_arch = "x86_64")]
+mod triangle;
 
 use std::sync::LazyLock;
 
@@ -13,54 +26,63 @@ use super::WideBvh;
 use crate::geometry::{Ray, ShapeHit};
 
 /// Instructions to traverse with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Instructions {
     /// Plain Rust; any processor.
     Portable,
     /// 256-bit vectors of x86-64.
     Avx2,
+    /// 512-bit vectors of x86-64.
+    Avx512,
 }
 
 impl Instructions {
     /// All, slowest first.
-    pub const ALL: [Self; 2] = [Self::Portable, Self::Avx2];
+    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The fastest that this processor has. `GLIMT_SIMD=portable` in the environment asks for less, to compare.
+    /// The fastest that this processor has. `GLIMT_SIMD=portable` or `avx2` in the environment asks for less, to compare.
     pub fn best() -> Self {
-        static BEST: LazyLock<Instructions> = LazyLock::new(|| {
-            let asked = std::env::var("GLIMT_SIMD");
-            if asked.is_ok_and(|name| name == "portable") {
-                Instructions::Portable
-            } else {
-                Instructions::Avx2.available()
-            }
-        });
+        static BEST: LazyLock<Instructions> =
+            LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
+                Ok("portable") => Instructions::Portable,
+                Ok("avx2") => Instructions::Avx2.available(),
+                _ => Instructions::Avx512.available(),
+            });
         *BEST
     }
 
     /// These, or the best that the processor has where it has not got them.
     pub fn available(self) -> Self {
-        if self == Self::Avx2 && has_avx2() { Self::Avx2 } else { Self::Portable }
+        self.min(available())
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-fn has_avx2() -> bool {
-    std::arch::is_x86_feature_detected!("avx2")
+fn available() -> Instructions {
+    use std::arch::is_x86_feature_detected as has;
+    if !has!("avx2") {
+        Instructions::Portable
+    } else if has!("avx512f") && has!("avx512vl") && has!("avx512dq") && has!("avx512bw") {
+        Instructions::Avx512
+    } else {
+        Instructions::Avx2
+    }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn has_avx2() -> bool {
-    false
+fn available() -> Instructions {
+    Instructions::Portable
 }
 
 /// See [`WideBvh::closest`]; the tree is not empty.
 #[allow(unsafe_code)]
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     match tree.instructions {
+        Instructions::Portable => portable::closest(tree, ray),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree has these instructions only where the processor has them (`Instructions::available`).
-        Instructions::Avx2 => unsafe { avx2::closest(tree, ray) },
+        Instructions::Avx2 | Instructions::Avx512 => unsafe { single::closest(tree, ray) },
+        #[cfg(not(target_arch = "x86_64"))]
         _ => portable::closest(tree, ray),
     }
 }
@@ -69,9 +91,42 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 #[allow(unsafe_code)]
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     match tree.instructions {
+        Instructions::Portable => portable::any(tree, ray, except),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx2 => unsafe { avx2::any(tree, ray, except) },
+        Instructions::Avx2 | Instructions::Avx512 => unsafe { single::any(tree, ray, except) },
+        #[cfg(not(target_arch = "x86_64"))]
         _ => portable::any(tree, ray, except),
+    }
+}
+
+/// Rays in a packet.
+pub const PACKET: usize = 16;
+
+/// See [`WideBvh::closest_packet`]; the tree is not empty. Says whether it was done.
+#[allow(unsafe_code)]
+pub fn closest_packet(tree: &WideBvh, rays: &[Ray], hits: &mut [Option<ShapeHit>]) -> bool {
+    match tree.instructions {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Instructions::Avx2 => unsafe { packet::closest_avx2(tree, rays, hits) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Instructions::Avx512 => unsafe { packet::closest_avx512(tree, rays, hits) },
+        _ => false,
+    }
+}
+
+/// See [`WideBvh::any_packet`]; the tree is not empty. A bit for each ray that hits; none where it was not done.
+#[allow(unsafe_code)]
+pub fn any_packet(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>]) -> Option<u32> {
+    match tree.instructions {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Instructions::Avx2 => unsafe { packet::any_avx2(tree, rays, except) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Instructions::Avx512 => unsafe { packet::any_avx512(tree, rays, except) },
+        _ => None,
     }
 }

@@ -1,0 +1,225 @@
+//! The ray kernel: what building takes and holds, and millions of rays a second, on one thread: primary rays, one
+//! cosine-distributed bounce, any hit towards a point light.
+//!
+//! - `cargo bench --bench rays` runs on generated meshes, `-- a.ply b.obj c.mesh` on files.
+//! - `--embree LIB` stands the same beside Embree 4: `LIB` is a `libembree4.so`, its scene robust and of medium quality.
+//!   `--embree-isa avx512` lets it use those (its packets of 16 need them, its single rays are faster by AVX2).
+//! - `--instructions NAME` traverses by those alone.
+//! - `--rays FILE --hits FILE` (or `--occluded FILE`), any number of times, counts what differs from given answers.
+//!
+//! Runs of glimt and of the peer alternate chunk by chunk, and each chunk counts by its fastest run, so that what else
+//! the machine does falls on both alike or not at all.
+
+#![allow(clippy::print_stdout)]
+
+mod compare;
+mod embree;
+mod meshes;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use embree::{Embree, Quality, Scene};
+use glimt::accel::WideBvh;
+use glimt::accel::wide_bvh::{Instructions, PACKET};
+use glimt::control::CancelToken;
+use glimt::geometry::Ray;
+use glimt::geometry::mesh::TriangleMesh;
+
+/// Chunks are timed this often.
+const RUNS: usize = 7;
+
+/// Rays of a chunk.
+const CHUNK: usize = 1 << 15;
+
+#[derive(Default)]
+struct Asked {
+    embree: Option<PathBuf>,
+    instructions: Option<Instructions>,
+    isa: Option<String>,
+    /// Files of rays, each with its answers.
+    given: Vec<(PathBuf, PathBuf)>,
+    files: Vec<String>,
+}
+
+fn main() {
+    let asked = asked();
+    let embree = asked.embree.as_deref().map(|path| {
+        Embree::load(path).unwrap_or_else(|error| {
+            println!("{}: {error}", path.display());
+            std::process::exit(2)
+        })
+    });
+    for file in &asked.files {
+        match meshes::load(Path::new(file)) {
+            Ok(mesh) => measure(file.rsplit('/').next().unwrap_or(file), &mesh, embree.as_ref(), &asked),
+            Err(error) => println!("{file}: {error}"),
+        }
+    }
+    if asked.files.is_empty() {
+        for (name, rings) in [("ball 10k", 71), ("ball 100k", 224), ("ball 1M", 708)] {
+            measure(name, &meshes::rippled_ball(rings), embree.as_ref(), &asked);
+        }
+    }
+}
+
+fn asked() -> Asked {
+    let mut asked = Asked::default();
+    let mut rays = None;
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--embree" => asked.embree = arguments.next().map(PathBuf::from),
+            "--instructions" => {
+                let name = arguments.next().unwrap_or_default();
+                asked.instructions =
+                    Instructions::ALL.into_iter().find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
+            }
+            "--rays" => rays = arguments.next().map(PathBuf::from),
+            "--hits" | "--occluded" => {
+                asked.given.extend(rays.take().zip(arguments.next().map(PathBuf::from)));
+            }
+            "--embree-isa" => asked.isa = arguments.next(),
+            other if !other.starts_with("--") => asked.files.push(other.to_owned()),
+            _ => {}
+        }
+    }
+    asked
+}
+
+fn seconds(run: impl FnOnce()) -> f64 {
+    let begin = Instant::now();
+    run();
+    begin.elapsed().as_secs_f64()
+}
+
+fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Asked) {
+    let count = mesh.triangles.len() as u32;
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let build = || WideBvh::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
+    let (mut own_build, mut peer_build) = (f64::INFINITY, f64::INFINITY);
+    let mut tree = None;
+    let mut scene = None;
+    for _ in 0..5 {
+        drop(tree.take());
+        own_build = own_build.min(seconds(|| tree = Some(build())));
+        if let Some(embree) = embree {
+            drop(scene.take());
+            let mut new =
+                embree.build(mesh, Quality::Medium, threads, asked.isa.as_deref().unwrap_or("avx2"));
+            peer_build = peer_build.min(seconds(|| new.commit()));
+            scene = Some(new);
+        }
+    }
+    let Some(mut tree) = tree else { return };
+    println!("{name}: {count} triangles, {threads} threads build, 1 traces");
+    line("build", "s", own_build, scene.as_ref().map(|_| peer_build));
+    line(
+        "memory",
+        "MB",
+        tree.memory_bytes() as f64 / 1e6,
+        scene.as_ref().map(|scene| scene.memory_bytes as f64 / 1e6),
+    );
+    let (nodes, packs) = tree.expected_visits();
+    println!("  a random line visits {nodes:.2} nodes and {packs:.2} packs");
+    let rays = meshes::rays(&tree, mesh);
+    for instructions in Instructions::ALL {
+        if instructions.available() != instructions
+            || asked.instructions.is_some_and(|only| only != instructions)
+        {
+            continue;
+        }
+        tree = tree.with(instructions);
+        println!("  {instructions:?}, single rays");
+        closest("primary", &tree, scene.as_ref(), &rays.primary);
+        closest("diffuse", &tree, scene.as_ref(), &rays.diffuse);
+        any("shadow", &tree, scene.as_ref(), &rays.shadow);
+        packets(&tree, scene.as_ref(), &rays);
+        for (rays, answers) in &asked.given {
+            if let Err(error) = compare::compare(&tree, mesh, rays, answers) {
+                println!("  {}: {error}", rays.display());
+            }
+        }
+    }
+}
+
+/// A figure, the peer's, and how they stand.
+fn line(name: &str, unit: &str, own: f64, peer: Option<f64>) {
+    match peer {
+        Some(peer) => println!("  {name:<10} {unit:>9} {own:>9.3} {peer:>9.3}  ratio {:.3}", own / peer),
+        None => println!("  {name:<10} {unit:>9} {own:>9.3}"),
+    }
+}
+
+fn closest(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) {
+    let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.closest(ray).is_some()).count();
+    match scene {
+        None => line(name, "Mrays/s", rates(rays, [&mut own])[0], None),
+        Some(scene) => {
+            let mut peer = |rays: &[Ray]| rays.iter().filter(|ray| scene.closest(ray).is_some()).count();
+            let [own, peer] = rates(rays, [&mut own, &mut peer]);
+            line(name, "Mrays/s", own, Some(peer));
+        }
+    }
+}
+
+fn any(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) {
+    let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.any(ray, None)).count();
+    match scene {
+        None => line(name, "Mrays/s", rates(rays, [&mut own])[0], None),
+        Some(scene) => {
+            let mut peer = |rays: &[Ray]| rays.iter().filter(|ray| scene.any(ray)).count();
+            let [own, peer] = rates(rays, [&mut own, &mut peer]);
+            line(name, "Mrays/s", own, Some(peer));
+        }
+    }
+}
+
+/// Sixteen rays at a time; the peer's once as they are and once told that they are coherent.
+fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
+    let mut closest = |rays: &[Ray]| {
+        let mut found = 0;
+        let mut hits = [None; PACKET];
+        for sixteen in rays.chunks(PACKET) {
+            tree.closest_packet(sixteen, &mut hits[..sixteen.len()]);
+            found += hits.iter().filter(|hit| hit.is_some()).count();
+        }
+        found
+    };
+    let mut any = |rays: &[Ray]| {
+        let found = |sixteen: &[Ray]| {
+            tree.any_packet(sixteen, &[None; PACKET][..sixteen.len()]).count_ones() as usize
+        };
+        rays.chunks(PACKET).map(found).sum()
+    };
+    println!("  {:?}, packets of {PACKET}", tree.instructions());
+    if let Some(scene) = scene {
+        let mut plain = |rays: &[Ray]| scene.closest16(rays, false);
+        let mut coherent = |rays: &[Ray]| scene.closest16(rays, true);
+        let [own, plain, coherent] = rates(&rays.primary, [&mut closest, &mut plain, &mut coherent]);
+        line("primary", "Mrays/s", own, Some(plain));
+        line("coherent", "Mrays/s", own, Some(coherent));
+    } else {
+        line("primary", "Mrays/s", rates(&rays.primary, [&mut closest])[0], None);
+    }
+    line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
+}
+
+/// Millions of rays a second of each way to trace them; every chunk counts by the fastest of its runs.
+fn rates<const N: usize>(rays: &[Ray], mut ways: [&mut dyn FnMut(&[Ray]) -> usize; N]) -> [f64; N] {
+    let mut total = [0.0; N];
+    for chunk in rays.chunks(CHUNK) {
+        let mut best = [f64::INFINITY; N];
+        for _ in 0..RUNS {
+            for (way, best) in ways.iter_mut().zip(&mut best) {
+                *best = best.min(seconds(|| {
+                    std::hint::black_box(way(chunk));
+                }));
+            }
+        }
+        for (total, best) in total.iter_mut().zip(best) {
+            *total += best;
+        }
+    }
+    total.map(|seconds| rays.len() as f64 / seconds / 1e6)
+}

@@ -1,0 +1,149 @@
+//! Building: large parts split in two by binned surface area, in parallel, until each is small enough for one thread to
+//! make its nodes, eight children at once; then all are put together.
+//!
+//! The tree is a function of the triangles alone, not of the threads.
+
+mod join;
+mod split;
+mod subtree;
+
+use rayon::prelude::*;
+
+use super::node::{Node, TrianglePack};
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::Aabb;
+use crate::math::{Vec3, Vec4};
+
+use split::{Segment, partition};
+use subtree::Subtree;
+
+/// Parts of at most this many triangles are built by one thread; the token is polled between them.
+const TASK_SIZE: usize = 8192;
+
+/// A triangle's box while the tree is built; the last lane of `min` holds the bits of its number.
+#[derive(Clone, Copy, Debug)]
+struct Reference {
+    min: Vec4,
+    max: Vec4,
+}
+
+impl Reference {
+    fn new(id: u32, corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners.map(|corner| corner.extend(0.0));
+        let mut min = a.min(b).min(c);
+        min.w = f32::from_bits(id);
+        // `min` and `max` drop a NaN: it is put back.
+        let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
+        Self { min: min + Vec3::from(poison).extend(0.0), max: a.max(b).max(c) }
+    }
+
+    fn id(&self) -> u32 {
+        self.min.w.to_bits()
+    }
+
+    fn centroid(&self) -> Vec4 {
+        self.min * 0.5 + self.max * 0.5
+    }
+
+    /// Whether it can be hit at all and its box has a size.
+    fn is_usable(&self) -> bool {
+        (self.max - self.min).truncate().is_finite()
+    }
+}
+
+/// A box in vector registers; the last lanes mean nothing.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    min: Vec4,
+    max: Vec4,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self { min: Vec4::INFINITY, max: Vec4::NEG_INFINITY };
+
+    #[inline(always)]
+    fn grow(&mut self, min: Vec4, max: Vec4) {
+        self.min = self.min.min(min);
+        self.max = self.max.max(max);
+    }
+
+    #[inline(always)]
+    fn half_area(&self) -> f32 {
+        let e = self.max - self.min;
+        e.x * e.y + e.y * e.z + e.z * e.x
+    }
+
+    fn aabb(&self) -> Aabb {
+        Aabb { min: self.min.truncate(), max: self.max.truncate() }
+    }
+}
+
+/// What building made.
+pub struct Built {
+    pub nodes: Vec<Node>,
+    pub packs: Vec<TrianglePack>,
+    pub bounds: Aabb,
+}
+
+/// Build over `count` triangles; those whose box has no finite size are in no leaf.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn build(
+    count: u32,
+    corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+    token: &CancelToken,
+) -> Result<Built, Cancelled> {
+    let mut references: Vec<Reference> =
+        (0..count).into_par_iter().map(|id| Reference::new(id, corners(id))).collect();
+    token.check()?;
+    if !references.par_iter().all(Reference::is_usable) {
+        references.retain(Reference::is_usable);
+    }
+    if references.is_empty() {
+        return Ok(Built { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
+    }
+    let whole = Segment::whole(&references);
+    let bounds = whole.bounds.aabb();
+    let part = part(&mut references, 0, whole, token)?;
+    token.check()?;
+    let (nodes, leaves) = join::join(part);
+    token.check()?;
+    let pack = |leaf: &subtree::Pack| {
+        let members = &references[leaf.first as usize..][..leaf.count as usize];
+        TrianglePack::new(members.iter().map(|member| (member.id(), corners(member.id()))))
+    };
+    let mut packs = super::simd::pages::large(leaves.len());
+    leaves.par_iter().map(pack).collect_into_vec(&mut packs);
+    Ok(Built { nodes, packs, bounds })
+}
+
+/// A part of the tree above the subtrees.
+enum Part {
+    /// Two halves, to be collapsed.
+    Halves(Box<[(Bounds, Part); 2]>),
+    /// Built by one thread.
+    Built(Subtree),
+}
+
+/// Split until one thread can take over. `start` is the place of the first reference among all.
+fn part(
+    references: &mut [Reference],
+    start: usize,
+    segment: Segment,
+    token: &CancelToken,
+) -> Result<Part, Cancelled> {
+    token.check()?;
+    let Some(split) = segment.split.as_ref().filter(|_| segment.count > TASK_SIZE) else {
+        return Ok(Part::Built(Subtree::build(references, start, segment)));
+    };
+    let (left, right) = partition(references, &segment, split);
+    let (left_bounds, right_bounds) = (left.bounds, right.bounds);
+    let middle = left.count;
+    let (left_references, right_references) = references.split_at_mut(middle);
+    let (left, right) = rayon::join(
+        || part(left_references, start, left, token),
+        || part(right_references, start + middle, right, token),
+    );
+    Ok(Part::Halves(Box::new([(left_bounds, left?), (right_bounds, right?)])))
+}

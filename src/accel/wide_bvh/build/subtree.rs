@@ -1,0 +1,84 @@
+//! The part of a tree that one thread makes.
+
+use super::split::{Segment, partition};
+use super::{Bounds, Reference};
+use crate::accel::wide_bvh::node::{Child, Node, PACK, WIDTH};
+
+/// Which references a pack of triangles holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Pack {
+    /// Place of the first among all references.
+    pub first: u32,
+    /// One to four.
+    pub count: u32,
+}
+
+/// Nodes and packs; children are counted from the first of each.
+#[derive(Debug)]
+pub struct Subtree {
+    pub nodes: Vec<Node>,
+    pub packs: Vec<Pack>,
+    pub root: Child,
+    pub bounds: Bounds,
+}
+
+impl Subtree {
+    /// Build over references, the first of which has the place `start` among all.
+    pub fn build(references: &mut [Reference], start: usize, segment: Segment) -> Self {
+        let mut own = Self {
+            nodes: Vec::with_capacity(references.len() / 6),
+            packs: Vec::with_capacity(references.len() / 3),
+            root: Child::Inner(0),
+            bounds: segment.bounds,
+        };
+        own.root = own.child(references, start, segment);
+        own
+    }
+
+    fn child(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> Child {
+        if segment.is_node {
+            Child::Inner(self.node(references, start, segment))
+        } else {
+            self.leaf(start, segment.count)
+        }
+    }
+
+    fn leaf(&mut self, start: usize, count: usize) -> Child {
+        let first = self.packs.len() as u32;
+        for at in (0..count).step_by(PACK) {
+            self.packs.push(Pack { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
+        }
+        Child::Leaf { first, count: self.packs.len() as u32 - first }
+    }
+
+    /// Split the child with the largest box until there are eight (Wald, Benthin, Boulos, *Getting Rid of Packets*, 2008).
+    fn node(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> u32 {
+        let place = self.nodes.len();
+        self.nodes.push(Node::EMPTY);
+        let mut children: [Option<(usize, Segment)>; WIDTH] = [const { None }; WIDTH];
+        children[0] = Some((0, segment));
+        let mut count = 1;
+        while count < WIDTH {
+            let inner = children[..count].iter().enumerate().filter_map(|(slot, child)| {
+                let (_, segment) = child.as_ref()?;
+                segment.split.is_some().then(|| (slot, segment.is_node, segment.bounds.half_area()))
+            });
+            let next = inner.max_by(|a, b| a.1.cmp(&b.1).then(a.2.total_cmp(&b.2)));
+            let Some((slot, ..)) = next else { break };
+            let Some((from, Segment { split: Some(split), .. })) = &children[slot] else { break };
+            let (from, split) = (*from, *split);
+            let Some((_, parent)) = &children[slot] else { break };
+            let (left, right) = partition(&mut references[from..from + parent.count], parent, &split);
+            children[count] = Some((from + left.count, right));
+            children[slot] = Some((from, left));
+            count += 1;
+        }
+        for (slot, (from, segment)) in children.into_iter().flatten().enumerate() {
+            let bounds = segment.bounds.aabb();
+            let members = &mut references[from..from + segment.count];
+            let child = self.child(members, start + from, segment);
+            self.nodes[place].set(slot, bounds, child);
+        }
+        place as u32
+    }
+}

@@ -1,0 +1,471 @@
+//! Sixteen rays at a time that go much the same way: what all of them miss is left out by one test of a frustum around them
+//! (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005), what is left is tested for sixteen rays
+//! side by side.
+
+use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+
+use super::super::WideBvh;
+use super::super::node::{Child, Node, PACK, TrianglePack};
+use super::PACKET as SIZE;
+use super::lanes::{F8, F16, Lanes, Pair};
+use super::stack::Stack;
+use super::triangle;
+use crate::geometry::aabb::SLAB_PAD;
+use crate::geometry::watertight::ShearedRay;
+use crate::geometry::{Ray, ShapeHit};
+
+/// Rows of a packet, one value for each ray.
+type Row = [f32; SIZE];
+
+/// Rays side by side.
+struct Rows {
+    origin: [Row; 3],
+    direction: [Row; 3],
+    t_max: Row,
+}
+
+impl Rows {
+    /// Lanes beyond the rays repeat the first, with no length.
+    #[inline(always)]
+    fn new(rays: &[Ray], first: &Ray) -> Self {
+        let mut rows = Self { origin: [[0.0; SIZE]; 3], direction: [[0.0; SIZE]; 3], t_max: [-1.0; SIZE] };
+        for lane in 0..SIZE {
+            let ray = rays.get(lane).unwrap_or(first);
+            for axis in 0..3 {
+                rows.origin[axis][lane] = ray.origin[axis];
+                rows.direction[axis][lane] = ray.direction[axis];
+            }
+            if lane < rays.len() {
+                rows.t_max[lane] = ray.t_max;
+            }
+        }
+        rows
+    }
+}
+
+/// The least and the greatest.
+#[inline(always)]
+fn ends(row: &Row) -> [f32; 2] {
+    let (mut least, mut greatest) = (row[0], row[0]);
+    for &x in row {
+        least = if x < least { x } else { least };
+        greatest = if x > greatest { x } else { greatest };
+    }
+    [least, greatest]
+}
+
+/// What holds for every ray of a packet, against eight boxes at a time. Subtraction and multiplication round monotonously, so
+/// that no ray enters a box before the frustum does, or leaves it later.
+struct Frustum {
+    /// Greatest origin where the rays go up, least where they go down: the one that is nearest to the near plane.
+    near_origin: [F8; 3],
+    far_origin: [F8; 3],
+    inverse: [[F8; 2]; 3],
+    near: [usize; 3],
+}
+
+impl Frustum {
+    #[inline(always)]
+    fn new<V: Lanes>(rows: &Rows, packet: &Packet<V>, like: F8) -> Self {
+        let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
+        let mut inverse = [[like; 2]; 3];
+        for axis in 0..3 {
+            let ends = ends(&rows.origin[axis]);
+            let negative = packet.near[axis] & 1;
+            near_origin[axis] = like.like(ends[1 - negative]);
+            far_origin[axis] = like.like(ends[negative]);
+            let mut row = [0.0; SIZE];
+            packet.inverse[axis].store(&mut row);
+            let [least, greatest] = self::ends(&row);
+            inverse[axis] = [like.like(least), like.like(greatest)];
+        }
+        Self { near_origin, far_origin, inverse, near: packet.near }
+    }
+
+    /// A bound on where the first ray enters each box, and a bit for each box that a ray may meet before `end`.
+    #[inline(always)]
+    fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
+        let pad = end.like(SLAB_PAD);
+        let (mut near, mut far) = (end.like(0.0), end);
+        for axis in 0..3 {
+            let [least, greatest] = self.inverse[axis];
+            let to_near = end.gather(&node.rows[self.near[axis]]) - self.near_origin[axis];
+            let to_far = end.gather(&node.rows[self.near[axis] ^ 1]) - self.far_origin[axis];
+            near = (to_near * least).min(to_near * greatest).max(near);
+            far = ((to_far * least).max(to_far * greatest) * pad).min(far);
+        }
+        (near, F8::bits(near.le(far)))
+    }
+}
+
+/// The rows in registers, ready for boxes and triangles.
+struct Packet<V: Lanes> {
+    origin: [V; 3],
+    inverse: [V; 3],
+    /// Origins along the axes of the sheared rays.
+    sheared_origin: [V; 3],
+    shear: [V; 3],
+    /// The axes of the world that are x, y and z of every sheared ray.
+    axes: [usize; 3],
+    /// Rows of a node that are near.
+    near: [usize; 3],
+}
+
+impl<V: Lanes> Packet<V> {
+    /// None where the rays do not go the same way: along each axis to the same side, the longest the same for all.
+    #[inline(always)]
+    fn new(rows: &Rows, first: &Ray, like: V) -> Option<Self> {
+        let axes = ShearedRay::new(first.origin, first.direction).axes();
+        let mut own = Self {
+            origin: [like; 3],
+            inverse: [like; 3],
+            sheared_origin: [like; 3],
+            shear: [like; 3],
+            axes,
+            near: [0; 3],
+        };
+        let (mut direction, mut size) = ([like; 3], [like; 3]);
+        let (zero, one) = (like.like(0.0), like.like(1.0));
+        let all = V::bits(zero.eq(zero));
+        for axis in 0..3 {
+            own.origin[axis] = like.gather(&rows.origin[axis]);
+            direction[axis] = like.gather(&rows.direction[axis]);
+            size[axis] = direction[axis].abs();
+            own.inverse[axis] = one.over(direction[axis]);
+            let up = V::bits(zero.lt(own.inverse[axis]) & own.inverse[axis].lt(like.like(f32::INFINITY)));
+            let down =
+                V::bits(own.inverse[axis].lt(zero) & like.like(f32::NEG_INFINITY).lt(own.inverse[axis]));
+            let finite = V::bits(own.origin[axis].abs().lt(like.like(f32::INFINITY)));
+            if (up != all && down != all) || finite != all {
+                return None;
+            }
+            own.near[axis] = 2 * axis + usize::from(down == all);
+        }
+        // `ShearedRay::new`, side by side: which axis is the longest, and the shears.
+        let x_over_y = V::bits(size[1].lt(size[0]));
+        let longest = match axes[2] {
+            0 => x_over_y & V::bits(size[2].lt(size[0])),
+            1 => !x_over_y & V::bits(size[2].lt(size[1])),
+            _ => !(x_over_y & V::bits(size[2].lt(size[0])) | !x_over_y & V::bits(size[2].lt(size[1]))),
+        };
+        if longest & all != all {
+            return None;
+        }
+        let scale = own.inverse[axes[2] % 3];
+        own.shear = [direction[axes[0] % 3] * scale, direction[axes[1] % 3] * scale, scale];
+        for axis in 0..3 {
+            own.sheared_origin[axis] = own.origin[axes[axis] % 3];
+        }
+        Some(own)
+    }
+
+    /// Whether any ray meets the box in a slot before its end, `SlabRay::enter` side by side.
+    #[inline(always)]
+    fn meets(&self, node: &Node, slot: usize, end: V) -> bool {
+        let pad = end.like(SLAB_PAD);
+        let (mut near, mut far) = (end.like(0.0), end);
+        for axis in 0..3 {
+            let row = self.near[axis] % 6;
+            let (to_near, to_far) = (end.like(node.rows[row][slot]), end.like(node.rows[row ^ 1][slot]));
+            near = ((to_near - self.origin[axis]) * self.inverse[axis]).max(near);
+            far = ((to_far - self.origin[axis]) * self.inverse[axis] * pad).min(far);
+        }
+        V::bits(near.le(far)) != 0
+    }
+
+    /// Test the triangle in a lane of a pack against all rays.
+    #[inline(always)]
+    fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
+        let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
+        triangle::hits(&[a, b, c], self.shear[2], t_max)
+    }
+
+    /// A corner as each ray sees it; `row` is its first.
+    #[inline(always)]
+    fn corner(&self, pack: &TrianglePack, row: usize, lane: usize) -> [V; 3] {
+        let z = self.coordinate(pack, row, 2, lane);
+        let x = self.coordinate(pack, row, 0, lane) - self.shear[0] * z;
+        let y = self.coordinate(pack, row, 1, lane) - self.shear[1] * z;
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    fn coordinate(&self, pack: &TrianglePack, row: usize, i: usize, lane: usize) -> V {
+        let axis = self.axes[i] % 3;
+        self.shear[0].like(pack.rows[row + axis][lane]) - self.sheared_origin[i]
+    }
+}
+
+/// The nearest hits so far.
+struct Nearest<V: Lanes> {
+    t: V,
+    u: V,
+    v: V,
+    /// Bits of the triangles' numbers.
+    id: V,
+    found: u32,
+}
+
+/// See [`WideBvh::closest_packet`]; false where the rays do not go the same way.
+#[inline(always)]
+fn closest<V: Lanes>(
+    tree: &WideBvh,
+    rays: &[Ray],
+    hits: &mut [Option<ShapeHit>],
+    like: V,
+    like8: F8,
+) -> bool {
+    let Some(first) = rays.first() else { return false };
+    let rows = Rows::new(rays, first);
+    let Some(packet) = Packet::new(&rows, first, like) else { return false };
+    let frustum = Frustum::new(&rows, &packet, like8);
+    let t_max = like.gather(&rows.t_max);
+    let pad = like.like(SLAB_PAD);
+    let none = like.like(f32::from_bits(u32::MAX));
+    let mut best = Nearest { t: t_max, u: t_max, v: t_max, id: none, found: 0 };
+    let mut end = t_max.greatest() * SLAB_PAD;
+    let mut stack: Stack<(f32, u32)> = Stack::new();
+    stack.push((0.0, 0));
+    while let Some((entry, code)) = stack.pop() {
+        if entry > end {
+            continue;
+        }
+        match Child::decode(code) {
+            Child::Inner(index) => {
+                let node = &tree.nodes[index as usize];
+                let (near, met) = frustum.enter(node, like8.like(end));
+                push_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
+            }
+            Child::Leaf { first, count } => {
+                let before = best.found;
+                let mut any = 0;
+                for pack in &tree.packs[first as usize..(first + count) as usize] {
+                    for lane in 0..PACK {
+                        if pack.ids[lane] == u32::MAX {
+                            break;
+                        }
+                        any |= best.take(&packet, pack, lane, rays);
+                    }
+                }
+                if any != 0 || before != best.found {
+                    end = best.t.greatest() * SLAB_PAD;
+                }
+            }
+        }
+    }
+    best.write(hits);
+    true
+}
+
+impl<V: Lanes> Nearest<V> {
+    /// Take what is nearer, or as near with a lower number; a bit for each ray that took it.
+    #[inline(always)]
+    fn take(&mut self, packet: &Packet<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+        let hits = packet.hits(pack, lane, self.t);
+        if hits.hit | hits.doubtful == 0 {
+            return 0;
+        }
+        self.keep(&hits, pack, lane, rays)
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, hits: &triangle::Hits<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+        let own = pack.ids[lane];
+        let as_near = hits.hit & V::bits(hits.t.eq(self.t));
+        let mut taken = hits.hit & !as_near;
+        if taken != 0 {
+            let mask = V::mask(taken, self.t);
+            self.t = hits.t.or_else(mask, self.t);
+            self.u = hits.u.or_else(mask, self.u);
+            self.v = hits.v.or_else(mask, self.v);
+            self.id = self.t.like(f32::from_bits(own)).or_else(mask, self.id);
+            self.found |= taken;
+        }
+        let mut singly = as_near | hits.doubtful;
+        while singly != 0 {
+            let ray = singly.trailing_zeros() as usize;
+            singly &= singly - 1;
+            taken |= self.keep_one(ray, pack, lane, rays);
+        }
+        taken
+    }
+
+    /// The same for one ray, by the scalar test.
+    #[cold]
+    #[inline(never)]
+    fn keep_one(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+        let Some(own) = rays.get(ray) else { return 0 };
+        let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
+        self.t.store(&mut t);
+        self.u.store(&mut u);
+        self.v.store(&mut v);
+        self.id.store(&mut id);
+        let sheared = ShearedRay::new(own.origin, own.direction);
+        let Some(hit) = sheared.intersect(&pack.corners(lane), t[ray]) else { return 0 };
+        let number = pack.ids[lane];
+        if (hit.t, number) >= (t[ray], id[ray].to_bits()) {
+            return 0;
+        }
+        (t[ray], u[ray], v[ray], id[ray]) = (hit.t, hit.u, hit.v, f32::from_bits(number));
+        (self.t, self.u) = (self.t.gather(&t), self.t.gather(&u));
+        (self.v, self.id) = (self.t.gather(&v), self.t.gather(&id));
+        self.found |= 1 << ray;
+        1 << ray
+    }
+
+    #[inline(always)]
+    fn write(&self, hits: &mut [Option<ShapeHit>]) {
+        let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
+        self.t.store(&mut t);
+        self.u.store(&mut u);
+        self.v.store(&mut v);
+        self.id.store(&mut id);
+        for (ray, hit) in hits.iter_mut().enumerate().take(SIZE) {
+            *hit = (self.found & 1 << ray != 0).then(|| ShapeHit {
+                t: t[ray],
+                primitive: id[ray].to_bits(),
+                u: u[ray],
+                v: v[ray],
+            });
+        }
+    }
+}
+
+/// See [`WideBvh::any_packet`]; none where the rays do not go the same way.
+#[inline(always)]
+fn any<V: Lanes>(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>], like: V, like8: F8) -> Option<u32> {
+    let first = rays.first()?;
+    let rows = Rows::new(rays, first);
+    let packet = Packet::new(&rows, first, like)?;
+    let frustum = Frustum::new(&rows, &packet, like8);
+    let mut t_max = like.gather(&rows.t_max);
+    let pad = like.like(SLAB_PAD);
+    let mut end = t_max.greatest() * SLAB_PAD;
+    let all = (1_u32 << rays.len().min(SIZE)) - 1;
+    let mut found = 0_u32;
+    let mut stack: Stack<(f32, u32)> = Stack::new();
+    stack.push((0.0, 0));
+    while let Some((_, code)) = stack.pop() {
+        match Child::decode(code) {
+            Child::Inner(index) => {
+                let node = &tree.nodes[index as usize];
+                let (near, met) = frustum.enter(node, like8.like(end));
+                push_ordered(tree, node, near, met, &mut stack, &packet, t_max * pad);
+            }
+            Child::Leaf { first, count } => {
+                let before = found;
+                for pack in &tree.packs[first as usize..(first + count) as usize] {
+                    for lane in 0..PACK {
+                        if pack.ids[lane] == u32::MAX {
+                            break;
+                        }
+                        let hits = packet.hits(pack, lane, t_max);
+                        let mut rest = (hits.hit | hits.doubtful) & all & !found;
+                        while rest != 0 {
+                            let ray = rest.trailing_zeros() as usize % SIZE;
+                            rest &= rest - 1;
+                            if except.get(ray).copied().flatten() == Some(pack.ids[lane]) {
+                                continue;
+                            }
+                            let sure = hits.hit & 1 << ray != 0;
+                            if sure || doubtful_hit(&rays[ray], pack, lane) {
+                                found |= 1 << ray;
+                            }
+                        }
+                    }
+                }
+                if found == all {
+                    return Some(found);
+                }
+                if before != found {
+                    t_max = like.like(-1.0).or_else(V::mask(found, t_max), t_max);
+                    end = t_max.greatest() * SLAB_PAD;
+                }
+            }
+        }
+    }
+    Some(found)
+}
+
+#[cold]
+#[inline(never)]
+fn doubtful_hit(ray: &Ray, pack: &TrianglePack, lane: usize) -> bool {
+    ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners(lane), ray.t_max).is_some()
+}
+
+/// Push the children that are met, farthest first, so that the nearest is on top.
+#[inline(always)]
+fn push_ordered<V: Lanes>(
+    tree: &WideBvh,
+    node: &Node,
+    near: F8,
+    met: u32,
+    stack: &mut Stack<(f32, u32)>,
+    packet: &Packet<V>,
+    end: V,
+) {
+    let mut entries = [0.0_f32; 8];
+    near.store(&mut entries);
+    let (mut rest, mut pushed) = (met, 0);
+    while rest != 0 {
+        let slot = rest.trailing_zeros() as usize % 8;
+        rest &= rest - 1;
+        if !packet.meets(node, slot, end) {
+            continue;
+        }
+        prefetch(tree, node.children[slot]);
+        stack.push((entries[slot], node.children[slot]));
+        let mut back = 0;
+        while back < pushed && stack.below(back + 1).0 < stack.below(back).0 {
+            let lower = *stack.below(back + 1);
+            *stack.below(back + 1) = std::mem::replace(stack.below(back), lower);
+            back += 1;
+        }
+        pushed += 1;
+    }
+}
+
+/// Ask for a child's memory before it is needed.
+#[inline(always)]
+fn prefetch(tree: &WideBvh, code: u32) {
+    let (start, lines): (*const i8, usize) = match Child::decode(code) {
+        Child::Inner(index) => (tree.nodes.as_ptr().wrapping_add(index as usize).cast(), 4),
+        Child::Leaf { first, .. } => (tree.packs.as_ptr().wrapping_add(first as usize).cast(), 3),
+    };
+    for line in 0..lines {
+        // SAFETY: a hint; no address is wrong.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) };
+    }
+}
+
+/// [`closest`] by AVX2.
+#[target_feature(enable = "avx2")]
+pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], hits: &mut [Option<ShapeHit>]) -> bool {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
+    closest(tree, rays, hits, like, like8)
+}
+
+/// [`any`] by AVX2.
+#[target_feature(enable = "avx2")]
+pub fn any_avx2(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>]) -> Option<u32> {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
+    any(tree, rays, except, like, like8)
+}
+
+/// [`closest`] by AVX-512.
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
+pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], hits: &mut [Option<ShapeHit>]) -> bool {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
+    closest(tree, rays, hits, like, like8)
+}
+
+/// [`any`] by AVX-512.
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
+pub fn any_avx512(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>]) -> Option<u32> {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
+    any(tree, rays, except, like, like8)
+}

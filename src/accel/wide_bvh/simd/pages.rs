@@ -1,0 +1,30 @@
+//! Memory for large arrays that rays jump about in: by large pages, where the system has them for the asking.
+
+/// From this many bytes on it pays to ask.
+const LARGE: usize = 1 << 21;
+
+/// An empty vector with room for `count`.
+pub fn large<T>(count: usize) -> Vec<T> {
+    let items = Vec::with_capacity(count);
+    let bytes = count * size_of::<T>();
+    if bytes >= LARGE {
+        ask(items.as_ptr() as usize, bytes);
+    }
+    items
+}
+
+#[cfg(target_os = "linux")]
+fn ask(start: usize, bytes: usize) {
+    use nix::sys::mman::{MmapAdvise, madvise};
+    const PAGE: usize = 4096;
+    let first = start.next_multiple_of(PAGE);
+    let length = (start + bytes).saturating_sub(first) / PAGE * PAGE;
+    if let Some(address) = std::ptr::NonNull::new(first as *mut std::ffi::c_void) {
+        // SAFETY: the pages lie inside the allocation, and the advice changes none of what they hold. Where it is not
+        // taken nothing is lost, which is why the answer does not matter.
+        let _ = unsafe { madvise(address, length, MmapAdvise::MADV_HUGEPAGE) };
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn ask(_start: usize, _bytes: usize) {}

@@ -1,0 +1,250 @@
+//! One ray: eight boxes and four triangles at a time, by AVX2.
+
+use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+
+use super::super::WideBvh;
+use super::super::node::{Child, Node, PACK, TrianglePack};
+use super::lanes::{F4, F8, Lanes};
+use super::portable::nearer;
+use super::stack::Stack;
+use super::triangle::{self, Hits};
+use crate::geometry::aabb::SLAB_PAD;
+use crate::geometry::watertight::ShearedRay;
+use crate::geometry::{Ray, ShapeHit};
+
+/// A ray in all lanes, with the rows of a node that are near and far along each axis.
+struct BoxRay {
+    origin: [F8; 3],
+    inverse: [F8; 3],
+    near: [usize; 3],
+}
+
+impl BoxRay {
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn new(ray: &Ray) -> Self {
+        let inverse = ray.direction.recip();
+        // SAFETY: this function has the instructions.
+        let all = |x: [f32; 3]| x.map(|x| unsafe { F8::splat(x) });
+        let near = [0, 1, 2].map(|axis| 2 * axis + usize::from(inverse[axis] < 0.0));
+        Self { origin: all(ray.origin.to_array()), inverse: all(inverse.to_array()), near }
+    }
+
+    /// Where the ray enters the eight boxes, and a bit for each that it meets before `far`. A distance that is NaN leaves the
+    /// interval as it is, which is what `SlabRay::enter` does.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
+        let pad = end.like(SLAB_PAD);
+        let (mut near, mut far) = (end.like(0.0), end);
+        for axis in 0..3 {
+            let row = |row: usize| end.gather(&node.rows[row]);
+            let distance = |plane: F8| (plane - self.origin[axis]) * self.inverse[axis];
+            near = distance(row(self.near[axis])).max(near);
+            far = (distance(row(self.near[axis] ^ 1)) * pad).min(far);
+        }
+        (near, F8::bits(near.le(far)))
+    }
+}
+
+/// A sheared ray in all lanes.
+struct TriangleRay {
+    origin: [F4; 3],
+    shear: [F4; 3],
+    axes: [usize; 3],
+    scalar: ShearedRay,
+}
+
+impl TriangleRay {
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn new(ray: &Ray) -> Self {
+        let scalar = ShearedRay::new(ray.origin, ray.direction);
+        let axes = scalar.axes();
+        // SAFETY: this function has the instructions.
+        let all = |x: [f32; 3]| x.map(|x| unsafe { F4::splat(x) });
+        Self {
+            origin: all(axes.map(|axis| ray.origin[axis])),
+            shear: all(scalar.shear().to_array()),
+            axes,
+            scalar,
+        }
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
+        let corner = |corner: usize| {
+            let row = |i: usize| {
+                self.origin[i].gather(&pack.rows[(3 * corner + self.axes[i]) % 9]) - self.origin[i]
+            };
+            let z = row(2);
+            [row(0) - self.shear[0] * z, row(1) - self.shear[1] * z, z]
+        };
+        triangle::hits(&[corner(0), corner(1), corner(2)], self.shear[2], self.shear[2].like(t_max))
+    }
+}
+
+/// See [`WideBvh::closest`].
+#[target_feature(enable = "avx2")]
+pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
+    let (boxes, triangles) = (BoxRay::new(ray), TriangleRay::new(ray));
+    let mut best: Option<ShapeHit> = None;
+    let mut t_max = ray.t_max;
+    let mut end = boxes.origin[0].like(t_max * SLAB_PAD);
+    let mut stack: Stack<(f32, u32)> = Stack::new();
+    let mut code = 0;
+    loop {
+        match Child::decode(code) {
+            Child::Inner(index) => {
+                let node = &tree.nodes[index as usize];
+                let (near, met) = boxes.enter(node, end);
+                if let Some(next) = push_ordered(tree, node, near, met, &mut stack) {
+                    code = next;
+                    continue;
+                }
+            }
+            Child::Leaf { first, count } => {
+                for pack in &tree.packs[first as usize..(first + count) as usize] {
+                    let hits = triangles.hits(pack, t_max);
+                    if hits.hit | hits.doubtful != 0 {
+                        nearest(pack, &hits, &triangles.scalar, &mut best, t_max);
+                        t_max = best.map_or(t_max, |best| best.t);
+                    }
+                }
+                end = end.like(t_max * SLAB_PAD);
+            }
+        }
+        loop {
+            let Some((entry, next)) = stack.pop() else { return best };
+            if entry <= t_max * SLAB_PAD {
+                code = next;
+                break;
+            }
+        }
+    }
+}
+
+/// Take the nearest of a pack's hits.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn nearest(pack: &TrianglePack, hits: &Hits<F4>, ray: &ShearedRay, best: &mut Option<ShapeHit>, t_max: f32) {
+    let mut t = [0.0; PACK];
+    hits.t.store(&mut t);
+    let (mut u, mut v) = ([0.0; PACK], [0.0; PACK]);
+    hits.u.store(&mut u);
+    hits.v.store(&mut v);
+    let mut lanes = hits.hit;
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize % PACK;
+        lanes &= lanes - 1;
+        let id = pack.ids[lane];
+        if best.is_none_or(|best| (t[lane], id) < (best.t, best.primitive)) {
+            *best = Some(ShapeHit { t: t[lane], primitive: id, u: u[lane], v: v[lane] });
+        }
+    }
+    let mut lanes = hits.doubtful;
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize % PACK;
+        lanes &= lanes - 1;
+        nearer(pack, lane, ray, t_max, best);
+    }
+}
+
+/// Push the children that are met, farthest first, but for the nearest, which is returned.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn push_ordered(
+    tree: &WideBvh,
+    node: &Node,
+    near: F8,
+    met: u32,
+    stack: &mut Stack<(f32, u32)>,
+) -> Option<u32> {
+    if met == 0 {
+        return None;
+    }
+    let first = met.trailing_zeros() as usize % 8;
+    let mut rest = met & (met - 1);
+    if rest == 0 {
+        prefetch(tree, node.children[first]);
+        return Some(node.children[first]);
+    }
+    let mut entries = [0.0_f32; 8];
+    near.store(&mut entries);
+    prefetch(tree, node.children[first]);
+    let mut nearest = (entries[first], node.children[first]);
+    let mut pushed = 0;
+    while rest != 0 {
+        let slot = rest.trailing_zeros() as usize % 8;
+        rest &= rest - 1;
+        let mut other = (entries[slot], node.children[slot]);
+        prefetch(tree, other.1);
+        if other.0 < nearest.0 {
+            std::mem::swap(&mut other, &mut nearest);
+        }
+        // Insertion into what this node pushed, which gets nearer towards the top.
+        stack.push(other);
+        let mut back = 0;
+        while back < pushed && stack.below(back + 1).0 < stack.below(back).0 {
+            let lower = *stack.below(back + 1);
+            *stack.below(back + 1) = std::mem::replace(stack.below(back), lower);
+            back += 1;
+        }
+        pushed += 1;
+    }
+    Some(nearest.1)
+}
+
+/// Ask for a child's memory before it is needed.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn prefetch(tree: &WideBvh, code: u32) {
+    let (start, lines): (*const i8, usize) = match Child::decode(code) {
+        Child::Inner(index) => (tree.nodes.as_ptr().wrapping_add(index as usize).cast(), 4),
+        Child::Leaf { first, .. } => (tree.packs.as_ptr().wrapping_add(first as usize).cast(), 3),
+    };
+    for line in 0..lines {
+        _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line));
+    }
+}
+
+/// See [`WideBvh::any`].
+#[target_feature(enable = "avx2")]
+pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
+    let (boxes, triangles) = (BoxRay::new(ray), TriangleRay::new(ray));
+    let end = boxes.origin[0].like(ray.t_max * SLAB_PAD);
+    let mut stack: Stack<u32> = Stack::new();
+    stack.push(0);
+    while let Some(code) = stack.pop() {
+        match Child::decode(code) {
+            Child::Inner(index) => {
+                let node = &tree.nodes[index as usize];
+                let (_, mut met) = boxes.enter(node, end);
+                while met != 0 {
+                    let child = node.children[met.trailing_zeros() as usize % 8];
+                    prefetch(tree, child);
+                    stack.push(child);
+                    met &= met - 1;
+                }
+            }
+            Child::Leaf { first, count } => {
+                for pack in &tree.packs[first as usize..(first + count) as usize] {
+                    let hits = triangles.hits(pack, ray.t_max);
+                    let mut lanes = hits.hit | hits.doubtful;
+                    while lanes != 0 {
+                        let lane = lanes.trailing_zeros() as usize % PACK;
+                        lanes &= lanes - 1;
+                        if Some(pack.ids[lane]) != except
+                            && (hits.hit & 1 << lane != 0
+                                || triangles.scalar.intersect(&pack.corners(lane), ray.t_max).is_some())
+                        {
+                            return true;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    false
+}

@@ -1,0 +1,43 @@
+//! Entries to come back to, in memory that is not cleared for every ray.
+
+use std::mem::MaybeUninit;
+
+/// Levels of the binary tree are fewer than 96, each at most seven children to come back to.
+const STACK_SIZE: usize = 96 * 7;
+
+/// A stack that no tree fills.
+pub struct Stack<T> {
+    entries: [MaybeUninit<T>; STACK_SIZE],
+    size: usize,
+}
+
+impl<T: Copy> Stack<T> {
+    /// An empty one.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self { entries: [const { MaybeUninit::uninit() }; STACK_SIZE], size: 0 }
+    }
+
+    /// Put one on top.
+    #[inline(always)]
+    pub fn push(&mut self, entry: T) {
+        self.entries[self.size].write(entry);
+        self.size += 1;
+    }
+
+    /// Take the top one.
+    #[inline(always)]
+    pub fn pop(&mut self) -> Option<T> {
+        self.size = self.size.checked_sub(1)?;
+        // SAFETY: entries below `size` before the decrement were written by `push`.
+        Some(unsafe { self.entries[self.size].assume_init() })
+    }
+
+    /// The entry `back` places below the top; it was pushed before.
+    #[inline(always)]
+    pub fn below(&mut self, back: usize) -> &mut T {
+        debug_assert!(back < self.size);
+        // SAFETY: as in `pop`.
+        unsafe { self.entries[self.size - 1 - back].assume_init_mut() }
+    }
+}
