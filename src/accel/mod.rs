@@ -6,3 +6,6 @@ pub mod wide_bvh;
 
 pub use bvh::Bvh;
 pub use wide_bvh::WideBvh;
+
+/// Rays that are traced together.
+pub const PACKET: usize = 16;

@@ -50,6 +50,16 @@ impl Geometry {
         &self.shapes
     }
 
+    /// The tree over the shapes that have an end.
+    pub(super) fn tree(&self) -> &Bvh {
+        &self.tree
+    }
+
+    /// The shapes that have none.
+    pub(super) fn unbounded(&self) -> &[u32] {
+        &self.unbounded
+    }
+
     /// Whether building from these would give the same.
     pub fn serves(
         &self,

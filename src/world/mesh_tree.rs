@@ -61,4 +61,14 @@ impl MeshTree {
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         self.tree.any(ray, except)
     }
+
+    /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays.
+    pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<ShapeHit>]) {
+        self.tree.closest_packet(rays, hits);
+    }
+
+    /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle but its own of `except`.
+    pub fn any_packet(&self, rays: &[Ray], except: &[Option<u32>]) -> u32 {
+        self.tree.any_packet(rays, except)
+    }
 }

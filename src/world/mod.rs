@@ -6,6 +6,7 @@ mod emitters;
 pub mod geometry;
 mod lower;
 pub mod mesh_tree;
+mod packet;
 pub mod shape;
 pub mod textures;
 

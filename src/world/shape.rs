@@ -98,7 +98,7 @@ impl Shape {
 
 impl MeshInstance {
     /// The ray in the mesh's coordinates, with the same t.
-    fn local_ray(&self, ray: &Ray) -> Ray {
+    pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
         if self.transform == Transform::IDENTITY {
             return *ray;
         }

@@ -1,6 +1,7 @@
 //! A binary bounding volume hierarchy, built by binned surface area.
 
 mod build;
+mod packet;
 mod traverse;
 
 use crate::geometry::Aabb;

@@ -12,7 +12,9 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-pub use simd::{Instructions, PACKET};
+pub use simd::Instructions;
+
+use crate::accel::PACKET;
 
 use node::{Node, TrianglePack};
 

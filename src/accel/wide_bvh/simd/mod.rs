@@ -100,9 +100,6 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     }
 }
 
-/// Rays in a packet.
-pub const PACKET: usize = 16;
-
 /// See [`WideBvh::closest_packet`]; the tree is not empty. Says whether it was done.
 #[allow(unsafe_code)]
 pub fn closest_packet(tree: &WideBvh, rays: &[Ray], hits: &mut [Option<ShapeHit>]) -> bool {

@@ -6,10 +6,10 @@ use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
 use super::super::WideBvh;
 use super::super::node::{Child, Node, PACK, TrianglePack};
-use super::PACKET as SIZE;
 use super::lanes::{F8, F16, Lanes, Pair};
 use super::stack::Stack;
 use super::triangle;
+use crate::accel::PACKET as SIZE;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
