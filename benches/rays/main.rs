@@ -5,6 +5,7 @@
 //! - `--embree LIB` stands the same beside Embree 4: `LIB` is a `libembree4.so`, its scene robust and of medium quality.
 //!   `--embree-isa avx512` lets it use those (its packets of 16 need them, its single rays are faster by AVX2).
 //! - `--instructions NAME` traverses by those alone.
+//! - `--build` builds and traces nothing.
 //! - `--rays FILE --hits FILE` (or `--occluded FILE`), any number of times, counts what differs from given answers.
 //!
 //! Runs of glimt and of the peer alternate chunk by chunk, and each chunk counts by its fastest run, so that what else
@@ -37,6 +38,7 @@ struct Asked {
     embree: Option<PathBuf>,
     instructions: Option<Instructions>,
     isa: Option<String>,
+    build_only: bool,
     /// Files of rays, each with its answers.
     given: Vec<(PathBuf, PathBuf)>,
     files: Vec<String>,
@@ -75,6 +77,7 @@ fn asked() -> Asked {
                 asked.instructions =
                     Instructions::ALL.into_iter().find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
             }
+            "--build" => asked.build_only = true,
             "--rays" => rays = arguments.next().map(PathBuf::from),
             "--hits" | "--occluded" => {
                 asked.given.extend(rays.take().zip(arguments.next().map(PathBuf::from)));
@@ -100,7 +103,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
     let (mut own_build, mut peer_build) = (f64::INFINITY, f64::INFINITY);
     let mut tree = None;
     let mut scene = None;
-    for _ in 0..5 {
+    for _ in 0..if asked.build_only { 25 } else { 5 } {
         drop(tree.take());
         own_build = own_build.min(seconds(|| tree = Some(build())));
         if let Some(embree) = embree {
@@ -122,6 +125,9 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
     );
     let (nodes, packs) = tree.expected_visits();
     println!("  a random line visits {nodes:.2} nodes and {packs:.2} packs");
+    if asked.build_only {
+        return;
+    }
     let rays = meshes::rays(&tree, mesh);
     for instructions in Instructions::ALL {
         if instructions.available() != instructions

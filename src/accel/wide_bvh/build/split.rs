@@ -10,6 +10,11 @@ use crate::math::Vec4;
 /// Most bins along an axis.
 const BINS: usize = 32;
 
+/// Most bins of segments of at most [`FEW`] references.
+const FEW_BINS: usize = 8;
+
+const FEW: usize = 32;
+
 /// Segments with more references are binned in parallel.
 const PARALLEL_SIZE: usize = 1 << 16;
 
@@ -35,8 +40,8 @@ pub struct Segment {
 /// How to split.
 #[derive(Clone, Copy, Debug)]
 pub enum Split {
-    /// Those below a bin of an axis to the left.
-    Plane { axis: usize, bin: usize, bins: Bins },
+    /// Those below a bin of an axis to the left; with the boxes around both sides.
+    Plane { axis: usize, bin: usize, bins: Bins, sides: [Bounds; 2] },
     /// Half of them, as they stand.
     Middle,
 }
@@ -44,49 +49,65 @@ pub enum Split {
 impl Segment {
     /// All of the references.
     pub fn whole(references: &[Reference]) -> Self {
-        let chunk = |references: &[Reference]| {
-            let (mut bounds, mut centroids) = (Bounds::EMPTY, Bounds::EMPTY);
-            for reference in references {
-                bounds.grow(reference.min, reference.max);
-                centroids.grow(reference.centroid(), reference.centroid());
-            }
-            (bounds, centroids)
-        };
-        let (bounds, centroids) = references.par_chunks(PARALLEL_SIZE / 4).map(chunk).reduce(
-            || (Bounds::EMPTY, Bounds::EMPTY),
-            |mut a, b| {
-                a.0.grow(b.0.min, b.0.max);
-                a.1.grow(b.1.min, b.1.max);
-                a
-            },
-        );
-        Self::new(references, bounds, centroids, 0)
+        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(Boxes::around);
+        Self::new(references, chunks.reduce(|| Boxes::EMPTY, Boxes::union), 0)
     }
 
-    fn new(references: &[Reference], bounds: Bounds, centroids: Bounds, level: u32) -> Self {
+    fn new(references: &[Reference], boxes: Boxes, level: u32) -> Self {
         let count = references.len();
-        let (split, is_node) =
-            if count <= PACK { (None, false) } else { choose(references, &bounds, &centroids, level) };
-        Self { count, bounds, level, split, is_node }
+        let (split, is_node) = if count <= PACK { (None, false) } else { choose(references, &boxes, level) };
+        Self { count, bounds: boxes.bounds, level, split, is_node }
+    }
+}
+
+/// The box around some references, and the one around their centroids.
+#[derive(Clone, Copy)]
+struct Boxes {
+    bounds: Bounds,
+    centroids: Bounds,
+}
+
+impl Boxes {
+    const EMPTY: Self = Self { bounds: Bounds::EMPTY, centroids: Bounds::EMPTY };
+
+    fn around(references: &[Reference]) -> Self {
+        let mut own = Self::EMPTY;
+        for reference in references {
+            own.grow(reference, reference.centroid());
+        }
+        own
+    }
+
+    #[inline(always)]
+    fn grow(&mut self, reference: &Reference, centroid: Vec4) {
+        self.bounds.grow(reference.min, reference.max);
+        self.centroids.grow(centroid, centroid);
+    }
+
+    fn union(mut self, other: Self) -> Self {
+        self.bounds.grow(other.bounds.min, other.bounds.max);
+        self.centroids.grow(other.centroids.min, other.centroids.max);
+        self
     }
 }
 
 /// How a segment is split best, and whether that is worth a node.
-fn choose(
-    references: &[Reference],
-    bounds: &Bounds,
-    centroids: &Bounds,
-    level: u32,
-) -> (Option<Split>, bool) {
+fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>, bool) {
     let count = references.len();
     let must = count > PACK * MOST_PACKS as usize;
+    let Boxes { bounds, centroids } = boxes;
     let bins = Bins::new(centroids, count);
-    let best = if level < SURFACE_AREA_LEVELS { cheapest(references, &bins) } else { None };
+    let best = match count {
+        _ if level >= SURFACE_AREA_LEVELS => None,
+        0..=FEW => Histogram::<FEW_BINS>::of(references, &bins).cheapest(&bins),
+        ..=PARALLEL_SIZE => Histogram::<BINS>::of(references, &bins).cheapest(&bins),
+        _ => Histogram::<BINS>::in_parallel(references, &bins).cheapest(&bins),
+    };
     let leaf_cost = blocks(count as u32) as f32 * bounds.half_area();
     match best {
-        Some((axis, bin, cost)) if must || cost < leaf_cost => {
+        Some(Cheapest { axis, bin, cost, sides }) if must || cost < leaf_cost => {
             let is_node = must || cost + TRAVERSAL_COST * bounds.half_area() < leaf_cost;
-            (Some(Split::Plane { axis, bin, bins }), is_node)
+            (Some(Split::Plane { axis, bin, bins, sides }), is_node)
         }
         None if must => (Some(Split::Middle), true),
         _ => (None, false),
@@ -112,9 +133,10 @@ const ROUND: f32 = 12_582_912.0;
 
 impl Bins {
     fn new(centroids: &Bounds, references: usize) -> Self {
-        let count = BINS.min(4 + references / 8);
+        let count = BINS.min(4 + references / 8).max(if references > FEW { FEW_BINS } else { 0 });
         let extent = centroids.max - centroids.min;
         let scale = |length: f32| {
+            // A little less, so that the last centroid is in the last bin.
             let per_length = count as f32 * 0.999_99 / length;
             if length > 0.0 && per_length.is_finite() { per_length } else { 0.0 }
         };
@@ -122,37 +144,54 @@ impl Bins {
         Self { start: centroids.min, per_length, count }
     }
 
+    /// Numbers of the bins, plus [`ROUND`].
+    #[inline(always)]
+    fn place(&self, centroid: Vec4) -> Vec4 {
+        (centroid - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUND)
+    }
+
     #[inline(always)]
     fn of(&self, reference: &Reference) -> [usize; 3] {
-        let place =
-            (reference.centroid() - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUND);
-        let [x, y, z, _] = place.to_array();
-        [x, y, z].map(|place| (place.to_bits() as usize & (BINS - 1)).min(self.count - 1))
+        let [x, y, z, _] = self.place(reference.centroid()).to_array();
+        [x, y, z].map(|place| place.to_bits() as usize & (BINS - 1))
     }
 }
 
 /// Boxes and counts of the bins of three axes.
-#[derive(Clone)]
-struct Histogram {
-    bounds: [[Bounds; 3]; BINS],
-    counts: [[u32; 3]; BINS],
+struct Histogram<const N: usize> {
+    bounds: [[Bounds; 3]; N],
+    counts: [[u32; 3]; N],
 }
 
-impl Histogram {
+/// The cheapest split.
+struct Cheapest {
+    axis: usize,
+    /// The first bin on the right.
+    bin: usize,
+    /// Area-weighted packs of both sides.
+    cost: f32,
+    sides: [Bounds; 2],
+}
+
+impl<const N: usize> Histogram<N> {
     fn of(references: &[Reference], bins: &Bins) -> Self {
-        let mut own = Self { bounds: [[Bounds::EMPTY; 3]; BINS], counts: [[0; 3]; BINS] };
+        let mut own = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 3]; N] };
         for reference in references {
-            let [x, y, z] = bins.of(reference);
-            for (axis, bin) in [x, y, z].into_iter().enumerate() {
-                own.bounds[bin][axis].grow(reference.min, reference.max);
-                own.counts[bin][axis] += 1;
+            for (axis, bin) in bins.of(reference).into_iter().enumerate() {
+                own.bounds[bin % N][axis].grow(reference.min, reference.max);
+                own.counts[bin % N][axis] += 1;
             }
         }
         own
     }
 
+    fn in_parallel(references: &[Reference], bins: &Bins) -> Self {
+        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(|references| Self::of(references, bins));
+        chunks.reduce(|| Self::of(&[], bins), |all, one| all.add(&one))
+    }
+
     fn add(mut self, other: &Self) -> Self {
-        for bin in 0..BINS {
+        for bin in 0..N {
             for axis in 0..3 {
                 self.bounds[bin][axis].grow(other.bounds[bin][axis].min, other.bounds[bin][axis].max);
                 self.counts[bin][axis] += other.counts[bin][axis];
@@ -160,84 +199,93 @@ impl Histogram {
         }
         self
     }
-}
 
-/// Axis, first bin on the right, and area-weighted packs of both sides.
-fn cheapest(references: &[Reference], bins: &Bins) -> Option<(usize, usize, f32)> {
-    let histogram = if references.len() > PARALLEL_SIZE {
-        let histograms: Vec<_> = references
-            .par_chunks(references.len().div_ceil(8))
-            .map(|references| Histogram::of(references, bins))
-            .collect();
-        histograms.into_iter().reduce(|all, one| all.add(&one))?
-    } else {
-        Histogram::of(references, bins)
-    };
-    let mut best: Option<(usize, usize, f32)> = None;
-    for axis in 0..3 {
-        if bins.per_length[axis] == 0.0 {
-            continue;
-        }
-        let mut right_cost = [0.0_f32; BINS];
-        let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-        for bin in (1..bins.count).rev() {
-            let own = &histogram.bounds[bin][axis];
-            bounds.grow(own.min, own.max);
-            count += histogram.counts[bin][axis];
-            right_cost[bin] =
-                if count == 0 { f32::INFINITY } else { bounds.half_area() * blocks(count) as f32 };
-        }
-        (bounds, count) = (Bounds::EMPTY, 0);
-        for bin in 1..bins.count {
-            let own = &histogram.bounds[bin - 1][axis];
-            bounds.grow(own.min, own.max);
-            count += histogram.counts[bin - 1][axis];
-            if count == 0 {
-                continue;
+    /// Sweep over the planes between bins, from both ends.
+    fn cheapest(&self, bins: &Bins) -> Option<Cheapest> {
+        let mut best: Option<(usize, usize, f32)> = None;
+        let count = bins.count.min(N);
+        for axis in (0..3).filter(|&axis| bins.per_length[axis] > 0.0) {
+            let mut right_cost = [f32::INFINITY; N];
+            let (mut bounds, mut members) = (Bounds::EMPTY, 0);
+            for bin in (1..count).rev() {
+                let own = &self.bounds[bin][axis];
+                bounds.grow(own.min, own.max);
+                members += self.counts[bin][axis];
+                if members > 0 {
+                    right_cost[bin] = bounds.half_area() * blocks(members) as f32;
+                }
             }
-            let cost = bounds.half_area() * blocks(count) as f32 + right_cost[bin];
-            if cost.is_finite() && best.is_none_or(|(_, _, least)| cost < least) {
-                best = Some((axis, bin, cost));
+            (bounds, members) = (Bounds::EMPTY, 0);
+            for bin in 1..count {
+                let own = &self.bounds[bin - 1][axis];
+                bounds.grow(own.min, own.max);
+                members += self.counts[bin - 1][axis];
+                let cost = bounds.half_area() * blocks(members) as f32 + right_cost[bin];
+                if members > 0 && cost < best.map_or(f32::INFINITY, |(_, _, least)| least) {
+                    best = Some((axis, bin, cost));
+                }
             }
         }
+        let (axis, bin, cost) = best?;
+        let around = |bins: &[[Bounds; 3]]| {
+            bins.iter().fold(Bounds::EMPTY, |mut all, bin| {
+                all.grow(bin[axis].min, bin[axis].max);
+                all
+            })
+        };
+        let (left, right) = self.bounds[..count].split_at(bin);
+        Some(Cheapest { axis, bin, cost, sides: [around(left), around(right)] })
     }
-    best
 }
 
 /// Reorder the references by the split; the two segments, neither of them empty.
 pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split) -> (Segment, Segment) {
-    let mut sides = [(Bounds::EMPTY, Bounds::EMPTY); 2];
-    let mut note = |side: usize, reference: &Reference| {
-        let (bounds, centroids) = &mut sides[side];
-        bounds.grow(reference.min, reference.max);
-        centroids.grow(reference.centroid(), reference.centroid());
-    };
-    let middle = match *split {
-        Split::Plane { axis, bin, bins } => {
-            let (mut start, mut end) = (0, references.len());
-            while start < end {
-                if bins.of(&references[start])[axis] < bin {
-                    note(0, &references[start]);
-                    start += 1;
-                } else {
-                    note(1, &references[start]);
-                    end -= 1;
-                    references.swap(start, end);
-                }
-            }
-            start
+    let (middle, left, right) = match split {
+        Split::Plane { axis, bin, bins, sides } => {
+            let (middle, [left, right]) = match axis {
+                0 => partition_by_plane::<0>(references, *bin, bins),
+                1 => partition_by_plane::<1>(references, *bin, bins),
+                _ => partition_by_plane::<2>(references, *bin, bins),
+            };
+            let boxes = |side: usize, centroids| Boxes { bounds: sides[side], centroids };
+            (middle, boxes(0, left), boxes(1, right))
         }
         Split::Middle => {
             let middle = references.len() / 2;
-            for (place, reference) in references.iter().enumerate() {
-                note(usize::from(place >= middle), reference);
-            }
-            middle
+            let (left, right) = references.split_at(middle);
+            (middle, Boxes::around(left), Boxes::around(right))
         }
     };
-    let (left, right) = references.split_at(middle);
     let level = segment.level + 1;
-    let [(left_bounds, left_centroids), (right_bounds, right_centroids)] = sides;
-    let left = Segment::new(left, left_bounds, left_centroids, level);
-    (left, Segment::new(right, right_bounds, right_centroids, level))
+    let (left_references, right_references) = references.split_at(middle);
+    let left = Segment::new(left_references, left, level);
+    (left, Segment::new(right_references, right, level))
+}
+
+/// Those below a bin first: how many they are, and the boxes around the centroids of both sides. Nothing depends on a branch
+/// that could be guessed wrongly: every reference changes places with the first on the right, which then counts to
+/// the left or not.
+fn partition_by_plane<const AXIS: usize>(
+    references: &mut [Reference],
+    bin: usize,
+    bins: &Bins,
+) -> (usize, [Bounds; 2]) {
+    let (start, per_length) = (Vec4::splat(bins.start[AXIS]), Vec4::splat(bins.per_length[AXIS]));
+    let first_right = Vec4::splat(ROUND + bin as f32);
+    let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
+    let mut middle = 0;
+    for i in 0..references.len() {
+        let reference = references[i];
+        references[i] = references[middle];
+        references[middle] = reference;
+        let centroid = reference.centroid();
+        let place =
+            (Vec4::splat(centroid[AXIS]) - start) * per_length - Vec4::splat(0.5) + Vec4::splat(ROUND);
+        let is_left = place.cmplt(first_right);
+        let on = |mask, otherwise| Vec4::select(mask, centroid, otherwise);
+        left.grow(on(is_left, Vec4::INFINITY), on(is_left, Vec4::NEG_INFINITY));
+        right.grow(on(!is_left, Vec4::INFINITY), on(!is_left, Vec4::NEG_INFINITY));
+        middle += usize::from(is_left.test(0));
+    }
+    (middle, [left, right])
 }
