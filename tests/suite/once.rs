@@ -99,6 +99,53 @@ fn the_report_has_its_keys() {
     assert!(report["peak_memory_bytes"].as_u64().expect("bytes") > 1 << 20);
 }
 
+/// The keys that scripts rely on, with a value of the type of each.
+const REPORT: &str = r#"{
+  "glimt": "0.1.0",
+  "scene": "scenes/cornell.toml",
+  "image": { "path": "cornell.png", "width": 640, "height": 480,
+             "samples": { "min": 16, "mean": 41.2, "max": 64 }, "error": 0.0081, "complete": true },
+  "settings": { "integrator": "whitted", "shadows": "soft", "photons": false, "dof": false, "accel": "bvh", "seed": 0, "threads": 2 },
+  "stages": [ { "name": "parse", "status": "done", "seconds": 0.0004, "why": "" } ],
+  "counters": { "triangles": 0, "camera_rays": 0, "shadow_rays": 0, "reflected_rays": 0, "refracted_rays": 0,
+                "photons_emitted": 0, "photons_stored": 0, "texels_loaded": 0, "texture_lookups": 0, "non_finite_samples": 0 },
+  "seconds": 1.93,
+  "peak_memory_bytes": 41943040
+}"#;
+
+/// Whether `found` has every key of `example`, with a value of its type; whole numbers stay whole.
+fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &str) {
+    use serde_json::Value as V;
+    match (example, found) {
+        (V::Object(keys), V::Object(_)) => {
+            for (key, value) in keys {
+                let place = format!("{place}.{key}");
+                assert_like(value, found.get(key).unwrap_or_else(|| panic!("{place} is missing")), &place);
+            }
+        }
+        (V::Array(values), V::Array(found)) => {
+            assert!(!found.is_empty(), "{place}");
+            found.iter().for_each(|one| assert_like(&values[0], one, place));
+        }
+        (V::Number(number), V::Number(_)) => assert!(!number.is_u64() || found.is_u64(), "{place}: {found}"),
+        (V::Bool(_), V::Bool(_)) | (V::String(_), V::String(_)) => {}
+        _ => panic!("{place} is {found}, not like {example}"),
+    }
+}
+
+#[test]
+fn the_report_has_every_key_with_its_type() {
+    let desk = Desk::new();
+    let example: serde_json::Value = serde_json::from_str(REPORT).expect("JSON");
+    let report = desk.report("ball.toml --samples 3");
+    assert_like(&example, &report, "report");
+    let error =
+        |samples: u32| desk.report(&format!("ball.toml --samples {samples}"))["image"]["error"].clone();
+    assert!(error(1).is_null(), "one sample tells nothing of its error");
+    let [few, many] = [4, 256].map(|samples| error(samples).as_f64().expect("an estimate"));
+    assert!(many > 0.0 && many < 0.25 * few && few < 1.0, "{few} {many}");
+}
+
 #[test]
 fn a_wrong_scene_is_2_and_leaves_the_picture() {
     let desk = Desk::new();
