@@ -5,10 +5,10 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::MAX_FILE_BYTES;
 use super::diagnostic::{Diagnostic, Place, Severity};
 use super::nearest::nearest;
 use super::sanitize::visible;
+use super::{MAX_FILE_BYTES, MAX_PARTS};
 
 /// The text and the hash of its bytes. The error is one diagnostic that names the file.
 pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnostic>> {
@@ -55,7 +55,15 @@ fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(too_large());
     }
+    if parts(&bytes) > MAX_PARTS {
+        return Err(large(format!("the scene file has more than {} million parts", MAX_PARTS >> 20)));
+    }
     Ok(bytes)
+}
+
+/// What the memory that a text takes grows with, counted.
+fn parts(text: &[u8]) -> usize {
+    text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
 /// Opens a file for reading; a pipe without a writer does not block.
@@ -87,10 +95,11 @@ fn regular(metadata: &Metadata) -> Result<(), Refusal> {
 }
 
 fn too_large() -> Refusal {
-    (
-        format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20),
-        Some("large geometry belongs in mesh files, which [[mesh]] names".to_owned()),
-    )
+    large(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
+}
+
+fn large(message: String) -> Refusal {
+    (message, Some("large geometry belongs in mesh files, which [[mesh]] names".to_owned()))
 }
 
 fn unreadable(path: &Path, error: &io::Error) -> Refusal {
@@ -191,7 +200,9 @@ mod tests {
         let path = folder.path().join("scene.toml");
         let file = File::create(&path).expect("a file");
         file.set_len(MAX_FILE_BYTES + 1).expect("grown");
-        assert!(message(&path).message.contains("16 MiB"));
+        assert!(message(&path).message.contains("128 MiB"));
+        std::fs::write(&path, "x=[[],[]]\n".repeat(MAX_PARTS / 7)).expect("written");
+        assert!(message(&path).message.contains("32 million parts"));
         std::fs::write(&path, b"# fine\nname = \"\xe4\"\n").expect("written");
         let encoding = message(&path);
         assert!(encoding.message.contains("line 2"), "{}", encoding.message);
