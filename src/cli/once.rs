@@ -9,7 +9,7 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::report;
-use super::signals::{self, Ended};
+use super::signals;
 use crate::output::check_place;
 use crate::pipeline::protocol::{Command, Event, Failure, Report, Request};
 use crate::pipeline::{Handle, start};
@@ -41,10 +41,28 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         force: false,
     })));
     let mut reporter = progress::reporter(order.progress, console);
-    let exit = follow(&worker, order, console, &mut *reporter, &ended);
+    let mut deadline = Deadline::default();
+    let exit = follow(&worker, order, console, &mut *reporter, || {
+        ended.by().is_some() && deadline.is_over(Instant::now())
+    });
     reporter.end();
-    worker.finish(PATIENCE);
+    worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
+}
+
+/// When the program ends whatever the worker is at: [`PATIENCE`] after it was first asked for.
+#[derive(Debug, Default)]
+struct Deadline(Option<Instant>);
+
+impl Deadline {
+    fn is_over(&mut self, now: Instant) -> bool {
+        now >= *self.0.get_or_insert(now + PATIENCE)
+    }
+
+    /// What the worker may still take.
+    fn left(&self, now: Instant) -> Duration {
+        self.0.map_or(PATIENCE, |end| end.saturating_duration_since(now))
+    }
 }
 
 /// Until the request is over or a signal ends it.
@@ -53,12 +71,11 @@ fn follow(
     order: &Order,
     console: &Console,
     reporter: &mut dyn Reporter,
-    ended: &Ended,
+    mut is_over: impl FnMut() -> bool,
 ) -> Exit {
     let mut written: Vec<PathBuf> = Vec::new();
-    let mut deadline: Option<Instant> = None;
     loop {
-        if ended.by().is_some() && *deadline.get_or_insert(Instant::now() + PATIENCE) < Instant::now() {
+        if is_over() {
             return Exit::FAILED;
         }
         let event = match worker.events.recv_timeout(TICK) {
@@ -128,4 +145,21 @@ fn wrote(path: &std::path::Path, report: &Report) -> String {
     };
     let seconds = progress::seconds(report.seconds);
     format!("wrote {} ({}×{}, {samples}, {seconds})", path.display(), image.width, image.height)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_is_waited_after_once() {
+        let signal = Instant::now();
+        let half = signal + PATIENCE / 2;
+        let mut deadline = Deadline::default();
+        assert_eq!(deadline.left(half), PATIENCE, "without a signal");
+        assert!(!deadline.is_over(signal) && !deadline.is_over(half));
+        assert_eq!(deadline.left(half), PATIENCE / 2);
+        assert!(deadline.is_over(signal + PATIENCE));
+        assert_eq!(deadline.left(signal + PATIENCE), Duration::ZERO);
+    }
 }
