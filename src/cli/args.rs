@@ -80,7 +80,7 @@ pub struct RenderArgs {
     pub once: bool,
 
     /// Where the picture goes; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
-    /// ppm. [default: the scene's `output`, else the scene's name with .png]
+    /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
     #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Bits per channel of PNG files: 8 or 16

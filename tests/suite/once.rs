@@ -19,6 +19,22 @@ fn a_scene_is_rendered_and_named_at_the_end() {
 }
 
 #[test]
+fn an_output_of_the_scene_lies_beside_it_and_one_of_the_call_in_the_working_directory() {
+    let desk = Desk::new();
+    fs::create_dir_all(desk.path("scenes/out")).expect("a folder");
+    desk.write("scenes/own.toml", SCENE.replace("[render]", "[render]\noutput = \"out/own.ppm\""));
+    desk.write("scenes/none.toml", SCENE);
+    let stderr = desk.expect("scenes/own.toml --once", 0);
+    assert!(stderr.contains("wrote scenes/out/own.ppm (32×24"), "{stderr}");
+    assert!(desk.path("scenes/out/own.ppm").is_file());
+    desk.expect("scenes/none.toml --once", 0);
+    assert!(desk.path("none.png").is_file());
+    desk.expect("scenes/own.toml --once -o call.png", 0);
+    assert!(desk.path("call.png").is_file());
+    assert_eq!(fs::read_dir(desk.path("scenes")).expect("a folder").count(), 3, "nothing else is beside it");
+}
+
+#[test]
 fn several_outputs_and_no_progress() {
     let desk = Desk::new();
     let stderr = desk.expect("ball.toml --once -o a.png -o b.ppm --progress none", 0);
@@ -120,7 +136,8 @@ fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &s
         (V::Object(keys), V::Object(_)) => {
             for (key, value) in keys {
                 let place = format!("{place}.{key}");
-                assert_like(value, found.get(key).unwrap_or_else(|| panic!("{place} is missing")), &place);
+                assert!(found.get(key).is_some(), "{place} is missing");
+                assert_like(value, &found[key], &place);
             }
         }
         (V::Array(values), V::Array(found)) => {
@@ -129,7 +146,7 @@ fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &s
         }
         (V::Number(number), V::Number(_)) => assert!(!number.is_u64() || found.is_u64(), "{place}: {found}"),
         (V::Bool(_), V::Bool(_)) | (V::String(_), V::String(_)) => {}
-        _ => panic!("{place} is {found}, not like {example}"),
+        _ => assert_eq!(found, example, "{place} is of another type"),
     }
 }
 
@@ -216,6 +233,23 @@ fn check_says_what_there_is() {
     desk.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = desk.expect("check ball.toml", 2);
     assert!(stderr.contains("bal") && stderr.contains("ball.toml:17:"), "{stderr}");
+}
+
+#[test]
+fn a_scene_of_very_many_shapes_is_checked() {
+    use std::fmt::Write;
+    const COUNT: u32 = 200_000;
+    let desk = Desk::new();
+    let mut text = SCENE.to_owned();
+    for i in 1..COUNT {
+        let (x, y, z) = (i % 97, i / 97 % 89, i / 8633);
+        let sphere = format!("center = [{x}.25, {y}.5, -{z}]\nradius = 0.125\nmaterial = \"ball\"");
+        writeln!(text, "[[sphere]]\n{sphere}").expect("memory");
+    }
+    desk.write("many.toml", text);
+    let output = desk.run("check many.toml");
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(stdout.starts_with("ok: many.toml: 200000 objects, 0 triangles"), "{stdout}");
 }
 
 #[test]
