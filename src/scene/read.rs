@@ -8,7 +8,8 @@ use std::sync::Arc;
 use super::diagnostic::{Diagnostic, Place, Severity};
 use super::nearest::nearest;
 use super::sanitize::visible;
-use super::{MAX_FILE_BYTES, MAX_PARTS};
+use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE};
+use crate::system::in_words;
 
 /// The text and the hash of its bytes. The error is one diagnostic that names the file.
 pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnostic>> {
@@ -109,24 +110,9 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
     if error.kind() == io::ErrorKind::NotFound {
         let help = neighbour(path).map(|near| format!("did you mean {}?", visible(&near.to_string_lossy())));
         let start = || "`glimt new FILE` writes a scene to start from".to_owned();
-        return ("there is no such scene file".to_owned(), Some(help.unwrap_or_else(start)));
+        return (NO_SUCH_FILE.to_owned(), Some(help.unwrap_or_else(start)));
     }
-    (format!("cannot read the scene file: {}", reason(error)), None)
-}
-
-/// An error of the file system in words.
-pub(super) fn reason(error: &io::Error) -> String {
-    #[cfg(unix)]
-    if error.raw_os_error() == Some(nix::libc::ELOOP) {
-        return "its symbolic links lead in a circle".to_owned();
-    }
-    match error.kind() {
-        io::ErrorKind::NotFound => "there is no such file".to_owned(),
-        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        io::ErrorKind::NotADirectory => "a part of its path is a file, not a folder".to_owned(),
-        io::ErrorKind::InvalidInput => "that is no name of a file".to_owned(),
-        _ => error.to_string(),
-    }
+    (format!("cannot read the scene file: {}", in_words(error)), None)
 }
 
 /// The file beside a missing one whose name is nearest to it.
