@@ -17,6 +17,7 @@ Examples:
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
 
+The scene that `glimt new` writes has every key, with comments.
 A scene that is named like a command is given with its folder: glimt ./check
 
 Exit codes: 0 done; 1 the work failed; 2 the call or the scene is wrong;

@@ -11,8 +11,10 @@ use super::progress::{self, Reporter};
 use super::report;
 use super::signals;
 use crate::output::check_place;
-use crate::pipeline::protocol::{Command, Event, Failure, Report, Request};
+use crate::pipeline::protocol::{Command, Effective, Event, Failure, Report, Request};
+use crate::pipeline::settings::Overrides;
 use crate::pipeline::{Handle, start};
+use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// How long the end may take after a signal.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -74,15 +76,21 @@ fn follow(
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
     let mut written: Vec<PathBuf> = Vec::new();
+    let mut idle: Vec<Diagnostic> = Vec::new();
     loop {
         if is_over() {
             return Exit::FAILED;
         }
-        let event = match worker.events.recv_timeout(TICK) {
+        let mut event = match worker.events.recv_timeout(TICK) {
             Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => return console.fail(Exit::FAILED, "the worker is gone"),
         };
+        match &mut event {
+            Event::Settings { settings, .. } => idle = without_effect(&order.overrides, settings),
+            Event::Done { warnings, .. } => warnings.append(&mut idle),
+            _ => {}
+        }
         reporter.event(&event);
         match event {
             Event::Written { path, .. } => written.push(path),
@@ -102,6 +110,26 @@ fn follow(
             _ => {}
         }
     }
+}
+
+/// Warnings about options that were asked for and change nothing. The terminal UI says it in its own way.
+fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
+    let warning = |message: &str, help: &str| Diagnostic {
+        severity: Severity::Warning,
+        message: message.to_owned(),
+        path: PathBuf::new(),
+        place: None,
+        help: Some(help.to_owned()),
+    };
+    let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
+        let help = "give the scene's [camera] an `aperture`, such as 0.1";
+        warning("--dof on has no effect: the scene's camera is a pinhole", help)
+    });
+    let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
+        let help = "`ambient` in [render] stands for the light that bounces between surfaces";
+        warning("--photons on has no effect: this version does not render photons", help)
+    });
+    dof.into_iter().chain(photons).collect()
 }
 
 fn done(

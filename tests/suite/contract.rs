@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use glimt::scene::description::{Camera, Scene};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
-use glimt::scene::parse;
+use glimt::scene::{parse, starter};
 
 /// What is promised of a key.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -320,4 +320,45 @@ fn paths_in_a_scene_are_seen_from_its_folder() {
     assert_eq!(scene.render.output, Some(folder.path().join("scenes/cornell.png")));
     assert_eq!(scene.mesh_files[0].value, folder.path().join("scenes/../assets/knot.obj"));
     assert_eq!(scene.textures[1].file.value, folder.path().join("scenes/textures/bricks.png"));
+}
+
+#[test]
+fn the_starter_and_the_readme_have_every_key() {
+    let readme = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).expect("a text");
+    let reference = readme.split("## All keys of a scene").nth(1).expect("a chapter");
+    for (header, keys) in TABLES {
+        let start =
+            header.split_once('.').map_or(format!("| `{header}`"), |(table, _)| format!("| `{table}."));
+        let row = reference.lines().find(|line| line.starts_with(&start)).unwrap_or_default();
+        for (key, ..) in *keys {
+            let in_row =
+                row.contains(&format!("`{key}`")) || *key == "material" && reference.contains("`material`");
+            assert!(in_row, "README: {header} {key}");
+            let has = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} = "));
+            assert!(*header == "[environment]" || starter().lines().any(has), "starter: {header} {key}");
+        }
+    }
+}
+
+#[test]
+fn every_line_of_the_starter_may_be_uncommented() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["bricks.png", "knot.obj"] {
+        fs::write(folder.path().join(name), "").expect("written");
+    }
+    let is_key = |text: &str| {
+        let name = text.split(" = ").next().unwrap_or_default();
+        text.starts_with('[')
+            || text.contains(" = ") && name.chars().all(|c| c.is_ascii_lowercase() || c == '_')
+    };
+    let uncommented = |line: &str| match line.strip_prefix("# ") {
+        // It stands in place of others.
+        Some(text) if is_key(text) && !text.starts_with("orbiter") => format!("{text}\n"),
+        _ => format!("{line}\n"),
+    };
+    let text: String = starter().lines().map(uncommented).collect();
+    assert!(text.lines().filter(|line| line.starts_with('#')).count() < 12, "{text}");
+    let outcome = parse(text.into(), &folder.path().join("scene.toml"));
+    assert_eq!(errors(&outcome.diagnostics), [""; 0]);
+    assert_eq!(outcome.scene.expect("a scene").objects.len(), 7);
 }

@@ -185,6 +185,45 @@ fn a_mesh_that_is_not_there_is_2_and_named() {
 }
 
 #[test]
+fn what_is_wrong_with_the_call_is_not_said_of_the_scene() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once --crop 0,0,33,1 --progress none", 2);
+    assert!(stderr.starts_with("error: --crop 0,0,33,1") && !stderr.contains("-->"), "{stderr}");
+    let stderr = desk.expect("ball.toml --once --bit-depth 16 -o a.png -o a.jpg --progress none", 2);
+    assert!(stderr.contains("JPEG") && stderr.contains("--> a.jpg\n"), "{stderr}");
+    desk.write("ball.toml", SCENE.replace("[render]", "[render]\noutput = \"own.jpg\""));
+    let stderr = desk.expect("ball.toml --once --bit-depth 16 --progress none", 2);
+    assert!(stderr.contains("--> own.jpg\n"), "{stderr}");
+    assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
+}
+
+#[test]
+fn options_that_change_nothing_are_told() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once --dof on --photons on --progress none", 0);
+    let warning = "warning: --dof on has no effect: the scene's camera is a pinhole";
+    assert!(stderr.contains(warning) && stderr.contains("--photons on has no effect"), "{stderr}");
+    assert!(stderr.ends_with("2 warnings\n"), "{stderr}");
+    let stderr = desk.expect("ball.toml --once --dof on --progress json", 0);
+    let done = stderr.lines().last().map(serde_json::from_str::<serde_json::Value>);
+    let done = done.expect("a line").expect("JSON");
+    let warning = &done["diagnostics"][0];
+    assert!(warning["path"].is_null() && warning["line"].is_null(), "{done}");
+    desk.write("ball.toml", SCENE.replace("[materials", "aperture = 0.1\n[materials"));
+    let stderr = desk.expect("ball.toml --once --dof on --photons off --progress none", 0);
+    assert_eq!(stderr, "");
+}
+
+#[test]
+fn a_generated_mesh_that_is_not_there_is_told_with_its_maker() {
+    let desk = Desk::new();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/million.toml");
+    desk.write("million.toml", fs::read_to_string(scene).expect("a scene"));
+    let stderr = desk.expect("check million.toml", 2);
+    assert!(stderr.contains("there is no file") && stderr.contains("glimt-assets -- million"), "{stderr}");
+}
+
+#[test]
 fn a_wrong_call_is_2() {
     let desk = Desk::new();
     for (line, word) in [
@@ -193,6 +232,7 @@ fn a_wrong_call_is_2() {
         ("ball.toml --once --accel kdtree", "not available"),
         ("ball.toml --once -o a.xyz", "a.xyz"),
         ("ball.toml --once --crop 0,0,33,1", "32×24"),
+        ("ball.toml --once --bit-depth 16 -o a.jpg", "cannot hold 16 bits"),
         ("ball.toml --nonsense", "--nonsense"),
         ("", "SCENE"),
     ] {
