@@ -7,6 +7,7 @@
 //!
 //! | room | what it knows |
 //! | --- | --- |
+//! | [`system`] | the operating system's errors in plain words |
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
@@ -26,24 +27,25 @@
 //!
 //! ## The arrows
 //!
-//! Each room uses only the rooms on its right; `tests/suite/house.rs` reads the `use` lines and holds them to
-//! this table.
+//! Each room uses the rooms on its right and no others; `tests/suite/house.rs` reads the sources and holds them to
+//! this table, and the table to them.
 //!
 //! ```text
+//! system      ->
 //! math        ->
 //! control     ->
 //! geometry    -> math
 //! accel       -> geometry math control
 //! sampling    -> math
-//! materials   -> sampling math
-//! lights      -> geometry sampling math
-//! scene       -> math
-//! assets      -> geometry materials math control
-//! world       -> scene assets accel materials lights geometry sampling math control
+//! materials   -> math
+//! lights      -> sampling math
+//! scene       -> math system
+//! assets      -> geometry materials math control system
+//! world       -> scene assets accel materials lights geometry math control
 //! film        -> math
 //! integrators -> world scene materials lights geometry sampling film math control
-//! output      -> film math
-//! pipeline    -> integrators world assets scene film output geometry materials math control
+//! output      -> film math system
+//! pipeline    -> integrators world assets scene film output materials math control
 //! tui         -> pipeline scene film math
 //! cli         -> pipeline tui output scene film
 //! ```
@@ -52,9 +54,11 @@
 //!
 //! - The same scene, settings and seed give the same bits, whatever the number of threads: random numbers
 //!   are a function of pixel, sample and dimension, and every sum has a fixed order.
-//! - Rays travel in batches; a hit carries a bound on its error; no epsilon constants.
+//! - Rays travel in batches; a hit carries a bound on its error, from which the next ray starts: no distance is a
+//!   constant. Where a constant tells degenerate from usable it is relative to the size of what it judges.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
-//! - Files are touched in `assets`, `output`, `scene` (the scene itself) and `pipeline::watch` alone.
+//! - Files are touched in `assets`, `output`, `scene` (the scene, and whether what it names is there),
+//!   `pipeline::watch` and `cli::new` alone.
 //! - `unsafe` code is in `accel::wide_bvh::simd` alone, with a portable twin that gives the same bits.
 //! - `tui` does not know `world`; `world` does not know pixels or time.
 
@@ -72,5 +76,6 @@ pub mod output;
 pub mod pipeline;
 pub mod sampling;
 pub mod scene;
+pub mod system;
 pub mod tui;
 pub mod world;

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::AssetError;
 use crate::control::{CancelToken, Cancelled, Progress};
+pub(crate) use crate::system::in_words;
 
 /// Bytes between two polls of the token.
 const CHUNK: usize = 1 << 20;
@@ -86,24 +87,6 @@ fn bytes_if(
         let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;
         if got == 0 {
             return Ok(bytes);
-        }
-    }
-}
-
-/// What went wrong, without the number of the operating system.
-pub(crate) fn in_words(error: &std::io::Error) -> String {
-    use std::io::ErrorKind;
-    match error.kind() {
-        ErrorKind::NotFound => "no such file".to_owned(),
-        _ if error.raw_os_error() == Some(nix::libc::ELOOP) => {
-            "its symbolic links lead in a circle".to_owned()
-        }
-        ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        _ => {
-            let text = error.to_string();
-            let words = text.split(" (os error").next().unwrap_or(&text);
-            let mut letters = words.chars();
-            letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
         }
     }
 }

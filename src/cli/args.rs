@@ -17,6 +17,7 @@ Examples:
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
 
+The scene that `glimt new` writes has every key, with comments.
 A scene that is named like a command is given with its folder: glimt ./check
 
 Exit codes: 0 done; 1 the work failed; 2 the call or the scene is wrong;
@@ -80,7 +81,7 @@ pub struct RenderArgs {
     pub once: bool,
 
     /// Where the picture goes; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
-    /// ppm. [default: the scene's `output`, else the scene's name with .png]
+    /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
     #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Bits per channel of PNG files: 8 or 16

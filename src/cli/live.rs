@@ -9,9 +9,11 @@ use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
 use super::report;
-use crate::pipeline::protocol::Event;
+use crate::pipeline::protocol::{Event, Failure};
 use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
+use crate::scene::NO_SUCH_FILE;
+use crate::scene::diagnostic::Diagnostic;
 use crate::tui::{self, Changed, ColorChoice, Options, PreviewChoice, TuiError};
 
 /// How long a file that is being written may take at the end.
@@ -59,19 +61,29 @@ fn live(order: Order) -> Result<Exit, (Exit, String)> {
 
 /// Hand events on, and see to files and reports on the way.
 fn tap(events: &Receiver<Event>, report: Option<&Path>, watcher: &Watcher, forward: impl Fn(Event) -> bool) {
-    for event in events {
-        match &event {
+    for mut event in events {
+        match &mut event {
             Event::Files { files, .. } => watcher.set_files(files.clone()),
             Event::Done { report: made, generation, .. } => {
                 if let Some(Err(message)) = report.map(|path| report::write(path, made)) {
                     forward(Event::WriteFailed { generation: *generation, message });
                 }
             }
+            Event::Failed { failure: Failure::Scene(all), .. } => all.iter_mut().for_each(await_scene),
             _ => {}
         }
         if !forward(event) {
             return;
         }
+    }
+}
+
+/// A scene that is not there may come (back): what watches it needs no other way out.
+fn await_scene(problem: &mut Diagnostic) {
+    if problem.message == NO_SUCH_FILE {
+        let typo = problem.help.take().filter(|help| help.starts_with("did you mean"));
+        let typo = typo.map_or(String::new(), |typo| format!("; {typo}"));
+        problem.help = Some(format!("it is rendered as soon as it is there{typo}"));
     }
 }
 
@@ -91,5 +103,28 @@ fn preview(preview: args::Preview) -> PreviewChoice {
         args::Preview::Halfblock => PreviewChoice::HalfBlock,
         args::Preview::Ascii => PreviewChoice::Ascii,
         args::Preview::None => PreviewChoice::None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_that_is_gone_is_waited_for() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let said = |name: &str| {
+            let [mut problem] = crate::scene::load(&folder.path().join(name))
+                .expect_err("there is none")
+                .try_into()
+                .expect("one problem");
+            await_scene(&mut problem);
+            problem.help.expect("a way out")
+        };
+        assert_eq!(said("room.toml"), "it is rendered as soon as it is there");
+        std::fs::write(folder.path().join("rooms.toml"), "").expect("written");
+        assert!(said("room.toml").contains("as soon as it is there; did you mean"));
+        std::fs::write(folder.path().join("room.toml"), "").expect("written");
+        assert!(!said("room.toml").contains("as soon as"), "another problem has its own way out");
     }
 }

@@ -9,10 +9,12 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::report;
-use super::signals::{self, Ended};
+use super::signals;
 use crate::output::check_place;
-use crate::pipeline::protocol::{Command, Event, Failure, Report, Request};
+use crate::pipeline::protocol::{Command, Effective, Event, Failure, Report, Request};
+use crate::pipeline::settings::Overrides;
 use crate::pipeline::{Handle, start};
+use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// How long the end may take after a signal.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -41,10 +43,28 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         force: false,
     })));
     let mut reporter = progress::reporter(order.progress, console);
-    let exit = follow(&worker, order, console, &mut *reporter, &ended);
+    let mut deadline = Deadline::default();
+    let exit = follow(&worker, order, console, &mut *reporter, || {
+        ended.by().is_some() && deadline.is_over(Instant::now())
+    });
     reporter.end();
-    worker.finish(PATIENCE);
+    worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
+}
+
+/// When the program ends whatever the worker is at: [`PATIENCE`] after it was first asked for.
+#[derive(Debug, Default)]
+struct Deadline(Option<Instant>);
+
+impl Deadline {
+    fn is_over(&mut self, now: Instant) -> bool {
+        now >= *self.0.get_or_insert(now + PATIENCE)
+    }
+
+    /// What the worker may still take.
+    fn left(&self, now: Instant) -> Duration {
+        self.0.map_or(PATIENCE, |end| end.saturating_duration_since(now))
+    }
 }
 
 /// Until the request is over or a signal ends it.
@@ -53,19 +73,24 @@ fn follow(
     order: &Order,
     console: &Console,
     reporter: &mut dyn Reporter,
-    ended: &Ended,
+    mut is_over: impl FnMut() -> bool,
 ) -> Exit {
     let mut written: Vec<PathBuf> = Vec::new();
-    let mut deadline: Option<Instant> = None;
+    let mut idle: Vec<Diagnostic> = Vec::new();
     loop {
-        if ended.by().is_some() && *deadline.get_or_insert(Instant::now() + PATIENCE) < Instant::now() {
+        if is_over() {
             return Exit::FAILED;
         }
-        let event = match worker.events.recv_timeout(TICK) {
+        let mut event = match worker.events.recv_timeout(TICK) {
             Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => return console.fail(Exit::FAILED, "the worker is gone"),
         };
+        match &mut event {
+            Event::Settings { settings, .. } => idle = without_effect(&order.overrides, settings),
+            Event::Done { warnings, .. } => warnings.append(&mut idle),
+            _ => {}
+        }
         reporter.event(&event);
         match event {
             Event::Written { path, .. } => written.push(path),
@@ -85,6 +110,26 @@ fn follow(
             _ => {}
         }
     }
+}
+
+/// Warnings about options that were asked for and change nothing. The terminal UI says it in its own way.
+fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
+    let warning = |message: &str, help: &str| Diagnostic {
+        severity: Severity::Warning,
+        message: message.to_owned(),
+        path: PathBuf::new(),
+        place: None,
+        help: Some(help.to_owned()),
+    };
+    let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
+        let help = "give the scene's [camera] an `aperture`, such as 0.1";
+        warning("--dof on has no effect: the scene's camera is a pinhole", help)
+    });
+    let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
+        let help = "`ambient` in [render] stands for the light that bounces between surfaces";
+        warning("--photons on has no effect: this version does not render photons", help)
+    });
+    dof.into_iter().chain(photons).collect()
 }
 
 fn done(
@@ -128,4 +173,21 @@ fn wrote(path: &std::path::Path, report: &Report) -> String {
     };
     let seconds = progress::seconds(report.seconds);
     format!("wrote {} ({}×{}, {samples}, {seconds})", path.display(), image.width, image.height)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_is_waited_after_once() {
+        let signal = Instant::now();
+        let half = signal + PATIENCE / 2;
+        let mut deadline = Deadline::default();
+        assert_eq!(deadline.left(half), PATIENCE, "without a signal");
+        assert!(!deadline.is_over(signal) && !deadline.is_over(half));
+        assert_eq!(deadline.left(half), PATIENCE / 2);
+        assert!(deadline.is_over(signal + PATIENCE));
+        assert_eq!(deadline.left(signal + PATIENCE), Duration::ZERO);
+    }
 }

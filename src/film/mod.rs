@@ -4,6 +4,7 @@
 //! [`Previewer`] shrinks it for the screen while it grows, and [`tone::develop`] turns either into a [`Picture`].
 
 mod curves;
+mod noise;
 mod preview;
 mod resample;
 mod srgb;

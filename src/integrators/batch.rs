@@ -8,7 +8,7 @@ use crate::control::CancelToken;
 use crate::film::Rect;
 use crate::geometry::Ray;
 use crate::lights::Source;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, Vec2, Vec3};
 use crate::sampling::filter::Filter;
 use crate::sampling::{PixelSampler, Purpose, warp};
 use crate::scene::description::PixelFilter;
@@ -192,8 +192,8 @@ impl Tracer<'_> {
         let sample = filter(self.settings.filter).sample(Vec2::new(fx, fy));
         let place = (sample.offset + Vec2::splat(0.5)).as_dvec2();
         let lens = if self.settings.dof { warp::disk(Vec2::new(lx, ly)) } else { Vec2::ZERO };
-        let (width, height) = (self.settings.width, self.settings.height);
-        let ray = self.world.camera.ray(f64::from(x) + place.x, f64::from(y) + place.y, width, height, lens);
+        let from_corner = DVec2::new(f64::from(x), f64::from(y)) + place;
+        let ray = self.world.camera.ray(self.settings.from_middle(from_corner), lens);
         PathRay { ray, throughput: Vec3::splat(sample.weight), slot, path: 1, medium: Medium::default() }
     }
 }

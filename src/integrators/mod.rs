@@ -14,7 +14,7 @@ use batch::{Queues, SampleBlock, Tracer};
 
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Rect, TileSamples};
-use crate::math::Vec3;
+use crate::math::{DVec2, Vec3};
 use crate::scene::description::{PixelFilter, Shadows};
 use crate::world::World;
 
@@ -108,6 +108,15 @@ pub struct RenderSettings {
     pub seed: u32,
     /// What is shown.
     pub view: View,
+}
+
+impl RenderSettings {
+    /// A place in the picture, in pixels from its top left corner, as the camera takes it: from its middle to the right
+    /// and up, in halves of its height.
+    pub fn from_middle(&self, from_corner: DVec2) -> DVec2 {
+        let (half_width, half_height) = (0.5 * f64::from(self.width), 0.5 * f64::from(self.height));
+        DVec2::new(from_corner.x - half_width, half_height - from_corner.y) / half_height
+    }
 }
 
 /// Rays and look-ups of one tile.

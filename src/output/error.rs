@@ -4,6 +4,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::Format;
+use crate::system::in_words;
 
 /// Why a picture could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -61,7 +62,7 @@ pub enum OutputError {
         way_out: &'static str,
     },
     /// The system refused.
-    #[error("cannot write {}: {}; {}", path.display(), words(source), way_out(source))]
+    #[error("cannot write {}: {}; {}", path.display(), in_words(source), way_out(source))]
     File {
         /// The path as given.
         path: PathBuf,
@@ -78,13 +79,6 @@ impl OutputError {
     pub(super) fn file(path: &Path, source: impl Into<io::Error>) -> Self {
         Self::File { path: path.to_owned(), source: source.into() }
     }
-}
-
-/// The system's words without its number, as they stand within a sentence.
-fn words(error: &io::Error) -> String {
-    let text = error.to_string();
-    let mut letters = text.split(" (os error").next().unwrap_or(&text).chars();
-    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
 }
 
 fn way_out(error: &io::Error) -> &'static str {

@@ -8,10 +8,11 @@ use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
 use super::stages::parse::Parsed;
 use super::trace::Kernel;
+use crate::assets::image::ImageEncoding;
 use crate::math::Vec3;
 use crate::scene::description::{Encoding, MaterialKind, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
-use crate::world::{NeededTexture, SourceEncoding, TextureSource};
+use crate::world::{NeededTexture, TextureSource};
 
 /// What a scene that is right consists of.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,9 +68,9 @@ fn add_declared(parsed: &Parsed, wanted: &mut Vec<NeededTexture>) {
             continue;
         }
         let encoding = match texture.encoding {
-            Encoding::Auto => SourceEncoding::Color,
-            Encoding::Srgb => SourceEncoding::Srgb,
-            Encoding::Linear => SourceEncoding::Linear,
+            Encoding::Auto => ImageEncoding::Color,
+            Encoding::Srgb => ImageEncoding::Srgb,
+            Encoding::Linear => ImageEncoding::Linear,
         };
         let source = TextureSource { path: texture.file.value.clone(), encoding };
         wanted.push(NeededTexture {

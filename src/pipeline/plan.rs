@@ -7,6 +7,7 @@ use super::settings::{Overrides, View};
 use crate::film::Rect;
 use crate::film::tone::{Curve, ToneMapping};
 use crate::integrators::RenderSettings;
+use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Camera, Integrator, Scene, Shadows, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
@@ -31,11 +32,11 @@ pub(super) struct Plan {
 /// Put scene and overrides together.
 ///
 /// # Errors
-/// A crop outside the picture.
+/// A crop outside the picture, or a file that cannot hold it.
 pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
     override_render(&mut scene, overrides);
     let render = &scene.render;
-    check_crop(overrides.crop, render.width, render.height, path)?;
+    check_crop(overrides.crop, render.width, render.height)?;
     let aperture = match &scene.camera {
         Camera::LookAt { aperture, .. } | Camera::Orbiter { aperture, .. } => *aperture,
     };
@@ -52,6 +53,8 @@ pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Resu
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let outputs = outputs(render.output.as_ref(), path, overrides);
+    let bit_depth = overrides.bit_depth.unwrap_or(8);
+    outputs.iter().try_for_each(|path| check_format(path, (render.width, render.height), bit_depth))?;
     Ok(Plan {
         name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         settings,
@@ -60,7 +63,7 @@ pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Resu
         crop: overrides.crop,
         time_seconds: overrides.time_seconds,
         tone: tone(render.exposure, render.tonemap, settings.view),
-        bit_depth: overrides.bit_depth.unwrap_or(8),
+        bit_depth,
         effective: effective(&scene, &settings, threads, &outputs),
         outputs,
         scene,
@@ -92,7 +95,7 @@ fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> Ve
     vec![of_scene.cloned().unwrap_or_else(default)]
 }
 
-fn check_crop(crop: Option<Rect>, width: u32, height: u32, path: &Path) -> Result<(), Box<Diagnostic>> {
+fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Diagnostic>> {
     let inside = |rect: Rect| {
         rect.area() > 0
             && rect.x.checked_add(rect.width).is_some_and(|right| right <= width)
@@ -105,12 +108,21 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32, path: &Path) -> Resul
                 "--crop {},{},{},{} does not lie inside the picture of {width}×{height} pixels",
                 rect.x, rect.y, rect.width, rect.height
             ),
-            path: path.to_owned(),
+            path: PathBuf::new(),
             place: None,
             help: Some("X,Y,W,H are the left and top pixel, the width and the height".to_owned()),
         })),
         _ => Ok(()),
     }
+}
+
+/// Whether a file of this ending can hold such a picture.
+fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+    let check = || Format::of(path)?.check_picture(size.0, size.1, BitDepth::try_from(bit_depth)?);
+    check().map_err(|error: OutputError| {
+        let (severity, message) = (Severity::Error, error.to_string());
+        Box::new(Diagnostic { severity, message, path: path.to_owned(), place: None, help: None })
+    })
 }
 
 /// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
@@ -190,9 +202,10 @@ mod tests {
     fn the_default_output_is_the_scenes_name_in_the_working_directory() {
         assert_eq!(planned("", &Overrides::default()).outputs, [PathBuf::from("my.scene.png")]);
         let scene = "[render]\noutput = \"a/b.exr\"\n";
-        assert_eq!(planned(scene, &Overrides::default()).outputs, [PathBuf::from("a/b.exr")]);
+        let of_scene = planned(scene, &Overrides::default()).outputs;
+        assert!(of_scene.len() == 1 && of_scene[0].is_absolute() && of_scene[0].ends_with("a/b.exr"));
         let overrides = Overrides { outputs: vec!["x.png".into(), "y.exr".into()], ..Default::default() };
-        assert_eq!(planned(scene, &overrides).outputs.len(), 2);
+        assert_eq!(planned(scene, &overrides).outputs, overrides.outputs);
     }
 
     #[test]

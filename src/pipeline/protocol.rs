@@ -326,6 +326,9 @@ pub struct ImageReport {
     pub height: u32,
     /// Samples per pixel.
     pub samples: SampleCounts,
+    /// The error to expect, relative to the picture's mean luminance; see
+    /// [`Film::relative_error`](crate::film::Film::relative_error). None below two samples a pixel.
+    pub error: Option<f64>,
     /// Whether every pixel got the samples that were asked for.
     pub complete: bool,
 }

@@ -43,6 +43,7 @@ fn image(outcome: &Outcome<'_>) -> ImageReport {
         width: plan.settings.width,
         height: plan.settings.height,
         samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
+        error: outcome.canvas.film.relative_error(),
         complete: outcome.canvas.is_complete(plan.samples),
     }
 }

@@ -72,7 +72,7 @@ pub struct Render {
     pub accel: Accel,
     /// Seed of every random number.
     pub seed: u32,
-    /// Where the picture goes, if the scene says so; as written, relative to the working directory.
+    /// Where the picture goes, if the scene says so, resolved against the scene's folder.
     pub output: Option<PathBuf>,
 }
 
@@ -262,7 +262,7 @@ pub enum MaterialKind {
     },
     /// Smooth dielectric.
     Glass {
-        /// Index of refraction inside, ≥ 1.
+        /// Index of refraction inside, in [0.1, 10]; below 1: thinner than what is outside, as a bubble in water.
         ior: f32,
         /// Transmittance per unit of length inside, in [0, 1].
         tint: Vec3,

@@ -20,7 +20,7 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// What is wrong, in one line, starting with a small letter.
     pub message: String,
-    /// The file it is about.
+    /// The file it is about; empty where it is about the call.
     pub path: PathBuf,
     /// The place in that file, if it has one.
     pub place: Option<Place>,

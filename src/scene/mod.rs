@@ -19,7 +19,14 @@ use description::Scene;
 use diagnostic::{Diagnostic, Place, Severity};
 
 /// Scene files over this size, in bytes, are refused.
-pub const MAX_FILE_BYTES: u64 = 16 << 20;
+pub const MAX_FILE_BYTES: u64 = 128 << 20;
+
+/// The message where a scene file is not there.
+pub const NO_SUCH_FILE: &str = "there is no such scene file";
+
+/// Scene files of more parts are refused, as each takes many times its bytes in memory: brackets, `=`, `,` and lines. A
+/// million spheres have half as many.
+const MAX_PARTS: usize = 32 << 20;
 
 /// A scene file that can be rendered.
 #[derive(Clone, Debug)]

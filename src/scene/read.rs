@@ -5,10 +5,11 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::MAX_FILE_BYTES;
 use super::diagnostic::{Diagnostic, Place, Severity};
 use super::nearest::nearest;
 use super::sanitize::visible;
+use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE};
+use crate::system::in_words;
 
 /// The text and the hash of its bytes. The error is one diagnostic that names the file.
 pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnostic>> {
@@ -55,7 +56,15 @@ fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(too_large());
     }
+    if parts(&bytes) > MAX_PARTS {
+        return Err(large(format!("the scene file has more than {} million parts", MAX_PARTS >> 20)));
+    }
     Ok(bytes)
+}
+
+/// What the memory that a text takes grows with, counted.
+fn parts(text: &[u8]) -> usize {
+    text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
 /// Opens a file for reading; a pipe without a writer does not block.
@@ -87,10 +96,11 @@ fn regular(metadata: &Metadata) -> Result<(), Refusal> {
 }
 
 fn too_large() -> Refusal {
-    (
-        format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20),
-        Some("large geometry belongs in mesh files, which [[mesh]] names".to_owned()),
-    )
+    large(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
+}
+
+fn large(message: String) -> Refusal {
+    (message, Some("large geometry belongs in mesh files, which [[mesh]] names".to_owned()))
 }
 
 fn unreadable(path: &Path, error: &io::Error) -> Refusal {
@@ -100,24 +110,9 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
     if error.kind() == io::ErrorKind::NotFound {
         let help = neighbour(path).map(|near| format!("did you mean {}?", visible(&near.to_string_lossy())));
         let start = || "`glimt new FILE` writes a scene to start from".to_owned();
-        return ("there is no such scene file".to_owned(), Some(help.unwrap_or_else(start)));
+        return (NO_SUCH_FILE.to_owned(), Some(help.unwrap_or_else(start)));
     }
-    (format!("cannot read the scene file: {}", reason(error)), None)
-}
-
-/// An error of the file system in words.
-pub(super) fn reason(error: &io::Error) -> String {
-    #[cfg(unix)]
-    if error.raw_os_error() == Some(nix::libc::ELOOP) {
-        return "its symbolic links lead in a circle".to_owned();
-    }
-    match error.kind() {
-        io::ErrorKind::NotFound => "there is no such file".to_owned(),
-        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        io::ErrorKind::NotADirectory => "a part of its path is a file, not a folder".to_owned(),
-        io::ErrorKind::InvalidInput => "that is no name of a file".to_owned(),
-        _ => error.to_string(),
-    }
+    (format!("cannot read the scene file: {}", in_words(error)), None)
 }
 
 /// The file beside a missing one whose name is nearest to it.
@@ -191,7 +186,9 @@ mod tests {
         let path = folder.path().join("scene.toml");
         let file = File::create(&path).expect("a file");
         file.set_len(MAX_FILE_BYTES + 1).expect("grown");
-        assert!(message(&path).message.contains("16 MiB"));
+        assert!(message(&path).message.contains("128 MiB"));
+        std::fs::write(&path, "x=[[],[]]\n".repeat(MAX_PARTS / 7)).expect("written");
+        assert!(message(&path).message.contains("32 million parts"));
         std::fs::write(&path, b"# fine\nname = \"\xe4\"\n").expect("written");
         let encoding = message(&path);
         assert!(encoding.message.contains("line 2"), "{}", encoding.message);

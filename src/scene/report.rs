@@ -101,7 +101,9 @@ fn one(
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
     }
     let title = level.primary_title(wrapped(&diagnostic.message, width.saturating_sub("warning: ".len())));
-    let mut group: Group<'_> = title.element(origin);
+    // What is wrong with the call has no file.
+    let has_origin = !path.is_empty();
+    let mut group: Group<'_> = if has_origin { title.element(origin) } else { Group::with_title(title) };
     if let Some(snippet) = snippet {
         group = group.element(snippet);
     }

@@ -183,6 +183,28 @@ fn a_lamp_of_any_finite_shape_is_fine() {
 }
 
 #[test]
+fn edges_without_area_are_told_where_they_are_given() {
+    let place = |text: &str| {
+        let outcome = outcome(&format!("[materials.m]\n{text}\nmaterial='m'\n{CAMERA}"));
+        let [error] = outcome.diagnostics.try_into().expect("one error");
+        assert!(error.message.ends_with("has no area"), "{}", error.message);
+        let place = error.place.expect("a place");
+        place.source[place.span].to_owned()
+    };
+    assert_eq!(place("[[quad]]\nu = [0, 0, 5]"), "[0, 0, 5]");
+    assert_eq!(place("[[quad]]\nv = [3, 0, 0]"), "[3, 0, 0]");
+    assert_eq!(place("[[triangle]]\na = [0, 2, 0]\nb = [0, 3, 0]"), "[0, 3, 0]");
+    assert_eq!(place("[[triangle]]\na = [2, -1, 0]"), "[2, -1, 0]");
+}
+
+#[test]
+fn a_triangle_is_as_fine_as_the_numbers_that_it_is_traced_in() {
+    let fine = "[[light]]\n[materials.m]\n[[triangle]]\na = [1e6, 0, 0]\nb = [1000000.001, 0, 0]\n\
+                c = [1e6, 0.001, 0]\nmaterial = 'm'\n";
+    assert_eq!(messages(fine), [""; 0]);
+}
+
+#[test]
 fn a_flood_of_errors_is_counted_and_cut() {
     let text: String = (0..700).map(|number| format!("wrong{number} = 1\n")).collect();
     let messages = messages(&text);

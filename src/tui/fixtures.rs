@@ -167,6 +167,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         width: 640,
         height: 480,
         samples: SampleCounts { min: 64, mean: 64.0, max: 64 },
+        error: Some(0.0081),
         complete: true,
     };
     let report = Report {

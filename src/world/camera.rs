@@ -3,7 +3,7 @@
 use crate::assets::OrbiterCamera;
 use crate::geometry::Ray;
 use crate::math::transform::rotation_xyz;
-use crate::math::{DMat3, DVec3, Vec2};
+use crate::math::{DMat3, DVec2, DVec3, Vec2};
 use crate::scene::description;
 
 /// A perspective camera with a flat plane of focus.
@@ -70,13 +70,11 @@ impl Camera {
         }
     }
 
-    /// The ray through a point of the picture, x from 0 (left) to `width` and y from 0 (top) to `height`, from a point of
-    /// the unit lens disk; its direction has unit length.
-    pub fn ray(&self, x: f64, y: f64, width: u32, height: u32, lens: Vec2) -> Ray {
-        let (width, height) = (f64::from(width), f64::from(height));
-        let scale = 2.0 * self.tan_half_fov / height;
-        let direction =
-            self.forward + self.right * ((x - 0.5 * width) * scale) + self.up * ((0.5 * height - y) * scale);
+    /// The ray through a point of the picture, seen from its middle to the right and up in halves of its height, from a
+    /// point of the unit lens disk; its direction has unit length.
+    pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
+        let place = place * self.tan_half_fov;
+        let direction = self.forward + self.right * place.x + self.up * place.y;
         let lens = lens.as_dvec2() * self.aperture;
         let offset = self.right * lens.x + self.up * lens.y;
         let aimed = direction - offset / self.focus;
@@ -121,17 +119,17 @@ mod tests {
     #[test]
     fn the_middle_and_the_edges_of_the_picture() {
         let camera = look_at(0.0);
-        let direction = |x, y| camera.ray(x, y, 200, 100, Vec2::ZERO).direction;
-        assert!((direction(100.0, 50.0) - Vec3::NEG_Z).length() < 1e-6);
-        assert!((direction(100.0, 0.0) - Vec3::new(0.0, 1.0, -1.0).normalize()).length() < 1e-6);
-        assert!((direction(200.0, 50.0) - Vec3::new(2.0, 0.0, -1.0).normalize()).length() < 1e-6);
+        let direction = |x, y| camera.ray(DVec2::new(x, y), Vec2::ZERO).direction;
+        assert!((direction(0.0, 0.0) - Vec3::NEG_Z).length() < 1e-6);
+        assert!((direction(0.0, 1.0) - Vec3::new(0.0, 1.0, -1.0).normalize()).length() < 1e-6);
+        assert!((direction(2.0, 0.0) - Vec3::new(2.0, 0.0, -1.0).normalize()).length() < 1e-6);
     }
 
     #[test]
     fn every_point_of_the_lens_sees_the_plane_in_focus_alike() {
         let camera = look_at(0.5);
         let on_plane = |lens| {
-            let ray = camera.ray(130.0, 20.0, 200, 100, lens);
+            let ray = camera.ray(DVec2::new(0.6, 0.6), lens);
             ray.at((0.0 - ray.origin.z) / ray.direction.z)
         };
         let sharp = on_plane(Vec2::ZERO);

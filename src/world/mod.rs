@@ -17,7 +17,7 @@ pub use camera::Camera;
 pub use geometry::{Geometry, Hit};
 pub use mesh_tree::MeshTree;
 pub use shape::Shape;
-pub use textures::{NeededTexture, SourceEncoding, TextureSource, textures_needed};
+pub use textures::{NeededTexture, TextureSource, textures_needed};
 
 use crate::assets::OrbiterCamera;
 use crate::lights::Light;

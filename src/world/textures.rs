@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::scene::description::{ColorSource, Encoding, Material, MaterialKind, Scene};
 
@@ -12,18 +13,7 @@ pub struct TextureSource {
     /// The file.
     pub path: PathBuf,
     /// How its numbers are read.
-    pub encoding: SourceEncoding,
-}
-
-/// How the numbers of an image file are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum SourceEncoding {
-    /// Integer files are sRGB, float files linear.
-    Color,
-    /// Always sRGB.
-    Srgb,
-    /// Always linear.
-    Linear,
+    pub encoding: ImageEncoding,
 }
 
 /// What a texture is used for.
@@ -97,9 +87,9 @@ pub fn uses_own_materials(scene: &Scene, file: usize) -> bool {
 pub fn declared_source(scene: &Scene, texture: usize, used: Use) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
-        (Encoding::Srgb, _) => SourceEncoding::Srgb,
-        (Encoding::Linear, _) | (Encoding::Auto, Use::Normal) => SourceEncoding::Linear,
-        (Encoding::Auto, Use::Color) => SourceEncoding::Color,
+        (Encoding::Srgb, _) => ImageEncoding::Srgb,
+        (Encoding::Linear, _) | (Encoding::Auto, Use::Normal) => ImageEncoding::Linear,
+        (Encoding::Auto, Use::Color) => ImageEncoding::Color,
     };
     TextureSource { path: texture.file.value.clone(), encoding }
 }
@@ -107,8 +97,8 @@ pub fn declared_source(scene: &Scene, texture: usize, used: Use) -> TextureSourc
 /// Where a texture of a mesh file comes from.
 pub fn file_source(path: &Path, used: Use) -> TextureSource {
     let encoding = match used {
-        Use::Color => SourceEncoding::Color,
-        Use::Normal => SourceEncoding::Linear,
+        Use::Color => ImageEncoding::Color,
+        Use::Normal => ImageEncoding::Linear,
     };
     TextureSource { path: path.to_owned(), encoding }
 }

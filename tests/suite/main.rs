@@ -2,6 +2,7 @@
 
 mod broken;
 mod closed_forms;
+mod contract;
 mod desk;
 mod extremes;
 mod hostile;

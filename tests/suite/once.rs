@@ -19,6 +19,22 @@ fn a_scene_is_rendered_and_named_at_the_end() {
 }
 
 #[test]
+fn an_output_of_the_scene_lies_beside_it_and_one_of_the_call_in_the_working_directory() {
+    let desk = Desk::new();
+    fs::create_dir_all(desk.path("scenes/out")).expect("a folder");
+    desk.write("scenes/own.toml", SCENE.replace("[render]", "[render]\noutput = \"out/own.ppm\""));
+    desk.write("scenes/none.toml", SCENE);
+    let stderr = desk.expect("scenes/own.toml --once", 0);
+    assert!(stderr.contains("wrote scenes/out/own.ppm (32×24"), "{stderr}");
+    assert!(desk.path("scenes/out/own.ppm").is_file());
+    desk.expect("scenes/none.toml --once", 0);
+    assert!(desk.path("none.png").is_file());
+    desk.expect("scenes/own.toml --once -o call.png", 0);
+    assert!(desk.path("call.png").is_file());
+    assert_eq!(fs::read_dir(desk.path("scenes")).expect("a folder").count(), 3, "nothing else is beside it");
+}
+
+#[test]
 fn several_outputs_and_no_progress() {
     let desk = Desk::new();
     let stderr = desk.expect("ball.toml --once -o a.png -o b.ppm --progress none", 0);
@@ -99,6 +115,54 @@ fn the_report_has_its_keys() {
     assert!(report["peak_memory_bytes"].as_u64().expect("bytes") > 1 << 20);
 }
 
+/// The keys that scripts rely on, with a value of the type of each.
+const REPORT: &str = r#"{
+  "glimt": "0.1.0",
+  "scene": "scenes/cornell.toml",
+  "image": { "path": "cornell.png", "width": 640, "height": 480,
+             "samples": { "min": 16, "mean": 41.2, "max": 64 }, "error": 0.0081, "complete": true },
+  "settings": { "integrator": "whitted", "shadows": "soft", "photons": false, "dof": false, "accel": "bvh", "seed": 0, "threads": 2 },
+  "stages": [ { "name": "parse", "status": "done", "seconds": 0.0004, "why": "" } ],
+  "counters": { "triangles": 0, "camera_rays": 0, "shadow_rays": 0, "reflected_rays": 0, "refracted_rays": 0,
+                "photons_emitted": 0, "photons_stored": 0, "texels_loaded": 0, "texture_lookups": 0, "non_finite_samples": 0 },
+  "seconds": 1.93,
+  "peak_memory_bytes": 41943040
+}"#;
+
+/// Whether `found` has every key of `example`, with a value of its type; whole numbers stay whole.
+fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &str) {
+    use serde_json::Value as V;
+    match (example, found) {
+        (V::Object(keys), V::Object(_)) => {
+            for (key, value) in keys {
+                let place = format!("{place}.{key}");
+                assert!(found.get(key).is_some(), "{place} is missing");
+                assert_like(value, &found[key], &place);
+            }
+        }
+        (V::Array(values), V::Array(found)) => {
+            assert!(!found.is_empty(), "{place}");
+            found.iter().for_each(|one| assert_like(&values[0], one, place));
+        }
+        (V::Number(number), V::Number(_)) => assert!(!number.is_u64() || found.is_u64(), "{place}: {found}"),
+        (V::Bool(_), V::Bool(_)) | (V::String(_), V::String(_)) => {}
+        _ => assert_eq!(found, example, "{place} is of another type"),
+    }
+}
+
+#[test]
+fn the_report_has_every_key_with_its_type() {
+    let desk = Desk::new();
+    let example: serde_json::Value = serde_json::from_str(REPORT).expect("JSON");
+    let report = desk.report("ball.toml --samples 3");
+    assert_like(&example, &report, "report");
+    let error =
+        |samples: u32| desk.report(&format!("ball.toml --samples {samples}"))["image"]["error"].clone();
+    assert!(error(1).is_null(), "one sample tells nothing of its error");
+    let [few, many] = [4, 256].map(|samples| error(samples).as_f64().expect("an estimate"));
+    assert!(many > 0.0 && many < 0.25 * few && few < 1.0, "{few} {many}");
+}
+
 #[test]
 fn a_wrong_scene_is_2_and_leaves_the_picture() {
     let desk = Desk::new();
@@ -121,6 +185,45 @@ fn a_mesh_that_is_not_there_is_2_and_named() {
 }
 
 #[test]
+fn what_is_wrong_with_the_call_is_not_said_of_the_scene() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once --crop 0,0,33,1 --progress none", 2);
+    assert!(stderr.starts_with("error: --crop 0,0,33,1") && !stderr.contains("-->"), "{stderr}");
+    let stderr = desk.expect("ball.toml --once --bit-depth 16 -o a.png -o a.jpg --progress none", 2);
+    assert!(stderr.contains("JPEG") && stderr.contains("--> a.jpg\n"), "{stderr}");
+    desk.write("ball.toml", SCENE.replace("[render]", "[render]\noutput = \"own.jpg\""));
+    let stderr = desk.expect("ball.toml --once --bit-depth 16 --progress none", 2);
+    assert!(stderr.contains("--> own.jpg\n"), "{stderr}");
+    assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
+}
+
+#[test]
+fn options_that_change_nothing_are_told() {
+    let desk = Desk::new();
+    let stderr = desk.expect("ball.toml --once --dof on --photons on --progress none", 0);
+    let warning = "warning: --dof on has no effect: the scene's camera is a pinhole";
+    assert!(stderr.contains(warning) && stderr.contains("--photons on has no effect"), "{stderr}");
+    assert!(stderr.ends_with("2 warnings\n"), "{stderr}");
+    let stderr = desk.expect("ball.toml --once --dof on --progress json", 0);
+    let done = stderr.lines().last().map(serde_json::from_str::<serde_json::Value>);
+    let done = done.expect("a line").expect("JSON");
+    let warning = &done["diagnostics"][0];
+    assert!(warning["path"].is_null() && warning["line"].is_null(), "{done}");
+    desk.write("ball.toml", SCENE.replace("[materials", "aperture = 0.1\n[materials"));
+    let stderr = desk.expect("ball.toml --once --dof on --photons off --progress none", 0);
+    assert_eq!(stderr, "");
+}
+
+#[test]
+fn a_generated_mesh_that_is_not_there_is_told_with_its_maker() {
+    let desk = Desk::new();
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/million.toml");
+    desk.write("million.toml", fs::read_to_string(scene).expect("a scene"));
+    let stderr = desk.expect("check million.toml", 2);
+    assert!(stderr.contains("there is no file") && stderr.contains("glimt-assets -- million"), "{stderr}");
+}
+
+#[test]
 fn a_wrong_call_is_2() {
     let desk = Desk::new();
     for (line, word) in [
@@ -129,6 +232,7 @@ fn a_wrong_call_is_2() {
         ("ball.toml --once --accel kdtree", "not available"),
         ("ball.toml --once -o a.xyz", "a.xyz"),
         ("ball.toml --once --crop 0,0,33,1", "32×24"),
+        ("ball.toml --once --bit-depth 16 -o a.jpg", "cannot hold 16 bits"),
         ("ball.toml --nonsense", "--nonsense"),
         ("", "SCENE"),
     ] {
@@ -169,6 +273,23 @@ fn check_says_what_there_is() {
     desk.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = desk.expect("check ball.toml", 2);
     assert!(stderr.contains("bal") && stderr.contains("ball.toml:17:"), "{stderr}");
+}
+
+#[test]
+fn a_scene_of_very_many_shapes_is_checked() {
+    use std::fmt::Write;
+    const COUNT: u32 = 200_000;
+    let desk = Desk::new();
+    let mut text = SCENE.to_owned();
+    for i in 1..COUNT {
+        let (x, y, z) = (i % 97, i / 97 % 89, i / 8633);
+        let sphere = format!("center = [{x}.25, {y}.5, -{z}]\nradius = 0.125\nmaterial = \"ball\"");
+        writeln!(text, "[[sphere]]\n{sphere}").expect("memory");
+    }
+    desk.write("many.toml", text);
+    let output = desk.run("check many.toml");
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(stdout.starts_with("ok: many.toml: 200000 objects, 0 triangles"), "{stdout}");
 }
 
 #[test]

@@ -10,15 +10,18 @@
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
 //! | `cancelled` | |
 //!
-//! A diagnostic has `severity` (`error`, `warning`), `message`, `path`, `line` and `column` (from 1, or null), `help`.
+//! A diagnostic has `severity` (`error`, `warning`), `message`, `path`, `line` and `column` (from 1), `help`; a
+//! path, line, column or help that it does not have is null.
 
+use std::borrow::Cow;
 use std::io::Write;
 
 use serde_json::{Value, json};
 
 use super::Reporter;
 use crate::pipeline::protocol::{Event, Failure};
-use crate::scene::diagnostic::{Diagnostic, Place, Severity};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::report::line_and_column;
 
 pub(super) struct Json;
 
@@ -81,10 +84,10 @@ fn failed(failure: &Failure) -> Value {
 fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
     all.iter()
         .map(|one| {
-            let place = one.place.as_ref().map(line_and_column);
+            let place = one.place.as_ref().map(|place| line_and_column(&place.source, place.span.start));
             json!({
                 "severity": if one.severity == Severity::Error { "error" } else { "warning" },
-                "message": one.message, "path": one.path.to_string_lossy(),
+                "message": one.message, "path": path(one),
                 "line": place.map(|(line, _)| line), "column": place.map(|(_, column)| column),
                 "help": one.help,
             })
@@ -92,8 +95,6 @@ fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
         .collect()
 }
 
-fn line_and_column(place: &Place) -> (usize, usize) {
-    let before = place.source.get(..place.span.start).unwrap_or("");
-    let line = before.matches('\n').count() + 1;
-    (line, before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1)
+fn path(diagnostic: &Diagnostic) -> Option<Cow<'_, str>> {
+    Some(diagnostic.path.to_string_lossy()).filter(|path| !path.is_empty())
 }

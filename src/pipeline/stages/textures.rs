@@ -17,10 +17,10 @@ use crate::assets::image::{ImageEncoding, ImageLimits, load};
 use crate::control::Cancelled;
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
-use crate::world::{NeededTexture, SourceEncoding, TextureSource};
+use crate::world::{NeededTexture, TextureSource};
 
 /// The cache of textures: one entry per file and reading of its numbers.
-pub(in crate::pipeline) type TextureCache = Pool<(PathBuf, SourceEncoding), Texels>;
+pub(in crate::pipeline) type TextureCache = Pool<(PathBuf, ImageEncoding), Texels>;
 
 /// The textures that were asked for, without those that failed.
 #[derive(Debug, Default)]
@@ -96,11 +96,7 @@ fn load_one(
     if let Some(texels) = kept {
         return Asset { files, result: Ok((texels, true)) };
     }
-    let encoding = match one.source.encoding {
-        SourceEncoding::Color => ImageEncoding::Color,
-        SourceEncoding::Srgb => ImageEncoding::Srgb,
-        SourceEncoding::Linear => ImageEncoding::Linear,
-    };
+    let encoding = one.source.encoding;
     let result = reading
         .sink
         .asset(&one.name, |progress| load(path, encoding, ImageLimits::default(), progress, reading.token));
@@ -115,7 +111,7 @@ fn place(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
     declared.or_else(mesh).unwrap_or(0..0)
 }
 
-fn name(source: &TextureSource) -> (PathBuf, SourceEncoding) {
+fn name(source: &TextureSource) -> (PathBuf, ImageEncoding) {
     (canonical(&source.path), source.encoding)
 }
 

@@ -36,8 +36,7 @@ fn look_at(table: &Table<'_>) -> Option<Camera> {
     let position = table.required("position", "[0, 1, 4]");
     let look_at = table.required("look_at", "[0, 1, 0]");
     let (eye, target) = (position.vector(Limits::Any), look_at.vector(Limits::Any));
-    let up = table.optional("up");
-    let up_vector = if up.is_given() { up.vector(Limits::Any) } else { Some(DVec3::Y) };
+    let up_vector = table.optional("up").vector_or(Limits::Any, DVec3::Y);
     let fov = fov(table).unwrap_or(FOV_DEGREES);
     let aperture = aperture(table);
     let focus = table.optional("focus").number(Limits::Length);

@@ -128,6 +128,11 @@ impl<'a> Key<'a> {
         self.numbers(limits, "three numbers, [x, y, z]").map(DVec3::from_array)
     }
 
+    /// Three numbers; `default` where the key is absent.
+    pub(super) fn vector_or(&self, limits: Limits, default: DVec3) -> Option<DVec3> {
+        if self.is_given() { self.vector(limits) } else { Some(default) }
+    }
+
     /// Two numbers.
     pub(super) fn pair(&self, limits: Limits) -> Option<Vec2> {
         self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))

@@ -3,7 +3,7 @@
 use super::super::description::{Falloff, PointLight};
 use super::limits::Limits;
 use super::table::Table;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 const FALLOFFS: [(&str, Falloff); 2] = [("square", Falloff::Square), ("none", Falloff::None)];
 
@@ -18,7 +18,7 @@ fn light(table: &Table<'_>) -> Option<PointLight> {
         // The keys of the other types would only be called unknown.
         kind.choice(&[("point", ())], &["spot", "directional"])?;
     }
-    let position = table.required("position", "[0, 3, 0]").vector(Limits::Any);
+    let position = table.optional("position").vector_or(Limits::Any, DVec3::new(0.0, 3.0, 0.0));
     let intensity = table.optional("intensity").color().unwrap_or(Vec3::splat(10.0));
     let falloff = table.optional("falloff").choice(&FALLOFFS, &[]).unwrap_or(Falloff::Square);
     table.finish();

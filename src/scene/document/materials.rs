@@ -117,7 +117,7 @@ fn mirror(table: &Table<'_>) -> MaterialKind {
 
 fn glass(table: &Table<'_>) -> MaterialKind {
     MaterialKind::Glass {
-        ior: table.optional("ior").number32(Limits::Between(1.0, 10.0)).unwrap_or(1.5),
+        ior: table.optional("ior").number32(Limits::Between(0.1, 10.0)).unwrap_or(1.5),
         tint: table.optional("tint").fraction().unwrap_or(Vec3::ONE),
     }
 }

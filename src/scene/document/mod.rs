@@ -23,6 +23,7 @@ use toml::de::DeTable;
 
 use super::Outcome;
 use super::description::Scene;
+use crate::math::Vec3;
 use context::{Context, Issue};
 use materials::Materials;
 use table::Table;
@@ -51,7 +52,7 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     let materials = materials::read(root, &textures.names);
     let (objects, mesh_files) = shapes::read(root, &materials);
     let lights = lights::read(root);
-    root.unavailable("environment", "[environment] is not available in this version", Some(ENVIRONMENT));
+    environment(root);
     root.finish();
 
     let scene = Scene {
@@ -72,6 +73,17 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     Some(scene)
 }
 
+/// Light from all around is for a later version; none is the default.
+fn environment(root: &Table<'_>) {
+    let header = root.optional("environment").key_span();
+    let Some((table, span)) = root.table("environment").zip(header) else { return };
+    if table.optional("color").color().is_some_and(|color| color != Vec3::ZERO) {
+        let issue = Issue::error(span, "[environment] is not available in this version").help(ENVIRONMENT);
+        root.context.report(issue);
+    }
+    table.finish();
+}
+
 const ENVIRONMENT: &str = "use `background` in [render] for what rays see that leave the scene";
 
 /// Warns about a scene without shapes, or without light.
@@ -84,8 +96,7 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
     let own_materials = scene.objects.iter().any(|object| object.material.is_none());
     let emits = |index: usize| Materials::emits(&scene.materials[index]);
     let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
-    if scene.lights.is_empty() && !own_materials && !lamps && scene.render.ambient == crate::math::Vec3::ZERO
-    {
+    if scene.lights.is_empty() && !own_materials && !lamps && scene.render.ambient == Vec3::ZERO {
         let help = "add a [[light]], give a material in use `emission`, or set `ambient` in [render]";
         context.report(Issue::warning(0..0, "nothing lights this scene").help(help));
     }

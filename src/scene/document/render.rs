@@ -82,7 +82,7 @@ const TONEMAPS: [(&str, Tonemap); 4] = [
 fn output(table: &Table<'_>) -> Option<PathBuf> {
     let key = table.optional("output");
     let text = key.text("the path of a picture, such as \"picture.png\"")?;
-    key.has_ending(text, &PICTURES, &["webp"]).then(|| PathBuf::from(text))
+    key.has_ending(text, &PICTURES, &["webp"]).then(|| table.context.resolve(text))
 }
 
 /// Stopping at an error is for a later version; not to stop is the default.

@@ -1,7 +1,8 @@
 //! The camera: projection and the circle of confusion.
 
 use glimt::film::Rect;
-use glimt::math::{DVec3, Vec2};
+use glimt::integrators::RenderSettings;
+use glimt::math::{DVec2, DVec3, Vec2};
 use glimt::scene::description::Camera;
 
 use super::scenes::{emitter, scene, tile};
@@ -32,7 +33,6 @@ fn rays_pass_through_what_is_projected_on_their_pixel() {
     for _ in 0..200 {
         let (position, target) = (random.direction() * 7.0, random.direction() * 2.0);
         let (up, fov) = (random.direction(), 20.0 + 80.0 * random.unit());
-        let (width, height) = (333, 200);
         let build = scene().with(|scene| {
             scene.camera = Camera::LookAt { position, look_at: target, up, fov, aperture: 0.0, focus: 1.0 };
         });
@@ -44,9 +44,10 @@ fn rays_pass_through_what_is_projected_on_their_pixel() {
         let point = target + random.direction() * 2.0;
         let eye = v(s.dot(point - position), u.dot(point - position), f.dot(point - position));
         let scale = 1.0 / (0.5 * fov.to_radians()).tan();
-        let ndc = (eye.x * scale * f64::from(height) / f64::from(width) / eye.z, eye.y * scale / eye.z);
-        let (x, y) = ((ndc.0 + 1.0) / 2.0 * f64::from(width), (1.0 - ndc.1) / 2.0 * f64::from(height));
-        let ray = camera.ray(x, y, width, height, Vec2::ZERO);
+        let ndc = DVec2::new(eye.x * scale * 200.0 / 333.0 / eye.z, eye.y * scale / eye.z);
+        let settings = RenderSettings { width: 333, height: 200, ..build.settings(0) };
+        let pixel = DVec2::new((ndc.x + 1.0) / 2.0 * 333.0, (1.0 - ndc.y) / 2.0 * 200.0);
+        let ray = camera.ray(settings.from_middle(pixel), Vec2::ZERO);
         let along = (point - ray.origin.as_dvec3()).normalize();
         assert!((along - ray.direction.as_dvec3()).length() < 1e-6, "{point} is not on its ray");
         assert_close("depth", camera.depth_of(point), eye.z);
@@ -64,7 +65,7 @@ fn the_extent_of_the_circle_of_confusion() {
         let mut extent = DVec3::ZERO;
         for step in 0..3600 {
             let (sin, cos) = (f64::from(step) / 1800.0 * std::f64::consts::PI).sin_cos();
-            let ray = camera.ray(240.0, 240.0, SIZE, SIZE, Vec2::new(cos as f32, sin as f32));
+            let ray = camera.ray(DVec2::ZERO, Vec2::new(cos as f32, sin as f32));
             let (o, k) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
             extent = extent.max((o + k * ((-d - o.z) / k.z)) * 2.0 * pixels_per_length(d));
         }

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::super::super::description::Located;
 use super::super::super::nearest::nearest;
-use super::super::super::read::{is_link, neighbour, reason};
+use super::super::super::read::{is_link, neighbour};
 use super::super::super::sanitize::{shortened, visible};
 use super::super::context::Issue;
 use super::Key;
+use crate::system::in_words;
 
 impl Key<'_> {
     /// An existing file with one of these endings (none given: any), resolved against the scene's folder.
@@ -82,6 +83,6 @@ fn regular_file(path: &Path) -> Result<(), (String, Option<String>)> {
                 None => "paths are relative to the scene file".to_owned(),
             }),
         )),
-        Err(error) => Err((format!("cannot read {shown}: {}", reason(&error)), None)),
+        Err(error) => Err((format!("cannot read {shown}: {}", in_words(&error)), None)),
     }
 }

@@ -79,7 +79,7 @@ fn object(
     Some(Object { shape: shape?, material, span: table.span.clone() })
 }
 
-/// Whether two edges span an area, in single precision too.
+/// Whether two edges span an area: neither is 0, and the sine of the angle between them is not lost to rounding.
 fn span_area(u: DVec3, v: DVec3) -> bool {
     const PARALLEL: f64 = 1e-10;
     match (u.try_normalize(), v.try_normalize()) {

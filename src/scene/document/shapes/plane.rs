@@ -9,7 +9,7 @@ use crate::math::DVec3;
 pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
     let point = table.optional("point").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     let key = table.optional("normal");
-    let normal = if key.is_given() { key.vector(Limits::Any)? } else { DVec3::Y };
+    let normal = key.vector_or(Limits::Any, DVec3::Y)?;
     if normal.try_normalize().is_none() {
         let issue = Issue::error(key.span()?, "the plane has no direction")
             .label("a normal of length 0")

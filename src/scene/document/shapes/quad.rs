@@ -5,13 +5,14 @@ use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::table::Table;
 use super::span_area;
+use crate::math::DVec3;
 
 pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
-    let corner = table.required("corner", "[-1, 0, 1]").vector(Limits::Any);
-    let u = table.required("u", "[2, 0, 0]").vector(Limits::Any);
-    let v_key = table.required("v", "[0, 0, -2]");
-    let v = v_key.vector(Limits::Any);
-    if let (Some(u), Some(v), Some(span)) = (u, v, v_key.span())
+    let (u_key, v_key) = (table.optional("u"), table.optional("v"));
+    let corner = table.optional("corner").vector_or(Limits::Any, DVec3::new(-1.0, 0.0, 1.0));
+    let u = u_key.vector_or(Limits::Any, DVec3::new(2.0, 0.0, 0.0));
+    let v = v_key.vector_or(Limits::Any, DVec3::new(0.0, 0.0, -2.0));
+    if let (Some(u), Some(v), Some(span)) = (u, v, v_key.span().or(u_key.span()))
         && !span_area(u, v)
     {
         let issue = Issue::error(span, "the quad has no area")

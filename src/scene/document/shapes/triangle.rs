@@ -2,22 +2,24 @@
 
 use super::super::super::description::Shape;
 use super::super::context::Issue;
+use super::super::key::Key;
 use super::super::limits::Limits;
 use super::super::table::Table;
 use super::span_area;
 use crate::math::DVec3;
 
+/// Of a triangle that does not say.
+const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
+
 pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
-    let a = table.required("a", "[0, 0, 0]").vector(Limits::Any);
-    let b = table.required("b", "[1, 0, 0]").vector(Limits::Any);
-    let c_key = table.required("c", "[0, 1, 0]");
-    let (a, b, c) = (a?, b?, c_key.vector(Limits::Any)?);
-    // Triangles are traced in single precision.
-    let [near, right, up] = [a, b, c].map(|corner: DVec3| corner.as_vec3().as_dvec3());
-    if !span_area(right - near, up - near) {
-        let issue = Issue::error(c_key.span()?, "the triangle has no area")
+    let keys = ["a", "b", "c"].map(|name| table.optional(name));
+    let [a, b, c] = [0, 1, 2].map(|i| keys[i].vector_or(Limits::Any, CORNERS[i]));
+    let (a, b, c) = (a?, b?, c?);
+    if !span_area(b - a, c - a) {
+        let span = keys.iter().rev().find_map(Key::span)?;
+        let issue = Issue::error(span, "the triangle has no area")
             .label("`a`, `b` and `c` are on one line")
-            .help("give three points that are not on a line, far enough apart for 32-bit numbers");
+            .help("give three points that are not on a line");
         table.context.report(issue);
         return None;
     }

@@ -1,0 +1,364 @@
+//! The scene file as it was promised: every key, by its name, with its default, and which are required.
+
+use std::fs;
+use std::path::PathBuf;
+
+use glimt::scene::description::{Camera, Scene};
+use glimt::scene::diagnostic::{Diagnostic, Severity};
+use glimt::scene::{parse, starter};
+
+/// What is promised of a key.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Promise {
+    /// May be left out: then it is what the example says.
+    Default,
+    /// May be left out: then it is something else.
+    Other,
+    /// Must be there.
+    Required,
+}
+
+use Promise::{Default, Other, Required};
+
+/// Name, example, promise.
+type Key = (&'static str, &'static str, Promise);
+
+/// The tables with all their keys, and examples of the values.
+const TABLES: &[(&str, &[Key])] = &[
+    (
+        "[render]",
+        &[
+            ("width", "640", Default),
+            ("height", "480", Default),
+            ("samples", "64", Default),
+            ("error", "0.0", Default),
+            ("max_depth", "8", Default),
+            ("integrator", "\"whitted\"", Default),
+            ("shadows", "\"soft\"", Default),
+            ("ambient", "[0, 0, 0]", Default),
+            ("background", "[0, 0, 0]", Default),
+            ("filter", "\"box\"", Default),
+            ("exposure", "0.0", Default),
+            ("tonemap", "\"none\"", Default),
+            ("accel", "\"bvh\"", Default),
+            ("seed", "0", Default),
+            ("output", "\"cornell.png\"", Other),
+        ],
+    ),
+    (
+        "[camera]",
+        &[
+            ("position", "[0, 1, 4]", Required),
+            ("look_at", "[0, 1, 0]", Required),
+            ("up", "[0, 1, 0]", Default),
+            ("fov", "40.0", Default),
+            ("aperture", "0.0", Default),
+            ("focus", "4.0", Default),
+        ],
+    ),
+    (
+        "[photons]",
+        &[
+            ("enabled", "false", Default),
+            ("count", "200_000", Default),
+            ("radius", "0.0", Default),
+            ("bounces", "16", Default),
+        ],
+    ),
+    (
+        "[textures.bricks]",
+        &[
+            ("file", "\"textures/bricks.png\"", Required),
+            ("filter", "\"bilinear\"", Default),
+            ("wrap", "\"repeat\"", Default),
+            ("repeat", "[1, 1]", Default),
+            ("encoding", "\"auto\"", Default),
+        ],
+    ),
+    (
+        "[materials.wall]",
+        &[
+            ("type", "\"phong\"", Default),
+            ("diffuse", "[0.7, 0.7, 0.7]", Default),
+            ("specular", "[0, 0, 0]", Default),
+            ("shininess", "32.0", Default),
+            ("ambient", "[1, 1, 1]", Other),
+            ("emission", "[0, 0, 0]", Default),
+            ("normal_map", "\"bumps\"", Other),
+            ("normal_strength", "1.0", Default),
+        ],
+    ),
+    ("[materials.steel]", &[("type", "\"mirror\"", Other), ("reflectance", "[0.9, 0.9, 0.9]", Default)]),
+    (
+        "[materials.crystal]",
+        &[("type", "\"glass\"", Other), ("ior", "1.5", Default), ("tint", "[1, 1, 1]", Default)],
+    ),
+    (
+        "[[sphere]]",
+        &[
+            ("center", "[0, 0.5, 0]", Required),
+            ("radius", "0.5", Required),
+            ("material", "\"crystal\"", Required),
+        ],
+    ),
+    (
+        "[[quad]]",
+        &[
+            ("corner", "[-1, 0, 1]", Default),
+            ("u", "[2, 0, 0]", Default),
+            ("v", "[0, 0, -2]", Default),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
+        "[[plane]]",
+        &[
+            ("point", "[0, 0, 0]", Default),
+            ("normal", "[0, 1, 0]", Default),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
+        "[[box]]",
+        &[
+            ("center", "[0, 0.5, 0]", Default),
+            ("size", "[1, 1, 1]", Default),
+            ("rotate", "[0, 30, 0]", Other),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
+        "[[triangle]]",
+        &[
+            ("a", "[0, 0, 0]", Default),
+            ("b", "[1, 0, 0]", Default),
+            ("c", "[0, 1, 0]", Default),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
+        "[[mesh]]",
+        &[
+            ("file", "\"../assets/knot.obj\"", Required),
+            ("material", "\"wall\"", Other),
+            ("scale", "1.0", Default),
+            ("rotate", "[0, 0, 0]", Default),
+            ("translate", "[0, 0, 0]", Default),
+            ("smooth", "true", Default),
+        ],
+    ),
+    (
+        "[[light]]",
+        &[
+            ("type", "\"point\"", Default),
+            ("position", "[0, 3, 0]", Default),
+            ("intensity", "[10, 10, 10]", Default),
+            ("falloff", "\"square\"", Default),
+        ],
+    ),
+    ("[environment]", &[("color", "[0, 0, 0]", Default)]),
+];
+
+/// What the materials refer to besides.
+const BUMPS: &str = "[textures.bumps]\nfile = \"textures/bumps.png\"\n";
+
+/// A folder with everything that the example names; gives the scene's path too.
+fn folder() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["scenes/textures", "assets"] {
+        fs::create_dir_all(folder.path().join(name)).expect("a folder");
+    }
+    for name in
+        ["scenes/textures/bricks.png", "scenes/textures/bumps.png", "assets/knot.obj", "scenes/camera.txt"]
+    {
+        fs::write(folder.path().join(name), "").expect("written");
+    }
+    let scene = folder.path().join("scenes/cornell.toml");
+    (folder, scene)
+}
+
+/// The whole example, with some keys left out.
+fn example(is_out: impl Fn(&str, &str) -> bool) -> String {
+    let mut text = String::from(BUMPS);
+    for (header, keys) in TABLES {
+        text.push_str(&format!("{header}\n"));
+        for (key, value, _) in keys.iter().filter(|(key, ..)| !is_out(header, key)) {
+            text.push_str(&format!("{key} = {value}\n"));
+        }
+    }
+    text
+}
+
+fn errors(diagnostics: &[Diagnostic]) -> Vec<&str> {
+    let errors = diagnostics.iter().filter(|one| one.severity == Severity::Error);
+    errors.map(|one| one.message.as_str()).collect()
+}
+
+/// Without the places of the file, which differ wherever something is left out.
+fn placeless(mut scene: Scene) -> Scene {
+    scene.objects.iter_mut().for_each(|object| object.span = 0..0);
+    scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);
+    scene.mesh_files.iter_mut().for_each(|file| file.span = 0..0);
+    scene
+}
+
+#[test]
+fn every_key_may_be_left_out_but_those_marked() {
+    let (_folder, path) = folder();
+    let outcome = |text: String| parse(text.into(), &path);
+    let whole = outcome(example(|_, _| false));
+    assert_eq!(errors(&whole.diagnostics), [""; 0]);
+    let whole = placeless(whole.scene.expect("a scene"));
+    for (header, keys) in TABLES {
+        for &(key, _, promise) in *keys {
+            // A phong material has no `reflectance`; what is not the default is tried by itself below.
+            if key == "type" && promise == Other {
+                continue;
+            }
+            let without = outcome(example(|of, name| (of, name) == (*header, key)));
+            let said = errors(&without.diagnostics);
+            match promise {
+                Required => assert_eq!(said, [format!("{header} needs `{key}`")], "{header} {key}"),
+                Default | Other => {
+                    assert_eq!(said, [""; 0], "{header} {key}");
+                    let scene = placeless(without.scene.expect("a scene"));
+                    assert_eq!(scene == whole, promise == Default, "{header} {key}: another default");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_table_of_required_keys_alone_is_enough() {
+    let (_folder, path) = folder();
+    let is_kept = |header: &str, key: &str| {
+        let (_, keys) = TABLES.iter().find(|(name, _)| *name == header).expect("a table");
+        keys.iter().any(|(name, _, promise)| *name == key && *promise == Required) || key == "type"
+    };
+    let outcome = parse(example(|header, key| !is_kept(header, key)).into(), &path);
+    assert_eq!(errors(&outcome.diagnostics), [""; 0]);
+    let scene = outcome.scene.expect("a scene");
+    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (6, 1, 3));
+    assert_eq!(scene.render.output, None);
+}
+
+#[test]
+fn the_camera_may_be_an_orbiter() {
+    let (_folder, path) = folder();
+    let outcome = parse("[camera]\norbiter = \"camera.txt\"\n".into(), &path);
+    assert_eq!(errors(&outcome.diagnostics), [""; 0]);
+    assert!(matches!(outcome.scene.expect("a scene").camera, Camera::Orbiter { .. }));
+}
+
+#[test]
+fn every_word_that_this_version_has_is_known() {
+    let (_folder, path) = folder();
+    let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+    let words: &[(&str, &[&str])] = &[
+        ("[render]\nshadows", &["off", "hard", "soft"]),
+        ("[render]\nfilter", &["box", "tent", "gaussian", "mitchell"]),
+        ("[render]\ntonemap", &["none", "reinhard", "aces", "agx"]),
+        ("[textures.bumps]\nfile = \"textures/bumps.png\"\nfilter", &["nearest", "bilinear"]),
+        ("[textures.bumps]\nfile = \"textures/bumps.png\"\nwrap", &["repeat", "clamp", "mirror"]),
+        ("[textures.bumps]\nfile = \"textures/bumps.png\"\nencoding", &["auto", "srgb", "linear"]),
+        ("[materials.a]\ntype", &["phong", "mirror", "glass"]),
+        ("[[light]]\nfalloff", &["square", "none"]),
+    ];
+    for (key, words) in words {
+        for word in *words {
+            let outcome = parse(format!("{camera}{key} = \"{word}\"\n").into(), &path);
+            assert_eq!(errors(&outcome.diagnostics), [""; 0], "{key} {word}");
+        }
+    }
+}
+
+#[test]
+fn the_ends_of_the_promised_ranges_are_in_them() {
+    let (_folder, path) = folder();
+    let said = |text: &str| {
+        let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+        let outcome = parse(format!("{camera}{text}\n").into(), &path);
+        errors(&outcome.diagnostics).len()
+    };
+    for right in [
+        "fov = 179.9",
+        "aperture = 0",
+        "[render]\nwidth = 1",
+        "[render]\nwidth = 65536\nheight = 1",
+        "[render]\nheight = 65536\nwidth = 1",
+        "[render]\nsamples = 1",
+        "[render]\nmax_depth = 0",
+        "[render]\nexposure = -3.5",
+        "[render]\nbackground = \"#ffcc00\"",
+        "[render]\nbackground = [0, 1, 1000.5]",
+        "[photons]\nradius = 0.5\nbounces = 0",
+        "[materials.a]\ntype = \"glass\"\nior = 0.75",
+        "[materials.a]\nambient = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
+        "[environment]",
+    ] {
+        assert_eq!(said(right), 0, "{right}");
+    }
+    for wrong in [
+        "[render]\nwidth = 0",
+        "[render]\nwidth = 65537",
+        "[render]\nsamples = 0",
+        "[render]\nerror = -1",
+        "[render]\nbackground = [0, -1, 0]",
+        "[environment]\ncolor = [1, 1, 1]",
+        "[environment]\ncolour = [0, 0, 0]",
+    ] {
+        assert_eq!(said(wrong), 1, "{wrong}");
+    }
+}
+
+#[test]
+fn paths_in_a_scene_are_seen_from_its_folder() {
+    let (folder, path) = folder();
+    let outcome = parse(example(|_, _| false).into(), &path);
+    let scene = outcome.scene.expect("a scene");
+    assert_eq!(scene.render.output, Some(folder.path().join("scenes/cornell.png")));
+    assert_eq!(scene.mesh_files[0].value, folder.path().join("scenes/../assets/knot.obj"));
+    assert_eq!(scene.textures[1].file.value, folder.path().join("scenes/textures/bricks.png"));
+}
+
+#[test]
+fn the_starter_and_the_readme_have_every_key() {
+    let readme = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).expect("a text");
+    let reference = readme.split("## All keys of a scene").nth(1).expect("a chapter");
+    for (header, keys) in TABLES {
+        let start =
+            header.split_once('.').map_or(format!("| `{header}`"), |(table, _)| format!("| `{table}."));
+        let row = reference.lines().find(|line| line.starts_with(&start)).unwrap_or_default();
+        for (key, ..) in *keys {
+            let in_row =
+                row.contains(&format!("`{key}`")) || *key == "material" && reference.contains("`material`");
+            assert!(in_row, "README: {header} {key}");
+            let has = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} = "));
+            assert!(*header == "[environment]" || starter().lines().any(has), "starter: {header} {key}");
+        }
+    }
+}
+
+#[test]
+fn every_line_of_the_starter_may_be_uncommented() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["bricks.png", "knot.obj"] {
+        fs::write(folder.path().join(name), "").expect("written");
+    }
+    let is_key = |text: &str| {
+        let name = text.split(" = ").next().unwrap_or_default();
+        text.starts_with('[')
+            || text.contains(" = ") && name.chars().all(|c| c.is_ascii_lowercase() || c == '_')
+    };
+    let uncommented = |line: &str| match line.strip_prefix("# ") {
+        // It stands in place of others.
+        Some(text) if is_key(text) && !text.starts_with("orbiter") => format!("{text}\n"),
+        _ => format!("{line}\n"),
+    };
+    let text: String = starter().lines().map(uncommented).collect();
+    assert!(text.lines().filter(|line| line.starts_with('#')).count() < 12, "{text}");
+    let outcome = parse(text.into(), &folder.path().join("scene.toml"));
+    assert_eq!(errors(&outcome.diagnostics), [""; 0]);
+    assert_eq!(outcome.scene.expect("a scene").objects.len(), 7);
+}
