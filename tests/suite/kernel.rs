@@ -1,0 +1,235 @@
+//! The ray kernel: no leak between triangles, no speck on flat faces, the same bits by all instructions.
+
+use glimt::accel::wide_bvh::Instructions;
+use glimt::accel::{PACKET, WideBvh};
+use glimt::control::CancelToken;
+use glimt::geometry::Ray;
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::math::Vec3;
+
+use crate::desk::Desk;
+
+/// Random numbers in [0, 1).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 40) as f32) / (1_u64 << 24) as f32
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() * count as f32) as usize % count
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next()) * 2.0 - Vec3::ONE
+    }
+}
+
+/// A closed ball of radius 2 of `rings` rings of as many squares; bumps make every quad skew.
+fn ball(rings: u32, bumps: f32) -> TriangleMesh {
+    let point = |ring: u32, column: u32| {
+        let height = std::f32::consts::PI * ring as f32 / rings as f32;
+        let around = 2.0 * std::f32::consts::PI * column as f32 / rings as f32;
+        let radius = 2.0 + bumps * (5.0 * height).sin() * (3.0 * around).cos();
+        Vec3::new(height.sin() * around.cos(), height.cos(), height.sin() * around.sin()) * radius
+    };
+    let mut mesh =
+        TriangleMesh { positions: vec![Vec3::Y * 2.0, Vec3::NEG_Y * 2.0], ..TriangleMesh::default() };
+    for ring in 1..rings {
+        mesh.positions.extend((0..rings).map(|column| point(ring, column)));
+    }
+    let index = |ring: u32, column: u32| match ring {
+        0 => 0,
+        _ if ring == rings => 1,
+        _ => 2 + (ring - 1) * rings + column % rings,
+    };
+    for ring in 0..rings {
+        for column in 0..rings {
+            let (a, b) = (index(ring, column), index(ring, column + 1));
+            let (c, d) = (index(ring + 1, column), index(ring + 1, column + 1));
+            let halves = [[a, b, c], [b, d, c]];
+            mesh.triangles.extend(halves.into_iter().filter(|[a, b, c]| a != b && b != c && a != c));
+        }
+    }
+    mesh
+}
+
+/// The same, scaled and then moved.
+fn placed(mesh: &TriangleMesh, scale: f32, offset: Vec3) -> TriangleMesh {
+    let positions = mesh.positions.iter().map(|&p| p * scale + offset).collect();
+    TriangleMesh { positions, ..mesh.clone() }
+}
+
+fn tree(mesh: &TriangleMesh) -> WideBvh {
+    let tree = WideBvh::build(mesh.triangles.len() as u32, |id| mesh.corners(id), &CancelToken::new());
+    tree.expect("nobody cancels")
+}
+
+/// How many of the rays from the inside of a closed mesh get out: each is aimed at a vertex, or at an edge.
+fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: Instructions) -> usize {
+    let tree = tree(mesh).with(instructions);
+    let mut random = Random(rays as u64);
+    let mut leaks = 0;
+    for i in 0..rays / PACKET {
+        let origin = random.vector() * 0.5 * scale + offset;
+        let corners = mesh.corners(random.below(mesh.triangles.len()) as u32);
+        let packet: [Ray; PACKET] = std::array::from_fn(|lane| {
+            let target = if lane % 2 == 0 {
+                corners[lane / 2 % 3]
+            } else {
+                corners[0].lerp(corners[1], random.next())
+            };
+            Ray::new(origin, target - origin)
+        });
+        if i % 2 == 0 {
+            let mut hits = [None; PACKET];
+            tree.closest_packet(&packet, &mut hits);
+            leaks += hits.iter().filter(|hit| hit.is_none()).count();
+            leaks += PACKET - tree.any_packet(&packet, &[None; PACKET]).count_ones() as usize;
+        } else {
+            leaks += packet.iter().filter(|ray| tree.closest(ray).is_none() || !tree.any(ray, None)).count();
+        }
+    }
+    leaks
+}
+
+/// Leaks of `rays` rays in each place, by each kind of instructions.
+fn assert_watertight(rays: usize) {
+    let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
+    let places =
+        [(1.0, Vec3::ZERO), (1.0, far), (2.0_f32.powi(30), Vec3::ZERO), (2.0_f32.powi(-30), Vec3::ZERO)];
+    for shape in [ball(16, 0.0), ball(60, 0.3)] {
+        for (scale, offset) in places {
+            let mesh = placed(&shape, scale, offset);
+            for instructions in Instructions::ALL {
+                let leaks = leaks(&mesh, scale, offset, rays, instructions);
+                assert_eq!(leaks, 0, "{} triangles × {scale} + {offset}", mesh.triangles.len());
+            }
+        }
+    }
+}
+
+#[test]
+fn no_ray_leaks_at_edges_and_vertices() {
+    assert_watertight(42_000);
+}
+
+/// `cargo test --release --test suite leaks_of_many -- --ignored`: 10⁸ rays, some minutes.
+#[test]
+#[ignore = "takes minutes"]
+fn leaks_of_many_rays() {
+    assert_watertight(100_000_000 / 24);
+}
+
+/// Boxes in a grid, 12 triangles each, all edges along the axes.
+fn boxes(side: u32) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    for cell in 0..side * side * side {
+        let at =
+            Vec3::new((cell % side) as f32, (cell / side % side) as f32, (cell / side / side) as f32) * 1.5;
+        let first = mesh.positions.len() as u32;
+        let corner = |i: u32| at + Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        mesh.positions.extend((0..8).map(corner));
+        for [a, b, c, d] in
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+        {
+            mesh.triangles.extend([[a, b, c], [a, c, d]].map(|triangle| triangle.map(|i| first + i)));
+        }
+    }
+    mesh
+}
+
+/// Where a ray first enters a box of the grid, by slabs in double precision.
+fn first_box(ray: &Ray, side: u32) -> f64 {
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let enter = |cell: u32| {
+        let at = [cell % side, cell / side % side, cell / side / side].map(|i| f64::from(i) * 1.5);
+        let (mut near, mut far) = (0.0, f64::INFINITY);
+        for axis in 0..3 {
+            if direction[axis] == 0.0 {
+                if !(at[axis]..=at[axis] + 1.0).contains(&origin[axis]) {
+                    return f64::INFINITY;
+                }
+                continue;
+            }
+            let ends = [at[axis], at[axis] + 1.0].map(|plane| (plane - origin[axis]) / direction[axis]);
+            (near, far) = (ends[0].min(ends[1]).max(near), ends[0].max(ends[1]).min(far));
+        }
+        if near <= far { near } else { f64::INFINITY }
+    };
+    (0..side * side * side).map(enter).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn boxes_show_no_speck_from_any_side() {
+    for side in [1, 3] {
+        let mesh = boxes(side);
+        let middle = Vec3::splat((side - 1) as f32 * 0.75 + 0.5);
+        let mut random = Random(u64::from(side));
+        for instructions in Instructions::ALL {
+            let tree = tree(&mesh).with(instructions);
+            for view in 0..1000 {
+                // The first looks are along the axes and their diagonals, where every ray lies in planes of faces.
+                let away = match view {
+                    0..26 => {
+                        let code = if view < 13 { view } else { view + 1 };
+                        Vec3::new((code % 3) as f32, (code / 3 % 3) as f32, (code / 9) as f32) - Vec3::ONE
+                    }
+                    _ => random.vector(),
+                };
+                let eye = middle + away.normalize() * 20.0;
+                for _ in 0..8 {
+                    let target = match view % 3 {
+                        // Vertices and edges of boxes: rays that graze.
+                        0 => mesh.positions[random.below(mesh.positions.len())],
+                        1 => {
+                            let [a, b, c] = mesh.corners(random.below(mesh.triangles.len()) as u32);
+                            a + (b - a) * random.next() + (c - b) * random.next() * random.next()
+                        }
+                        _ => middle + random.vector() * side as f32,
+                    };
+                    let ray = Ray::new(eye, target - eye);
+                    assert_no_speck(&tree, &ray, side);
+                }
+            }
+        }
+    }
+}
+
+/// A ray that enters a box, by more than rounding, hits it there; one that passes all boxes hits none.
+fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
+    let shifted = |by: f32| {
+        let across = ray.direction.any_orthogonal_vector().normalize() * by;
+        let other = ray.direction.cross(across).normalize() * by;
+        [across, other, -across, -other]
+            .map(|shift| first_box(&Ray { origin: ray.origin + shift, ..*ray }, side))
+    };
+    let exact = first_box(ray, side);
+    let (least, greatest) = shifted(1e-4).into_iter().fold((exact, exact), |(a, b), t| (a.min(t), b.max(t)));
+    match tree.closest(ray) {
+        Some(hit) => {
+            let t = f64::from(hit.t);
+            assert!(t >= least - 1e-5 && t <= greatest + 1e-5, "{ray:?} at {t}, not in {least}…{greatest}");
+        }
+        None => assert!(greatest.is_infinite(), "{ray:?} misses the box at {greatest}"),
+    }
+}
+
+#[test]
+fn all_instructions_make_the_same_picture() {
+    for scene in ["mesh", "textures", "orbiter", "dof"] {
+        let desk = Desk::new();
+        let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
+        let picture = |instructions: &str| {
+            let name = format!("{instructions}.exr");
+            let line = format!("{path} --once --width 96 --height 72 --samples 2 -o {name} --progress none");
+            let output = desk.glimt(&line).env("GLIMT_SIMD", instructions).output().expect("it runs");
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            desk.bytes(&name)
+        };
+        let portable = picture("portable");
+        assert!(portable == picture("avx2") && portable == picture("avx512"), "{scene}");
+    }
+}
