@@ -13,8 +13,7 @@ use super::super::protocol::{PreviewSize, RenderProgress};
 use super::super::sink::Sink;
 use super::super::trace::{Job, Tracer, next_pass};
 use super::{Staged, Stop};
-use crate::film::{Film, tone::develop};
-use crate::film::{RadianceImage, Rect};
+use crate::film::{Film, Previewer, RadianceImage, Rect, tone::develop};
 use crate::integrators::{RayCounters, RenderSettings};
 
 /// At most this often.
@@ -23,6 +22,8 @@ const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
 const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
 /// A preview may take this part of the time at most.
 const PREVIEW_SHARE: u32 = 10;
+/// The longest that a film is taken up into a preview without a look at the orders.
+const PREVIEW_PATIENCE: Duration = Duration::from_millis(4);
 
 /// A film with what it is of.
 #[derive(Debug)]
@@ -33,6 +34,8 @@ pub(in crate::pipeline) struct Canvas {
     done: Vec<u32>,
     /// A first picture at the size of the preview, shown where there are no samples yet.
     base: Option<RadianceImage>,
+    /// What the last preview was made by.
+    previewer: Option<Previewer>,
     /// The budget that ended the last render of it.
     ended_by: Option<f64>,
 }
@@ -41,7 +44,7 @@ impl Canvas {
     fn new(key: Key, plan: &Plan) -> Result<Self, Stop> {
         let film = Film::new(plan.settings.width, plan.settings.height, plan.crop).map_err(Stop::work)?;
         let done = vec![0; film.tile_count()];
-        Ok(Self { key, film, done, base: None, ended_by: None })
+        Ok(Self { key, film, done, base: None, previewer: None, ended_by: None })
     }
 
     /// Whether every pixel has this many samples.
@@ -56,6 +59,13 @@ impl Canvas {
 
     fn jobs(&self, target: u32) -> Vec<Job> {
         jobs(&self.film, |tile| self.done[tile]..target)
+    }
+
+    /// Take up in a preview of this size what changed, for a short time; whether that was all.
+    fn catch_up(&mut self, (width, height): (u32, u32)) -> bool {
+        self.previewer.take_if(|previewer| previewer.size() != (width, height));
+        let previewer = self.previewer.get_or_insert_with(|| Previewer::new(width, height));
+        previewer.update(&self.film, Some(Instant::now() + PREVIEW_PATIENCE))
     }
 
     /// Pixels times samples.
@@ -106,12 +116,9 @@ pub(in crate::pipeline) fn render(
         return Ok(Staged::reused(RayCounters::default(), "nothing that it shows changed"));
     }
     painter.canvas.ended_by = None;
-    painter.canvas.film.set_complete(false);
     painter.paint()?;
     let rays = painter.rays;
-    let complete = painter.canvas.is_complete(wanted);
-    painter.canvas.film.set_complete(complete);
-    Ok(match (!complete, had) {
+    Ok(match (!painter.canvas.is_complete(wanted), had) {
         (true, _) => {
             canvas.ended_by = budget;
             Staged::done(rays, "the time was up")
@@ -194,7 +201,7 @@ impl<'a> Painter<'a> {
             self.say_progress(false);
         }
         if now >= self.next_preview {
-            self.show();
+            self.show_some(now);
         }
         (self.order.pulse)(self.canvas);
         let seconds = self.clock.seconds(self.order.tracer.token.is_paused());
@@ -217,19 +224,27 @@ impl<'a> Painter<'a> {
             fraction,
             elapsed_seconds,
             eta_seconds,
-            samples: (self.units / self.canvas.units(|_| 1).max(1)) as u32,
+            samples: (self.units / self.canvas.film.crop().area() as u64) as u32,
             total_samples: self.order.plan.samples,
         });
     }
 
-    /// The film as it is, into the slot.
+    /// The film as it is, into the slot. For when no tile is being rendered: the pool's threads are asked to help.
     fn show(&mut self) {
-        let Some((width, height)) = self.preview_size() else { return };
-        let begin = Instant::now();
-        let base = self.canvas.base.as_ref().filter(|base| (base.width, base.height) == (width, height));
-        let image = self.canvas.film.preview(width, height, base);
-        self.order.sink.preview(develop(&image, &self.order.plan.tone));
-        self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(begin.elapsed() * PREVIEW_SHARE);
+        let (order, size) = (self.order, self.preview_size());
+        let Some(size) = size else { return };
+        show(self.canvas, size, order);
+        self.next_preview = Instant::now() + PREVIEW_INTERVAL;
+    }
+
+    /// The same between two tiles, on this thread and for a short time: what is left is taken up at the next tick.
+    fn show_some(&mut self, now: Instant) {
+        let Some(size) = self.preview_size() else { return };
+        self.canvas.catch_up(size);
+        if self.canvas.previewer.as_ref().is_some_and(Previewer::is_whole) {
+            say_picture(self.canvas, self.order);
+            self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
+        }
     }
 
     fn preview_size(&self) -> Option<(u32, u32)> {
@@ -263,10 +278,29 @@ impl<'a> Painter<'a> {
     }
 }
 
+/// The whole film into the slot, unless that is cancelled meanwhile.
+fn show(canvas: &mut Canvas, size: (u32, u32), order: &Order<'_>) {
+    let Tracer { pool, token, .. } = order.tracer;
+    while !pool.install(|| canvas.catch_up(size)) {
+        if token.is_cancelled() {
+            return;
+        }
+    }
+    say_picture(canvas, order);
+}
+
+/// What the previewer took up, into the slot.
+fn say_picture(canvas: &Canvas, order: &Order<'_>) {
+    if let Some(previewer) = &canvas.previewer {
+        let image = previewer.picture(canvas.base.as_ref());
+        order.sink.preview(develop(&image, &order.plan.tone));
+    }
+}
+
 /// The tiles that lack samples, in the film's order.
 fn jobs(film: &Film, samples_of: impl Fn(usize) -> std::ops::Range<u32>) -> Vec<Job> {
-    let job = |tile| Some(Job { tile, rect: film.tile_rect(tile)?, samples: samples_of(tile) });
-    film.tile_order().into_iter().filter_map(job).filter(|job| !job.samples.is_empty()).collect()
+    let job = |&tile: &usize| Some(Job { tile, rect: film.tile_rect(tile)?, samples: samples_of(tile) });
+    film.tile_order().iter().filter_map(job).filter(|job| !job.samples.is_empty()).collect()
 }
 
 /// The largest picture of this aspect ratio inside the bounds.

@@ -1,7 +1,7 @@
 //! Cancelling, holding, writing, failing.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use super::*;
@@ -88,6 +88,28 @@ fn the_worker_survives_a_panic() {
     let Failure::Work(message) = bench.failed() else { panic!("a failure of the work") };
     assert!(message.contains("internal error"), "{message}");
     assert!(bench.done().0.image.complete);
+}
+
+static TILES: AtomicUsize = AtomicUsize::new(0);
+
+fn breaks_first(
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile broke");
+    slow(world, settings, tile, samples, token)
+}
+
+#[test]
+fn a_panic_is_heard_before_the_pass_is_over() {
+    let scene = SCENE.replace("width = 40", "width = 1280").replace("height = 30", "height = 1280");
+    let mut bench = Bench::with(&scene, breaks_first);
+    assert!(matches!(bench.failed(), Failure::Work(_)));
+    let tiles = TILES.load(Ordering::SeqCst);
+    assert!(tiles < 40 * 40 / 4, "{tiles} tiles were rendered for nothing");
 }
 
 #[test]
