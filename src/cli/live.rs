@@ -12,7 +12,7 @@ use super::report;
 use crate::pipeline::protocol::Event;
 use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
-use crate::tui::{self, Changed, ColorChoice, Options, PreviewChoice, TuiError};
+use crate::tui::{self, ColorChoice, Options, PreviewChoice, TuiError};
 
 /// How long a file that is being written may take at the end.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -28,9 +28,9 @@ fn live(order: Order) -> Result<Exit, (Exit, String)> {
     let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
     let mut worker = start().map_err(no_thread)?;
     let (sender, changes) = channel();
-    let watcher = Watcher::start(order.poll, move |changed| {
+    let watcher = Watcher::start(order.poll, worker.contents(), move |changed| {
         // A front end that is gone wants no changes.
-        let _ = sender.send(Changed { noticed: changed.noticed });
+        let _ = sender.send(changed);
     })
     .map_err(no_thread)?;
     let (forward, events) = channel();

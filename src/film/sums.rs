@@ -95,10 +95,19 @@ impl Film {
     /// [`FilmError`] where the crop lies outside of the picture or memory does not suffice for the sums and the
     /// finished picture.
     pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
+        Self::within(u64::MAX, width, height, crop)
+    }
+
+    /// The same where no more than `most_bytes` may be taken.
+    ///
+    /// # Errors
+    /// As [`Film::new`].
+    pub fn within(most_bytes: u64, width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
         let whole = Rect { x: 0, y: 0, width, height };
         let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
-        let no_memory = FilmError::Memory { width, height, bytes: bytes_needed(width, height, crop) };
-        let tiles = allocate(width, height, crop).ok_or(no_memory)?;
+        let bytes = bytes_needed(width, height, crop);
+        let tiles = if bytes <= most_bytes { allocate(width, height, crop) } else { None };
+        let tiles = tiles.ok_or(FilmError::Memory { width, height, bytes })?;
         static IDS: AtomicU64 = AtomicU64::new(0);
         Ok(Self {
             width,

@@ -10,10 +10,9 @@ use super::diagnostic::{Diagnostic, Place, Severity};
 use super::nearest::nearest;
 use super::sanitize::visible;
 
-/// The text and the hash of its bytes. The error is one diagnostic that names the file.
-pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnostic>> {
+/// The text. The error is one diagnostic that names the file.
+pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
-    let hash = blake3::hash(&bytes);
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(problem(
             path,
@@ -23,7 +22,7 @@ pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnost
         ));
     }
     match String::from_utf8(bytes) {
-        Ok(text) => Ok((text.into(), hash)),
+        Ok(text) => Ok(text.into()),
         Err(error) => Err(not_utf8(path, error.as_bytes(), error.utf8_error().valid_up_to())),
     }
 }
