@@ -108,6 +108,7 @@ impl Engine {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
+        let before = self.films.current().map(|canvas| canvas.key);
         let outcome = self.run(request, sink, meanwhile, &mut findings);
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.read_named(diagnostics, &request.scene, &self.contents, meanwhile.token);
@@ -117,7 +118,8 @@ impl Engine {
         sink.send(match outcome {
             Ok(report) => {
                 let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-                let unchanged = settled(Stage::Render) && settled(Stage::Write);
+                let is_same = self.films.current().map(|canvas| canvas.key) == before;
+                let unchanged = is_same && settled(Stage::Render) && settled(Stage::Write);
                 Event::Done { generation, report: Box::new(report), warnings: findings.warnings, unchanged }
             }
             Err(Stop::Cancelled) => Event::Cancelled { generation },

@@ -148,7 +148,7 @@ pub enum Event {
         report: Box<Report>,
         /// Warnings.
         warnings: Vec<Diagnostic>,
-        /// Whether the request found everything as it was, so that nothing was rendered.
+        /// Whether the request found everything as it was, so that nothing was rendered and the same picture shown.
         unchanged: bool,
     },
     /// The request could not be done. The last picture stands.

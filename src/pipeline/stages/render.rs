@@ -52,6 +52,7 @@ pub(in crate::pipeline) fn render(
     order: &Order<'_>,
 ) -> Result<Staged<RayCounters>, Stop> {
     let wanted = order.plan.samples;
+    let is_other = films.current().is_some_and(|current| current.key != key);
     films.select(key, |kept| !order.force && kept.done.iter().all(|done| *done <= wanted));
     if films.current().is_none() {
         films.put(|| Canvas::new(key, order.plan, order.most_film_bytes)).map_err(Stop::work)?;
@@ -63,7 +64,8 @@ pub(in crate::pipeline) fn render(
     let mut painter = Painter::new(canvas, order);
     if finished {
         painter.show();
-        return Ok(Staged::reused(RayCounters::default(), "nothing that it shows changed"));
+        let why = if is_other { "its film was kept" } else { "nothing that it shows changed" };
+        return Ok(Staged::reused(RayCounters::default(), why));
     }
     painter.canvas.ended_by = None;
     painter.paint()?;

@@ -87,6 +87,11 @@ fn a_toggle_that_is_switched_back_finds_its_film_again() {
     assert_eq!(report.counters.films, 2);
     assert!(report.counters.film_memory_bytes >= 2 * 40 * 30 * 28);
     bench.overrides.shadows = None;
+    bench.writing = Writing::No;
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "rrrrrsrs");
+    assert!(!unchanged, "another picture is shown than before");
+    bench.writing = Writing::Must;
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrsrd");
     assert_eq!(report.counters.camera_rays, 0);
