@@ -14,7 +14,7 @@ use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
 use crate::scene::NO_SUCH_FILE;
 use crate::scene::diagnostic::Diagnostic;
-use crate::tui::{self, Changed, ColorChoice, Options, PreviewChoice, TuiError};
+use crate::tui::{self, ColorChoice, Options, PreviewChoice, TuiError};
 
 /// How long a file that is being written may take at the end.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -30,9 +30,9 @@ fn live(order: Order) -> Result<Exit, (Exit, String)> {
     let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
     let mut worker = start().map_err(no_thread)?;
     let (sender, changes) = channel();
-    let watcher = Watcher::start(order.poll, move |changed| {
+    let watcher = Watcher::start(order.poll, worker.contents(), move |changed| {
         // A front end that is gone wants no changes.
-        let _ = sender.send(Changed { noticed: changed.noticed });
+        let _ = sender.send(changed);
     })
     .map_err(no_thread)?;
     let (forward, events) = channel();

@@ -11,7 +11,7 @@ use super::progress::{self, Reporter};
 use super::report;
 use super::signals;
 use crate::output::check_place;
-use crate::pipeline::protocol::{Command, Effective, Event, Failure, Report, Request};
+use crate::pipeline::protocol::{Command, Effective, Event, Failure, Report, Request, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -39,7 +39,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         scene: order.scene.clone(),
         overrides: order.overrides.clone(),
         preview: None,
-        write: true,
+        write: Writing::Must,
         force: false,
     })));
     let mut reporter = progress::reporter(order.progress, console);

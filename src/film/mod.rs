@@ -2,6 +2,9 @@
 //!
 //! Integrators make [`TileSamples`]; a [`Film`] sums them in f64; [`Film::radiance`] is what is written,
 //! [`Previewer`] shrinks it for the screen while it grows, and [`tone::develop`] turns either into a [`Picture`].
+//!
+//! Large pictures are worked at by all threads of the pool that the caller is in, and by the caller alone outside of
+//! one: the number of threads is the caller's to choose.
 
 mod curves;
 mod noise;
@@ -16,6 +19,11 @@ pub use srgb::linear_to_srgb8;
 pub use sums::{Film, FilmError, SampleStats, TILE_SIZE};
 
 use crate::math::Vec3;
+
+/// Whether this thread belongs to a pool that work can be shared in.
+fn is_in_pool() -> bool {
+    rayon::current_thread_index().is_some()
+}
 
 /// A rectangle of pixels; (0, 0) is the top left one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

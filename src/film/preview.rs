@@ -1,9 +1,11 @@
 //! The picture so far, at the size of a screen, many times a second.
 
+use std::time::Instant;
+
 use rayon::prelude::*;
 
 use super::resample::Axis;
-use super::{Film, RadianceImage};
+use super::{Film, RadianceImage, is_in_pool};
 use crate::math::{DVec3, Vec3};
 
 /// Shrinks (or enlarges) a film by area, exactly for any ratio, and remembers what each tile gave, so that a picture
@@ -15,6 +17,10 @@ pub struct Previewer {
     height: u32,
     film_id: Option<u64>,
     shares: Vec<Share>,
+    /// The tile to look at next.
+    next: usize,
+    /// Whether every tile of this film has been looked at.
+    is_whole: bool,
 }
 
 /// What one tile gives to the pixels of the preview that it covers.
@@ -30,14 +36,14 @@ struct Share {
     cells: Vec<(DVec3, f64)>,
 }
 
-/// With this many tiles to look at, other threads are worth waking; the first picture of a film, mostly. Later
-/// ones do not wait for a pool that is busy rendering.
-const PARALLEL_TILES: usize = 2048;
+/// Tiles that one thread looks at between two looks at the clock: less than a millisecond of work.
+const TILES_AT_ONCE: usize = 32;
 
 impl Previewer {
     /// For pictures of this size; at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
-        Self { width: width.max(1), height: height.max(1), film_id: None, shares: Vec::new() }
+        let (width, height) = (width.max(1), height.max(1));
+        Self { width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
     }
 
     /// Columns and rows of its pictures.
@@ -45,14 +51,45 @@ impl Previewer {
         (self.width, self.height)
     }
 
-    /// The film as it is now. Any film may be given at any call. `base` shows where there are no samples yet (the
-    /// coarse first picture; of any size); none: black.
-    pub fn picture(&mut self, film: &Film, base: Option<&RadianceImage>) -> RadianceImage {
+    /// Bytes that it remembers.
+    pub fn memory_bytes(&self) -> u64 {
+        let cells: usize = self.shares.iter().map(|share| share.cells.capacity()).sum();
+        (cells * size_of::<(DVec3, f64)>() + self.shares.capacity() * size_of::<Share>()) as u64
+    }
+
+    /// Whether every tile of the film has been taken up at least once, so that [`Previewer::picture`] leaves nothing
+    /// out, though it may be a little behind.
+    pub fn is_whole(&self) -> bool {
+        self.is_whole
+    }
+
+    /// Take up what changed in the film, until `deadline` at the latest; none: all of it. Whether that was all; what
+    /// is left is first next time. Any film may be given at any call.
+    pub fn update(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
         if self.film_id != Some(film.id()) {
             self.film_id = Some(film.id());
             self.shares = vec![Share::default(); film.tile_count()];
+            (self.next, self.is_whole) = (0, false);
         }
-        self.refresh(film);
+        let axes = [Axis::new(film.width(), self.width), Axis::new(film.height(), self.height)];
+        let at_once = if is_in_pool() { TILES_AT_ONCE * rayon::current_num_threads() } else { TILES_AT_ONCE };
+        let mut looked = 0;
+        while looked < self.shares.len() {
+            let end = (self.next + at_once).min(self.shares.len());
+            refresh(&mut self.shares[self.next..end], self.next, film, axes);
+            looked += end - self.next;
+            self.next = if end == self.shares.len() { 0 } else { end };
+            self.is_whole |= self.next == 0;
+            if looked < self.shares.len() && deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// What was taken up. `base` shows where there are no samples yet (the coarse first picture; of any size);
+    /// none: black.
+    pub fn picture(&self, base: Option<&RadianceImage>) -> RadianceImage {
         let mut canvas = vec![(DVec3::ZERO, 0.0); self.width as usize * self.height as usize];
         for share in &self.shares {
             share.add_to(&mut canvas, self.width);
@@ -66,17 +103,19 @@ impl Previewer {
             .map(|(i, (sum, weight))| if *weight > 0.0 { (sum / weight).as_vec3() } else { below(i) });
         RadianceImage { width: self.width, height: self.height, pixels: pixels.collect() }
     }
+}
 
-    fn refresh(&mut self, film: &Film) {
-        let axes = [Axis::new(film.width(), self.width), Axis::new(film.height(), self.height)];
-        let refresh = |(tile, share): (usize, &mut Share)| share.refresh(film, tile, axes);
-        let changed = |(tile, share): &(usize, &mut Share)| film.tile(*tile).revision != share.revision;
-        let mut stale: Vec<_> = self.shares.iter_mut().enumerate().filter(changed).collect();
-        if stale.len() < PARALLEL_TILES {
-            stale.drain(..).for_each(refresh);
-        } else {
-            stale.into_par_iter().with_min_len(64).for_each(refresh);
+/// Take up these tiles, the first of which is `first`.
+fn refresh(shares: &mut [Share], first: usize, film: &Film, axes: [Axis; 2]) {
+    let refresh = |(i, share): (usize, &mut Share)| {
+        if film.tile(first + i).revision != share.revision {
+            share.refresh(film, first + i, axes);
         }
+    };
+    if is_in_pool() && shares.len() > TILES_AT_ONCE {
+        shares.par_iter_mut().enumerate().with_min_len(TILES_AT_ONCE / 4).for_each(refresh);
+    } else {
+        shares.iter_mut().enumerate().for_each(refresh);
     }
 }
 
@@ -142,6 +181,12 @@ mod tests {
         film
     }
 
+    fn preview(film: &Film, width: u32, height: u32, base: Option<&RadianceImage>) -> RadianceImage {
+        let mut previewer = Previewer::new(width, height);
+        assert!(previewer.update(film, None));
+        previewer.picture(base)
+    }
+
     fn pattern(x: u32, y: u32) -> f32 {
         (x * 7 + y * 13 + x * y) as f32 % 11.0
     }
@@ -155,7 +200,7 @@ mod tests {
         let film = film(77, 45, None, |x, y| Some(pattern(x, y)));
         let whole = film.radiance();
         for (width, height) in [(1, 1), (2, 3), (13, 7), (40, 45), (77, 45), (100, 91)] {
-            let picture = film.preview(width, height, None);
+            let picture = preview(&film, width, height, None);
             assert!((mean(&picture) - mean(&whole)).abs() < 1e-5, "{width}×{height}");
             for (a, b) in picture.pixels.iter().zip(&whole.resized(width, height).pixels) {
                 assert!((a - b).abs().max_element() < 1e-5, "{width}×{height}: {a} {b}");
@@ -168,17 +213,17 @@ mod tests {
         // The left half is rendered, but for every other row.
         let film = film(64, 64, None, |x, y| (x < 32 && y % 2 == 0).then_some(5.0));
         let base = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::splat(2.0)] };
-        let picture = film.preview(8, 8, Some(&base));
+        let picture = preview(&film, 8, 8, Some(&base));
         for (i, pixel) in picture.pixels.iter().enumerate() {
             assert_eq!(pixel.x, if i % 8 < 4 { 5.0 } else { 2.0 }, "pixel {i}");
         }
-        assert_eq!(film.preview(8, 8, None).pixels[7], Vec3::ZERO);
+        assert_eq!(preview(&film, 8, 8, None).pixels[7], Vec3::ZERO);
     }
 
     #[test]
     fn a_crop_lands_where_it_belongs() {
         let film = film(100, 60, Some(Rect { x: 50, y: 30, width: 500, height: 500 }), |_, _| Some(1.0));
-        let picture = film.preview(10, 6, None);
+        let picture = preview(&film, 10, 6, None);
         for (i, pixel) in picture.pixels.iter().enumerate() {
             let inside = i % 10 >= 5 && i / 10 >= 3;
             assert_eq!(pixel.x, f32::from(u8::from(inside)), "pixel {i}");
@@ -189,33 +234,67 @@ mod tests {
     fn a_used_previewer_sees_changes_and_other_films() {
         let mut previewer = Previewer::new(9, 5);
         let first = film(70, 40, None, |x, _| (x < 20).then_some(1.0));
-        assert_eq!(previewer.picture(&first, None), first.preview(9, 5, None));
+        let mut picture = |film: &Film| {
+            previewer.update(film, None);
+            previewer.picture(None)
+        };
+        assert_eq!(picture(&first), preview(&first, 9, 5, None));
         let rect = first.tile_rect(1).expect("a tile");
         let samples = TileSamples { rect, samples: 2, radiance: vec![Vec3::Y; rect.area() * 2] };
         first.add(1, &samples);
-        let changed = previewer.picture(&first, None);
-        assert_eq!(changed, first.preview(9, 5, None));
+        let changed = picture(&first);
+        assert_eq!(changed, preview(&first, 9, 5, None));
         assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile shows");
         let second = film(30, 50, None, |x, y| Some(pattern(x, y)));
-        assert_eq!(previewer.picture(&second, None), second.preview(9, 5, None));
+        assert_eq!(picture(&second), preview(&second, 9, 5, None));
     }
 
-    #[test]
-    fn many_tiles_are_the_same_in_parallel() {
-        let side = 32 * 46;
-        let film = Film::new(side, side, None).expect("a film");
-        assert!(film.tile_count() > PARALLEL_TILES);
+    /// 46 × 46 tiles, each as bright as its number.
+    fn tiled() -> Film {
+        let film = Film::new(32 * 46, 32 * 46, None).expect("a film");
         for tile in 0..film.tile_count() {
             let rect = film.tile_rect(tile).expect("a tile");
             let value = Vec3::splat(tile as f32);
             film.add(tile, &TileSamples { rect, samples: 1, radiance: vec![value; rect.area()] });
         }
-        let picture = film.preview(23, 23, None);
+        film
+    }
+
+    #[test]
+    fn many_tiles_are_the_same_in_parallel() {
+        let film = tiled();
+        let alone = preview(&film, 23, 23, None);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("a pool");
+        assert_eq!(pool.install(|| preview(&film, 23, 23, None)), alone);
         // Each new pixel covers 2×2 tiles of consecutive numbers in two rows.
-        for (i, pixel) in picture.pixels.iter().enumerate() {
+        for (i, pixel) in alone.pixels.iter().enumerate() {
             let (column, row) = (2 * (i % 23), 2 * (i / 23));
             let expected = (row * 46 + column) as f32 + 23.5;
             assert!((pixel.x - expected).abs() < 1e-3, "{i}: {} {expected}", pixel.x);
         }
+    }
+
+    #[test]
+    fn an_update_stops_at_its_deadline_and_goes_on_where_it_was() {
+        let film = tiled();
+        let mut previewer = Previewer::new(23, 23);
+        let past = Instant::now();
+        let slices = film.tile_count().div_ceil(TILES_AT_ONCE);
+        for slice in 1..=slices {
+            assert!(!previewer.is_whole());
+            assert!(!previewer.update(&film, Some(past)), "slice {slice}");
+        }
+        assert!(previewer.is_whole());
+        assert_eq!(previewer.picture(None), preview(&film, 23, 23, None));
+        // What changes behind the place reached is taken up in the next round.
+        previewer.update(&film, Some(past));
+        let rect = film.tile_rect(0).expect("a tile");
+        film.add(0, &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(1e6); rect.area()] });
+        for _ in 0..slices {
+            previewer.update(&film, Some(past));
+        }
+        assert!(previewer.is_whole());
+        assert_eq!(previewer.picture(None), preview(&film, 23, 23, None));
+        assert!(previewer.update(&film, None));
     }
 }

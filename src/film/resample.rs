@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::RadianceImage;
+use super::{RadianceImage, is_in_pool};
 use crate::math::DVec3;
 
 /// How the pixels of one axis fall into those of another length.
@@ -41,21 +41,23 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
     // Each new pixel gathers the old ones that it covers: the same overlaps, seen from the other side.
     let columns = Axis::new(image.width, width).inverse();
     let rows = Axis::new(image.height, height).inverse();
-    let pixels = (0..width as usize * height as usize)
-        .into_par_iter()
-        .with_min_len(256)
-        .map(|i| {
-            let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
-            for (y, row_weight) in rows.covered((i / width as usize) as u32) {
-                let row = &image.pixels[y as usize * image.width as usize..][..image.width as usize];
-                for (x, column_weight) in columns.covered((i % width as usize) as u32) {
-                    sum += row[x as usize].as_dvec3() * (row_weight * column_weight);
-                    weights += row_weight * column_weight;
-                }
+    let pixel = |i: usize| {
+        let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+        for (y, row_weight) in rows.covered((i / width as usize) as u32) {
+            let row = &image.pixels[y as usize * image.width as usize..][..image.width as usize];
+            for (x, column_weight) in columns.covered((i % width as usize) as u32) {
+                sum += row[x as usize].as_dvec3() * (row_weight * column_weight);
+                weights += row_weight * column_weight;
             }
-            (sum / weights).as_vec3()
-        })
-        .collect();
+        }
+        (sum / weights).as_vec3()
+    };
+    let all = 0..width as usize * height as usize;
+    let pixels = if is_in_pool() {
+        all.into_par_iter().with_min_len(256).map(pixel).collect()
+    } else {
+        all.map(pixel).collect()
+    };
     RadianceImage { width, height, pixels }
 }
 

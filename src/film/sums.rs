@@ -1,7 +1,7 @@
 //! The film: f64 sums of every pixel's samples, in tiles that many threads fill without sharing.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::noise::luminance;
 use super::{RadianceImage, Rect, TileSamples};
@@ -56,8 +56,8 @@ pub struct Film {
     height: u32,
     crop: Rect,
     tiles: Vec<Mutex<Tile>>,
+    order: OnceLock<Vec<usize>>,
     non_finite_samples: AtomicU64,
-    complete: AtomicBool,
     id: u64,
 }
 
@@ -99,18 +99,27 @@ impl Film {
     /// [`FilmError`] where the crop lies outside of the picture or memory does not suffice for the sums and the
     /// finished picture.
     pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
+        Self::within(u64::MAX, width, height, crop)
+    }
+
+    /// The same where no more than `most_bytes` may be taken.
+    ///
+    /// # Errors
+    /// As [`Film::new`].
+    pub fn within(most_bytes: u64, width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
         let whole = Rect { x: 0, y: 0, width, height };
         let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
-        let no_memory = FilmError::Memory { width, height, bytes: bytes_needed(width, height, crop) };
-        let tiles = allocate(width, height, crop).ok_or(no_memory)?;
+        let bytes = bytes_needed(width, height, crop);
+        let tiles = if bytes <= most_bytes { allocate(width, height, crop) } else { None };
+        let tiles = tiles.ok_or(FilmError::Memory { width, height, bytes })?;
         static IDS: AtomicU64 = AtomicU64::new(0);
         Ok(Self {
             width,
             height,
             crop,
             tiles,
+            order: OnceLock::new(),
             non_finite_samples: AtomicU64::new(0),
-            complete: AtomicBool::new(false),
             id: IDS.fetch_add(1, Ordering::Relaxed),
         })
     }
@@ -140,21 +149,15 @@ impl Film {
         (tile < self.tiles.len()).then(|| tile_rect(self.crop, tile))
     }
 
-    /// Every tile once, from the middle of the crop outwards in rings.
-    pub fn tile_order(&self) -> Vec<usize> {
-        let (columns, rows) = tile_grid(self.crop);
-        // Twice the distance from the middle, so that it is a whole number.
-        let offset = |index: usize, length: usize| 2 * index as i64 - (length as i64 - 1);
-        let mut order: Vec<usize> = (0..self.tiles.len()).collect();
-        order.sort_by(|&a, &b| {
-            let key = |tile: usize| {
-                let (x, y) = (offset(tile % columns, columns), offset(tile / columns, rows));
-                (x.abs().max(y.abs()) / 2, (y as f64).atan2(x as f64))
-            };
-            let (a, b) = (key(a), key(b));
-            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-        });
-        order
+    /// Every tile once, from the middle of the crop outwards in rings; sorted when it is first asked for.
+    pub fn tile_order(&self) -> &[usize] {
+        self.order.get_or_init(|| rings(self.crop))
+    }
+
+    /// Bytes that its sums take.
+    pub fn memory_bytes(&self) -> u64 {
+        let tile = size_of::<Mutex<Tile>>() + size_of::<usize>();
+        (self.crop.area() * SUM_BYTES + self.tiles.len() * tile) as u64
     }
 
     /// Add samples to a tile, each for itself and in their order. A sample with a NaN or an infinity counts as
@@ -222,35 +225,9 @@ impl Film {
         SampleStats { min, mean: total as f64 / self.crop.area() as f64, max }
     }
 
-    /// Samples of one pixel of the whole picture; 0 outside the crop.
-    pub fn pixel_samples(&self, x: u32, y: u32) -> u32 {
-        let columns = tile_grid(self.crop).0;
-        index_in(self.crop, x, y).map_or(0, |_| {
-            let (column, row) = ((x - self.crop.x) / TILE_SIZE, (y - self.crop.y) / TILE_SIZE);
-            let tile = row as usize * columns + column as usize;
-            index_in(tile_rect(self.crop, tile), x, y).map_or(0, |index| self.tile(tile).count(index))
-        })
-    }
-
     /// Samples with a NaN or an infinity, which counted as black.
     pub fn non_finite_samples(&self) -> u64 {
         self.non_finite_samples.load(Ordering::Relaxed)
-    }
-
-    /// Whether every sample that was asked for is in.
-    pub fn is_complete(&self) -> bool {
-        self.complete.load(Ordering::Acquire)
-    }
-
-    /// Said by whoever renders, once every sample is in (or no longer, when more are asked for).
-    pub fn set_complete(&self, complete: bool) {
-        self.complete.store(complete, Ordering::Release);
-    }
-
-    /// The picture so far at another size; see [`Previewer`](super::Previewer), which is what to use when it is
-    /// wanted again and again.
-    pub fn preview(&self, width: u32, height: u32, base: Option<&RadianceImage>) -> RadianceImage {
-        super::Previewer::new(width, height).picture(self, base)
     }
 
     /// Tells films apart.
@@ -284,12 +261,27 @@ fn tile_rect(crop: Rect, tile: usize) -> Rect {
     Rect { x: crop.x + x, y: crop.y + y, width: side(x, crop.width), height: side(y, crop.height) }
 }
 
+fn rings(crop: Rect) -> Vec<usize> {
+    let (columns, rows) = tile_grid(crop);
+    // Twice the distance from the middle, so that it is a whole number.
+    let offset = |index: usize, length: usize| 2 * index as i64 - (length as i64 - 1);
+    let place = |tile: usize| {
+        let (x, y) = (offset(tile % columns, columns), offset(tile / columns, rows));
+        (x.abs().max(y.abs()) / 2, (y as f64).atan2(x as f64), tile)
+    };
+    let mut places: Vec<_> = (0..columns * rows).map(place).collect();
+    places.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    places.into_iter().map(|(_, _, tile)| tile).collect()
+}
+
+/// Of one pixel's sum, sum of squares and count.
+const SUM_BYTES: usize = size_of::<DVec3>() + size_of::<f64>() + size_of::<u32>();
+
 /// For the sums of the crop, and for the whole picture as radiance and as sRGB.
 fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
-    let sum = size_of::<DVec3>() + size_of::<f64>() + size_of::<u32>();
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
     let whole = u64::from(width) * u64::from(height);
-    (crop.area() as u64).saturating_mul(sum as u64).saturating_add(whole.saturating_mul(pixel as u64))
+    (crop.area() as u64).saturating_mul(SUM_BYTES as u64).saturating_add(whole.saturating_mul(pixel as u64))
 }
 
 /// Asks for all the memory at once first, as a system that promises more than it has refuses only that.

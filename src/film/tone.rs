@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Picture, Picture16, RadianceImage, curves, linear_to_srgb8};
+use super::{Picture, Picture16, RadianceImage, curves, is_in_pool, linear_to_srgb8};
 use crate::math::Vec3;
 use crate::math::color::linear_to_srgb;
 
@@ -43,7 +43,7 @@ pub struct ToneMapping {
 
 /// Far above everything that any curve tells apart, far below what overflows inside one.
 const BRIGHTEST: f32 = 1e10;
-/// Below this many pixels other threads are not worth waking: a preview is developed where it is shown.
+/// Below this many pixels other threads are not worth waking.
 const PARALLEL_PIXELS: usize = 1 << 18;
 
 impl ToneMapping {
@@ -97,7 +97,7 @@ fn map_pixels<T: Send>(
 ) -> Vec<T> {
     let factor = tone.exposure_stops.exp2();
     let pixel = |&radiance: &Vec3| encode(tone.exposed(radiance, factor));
-    if image.pixels.len() < PARALLEL_PIXELS {
+    if image.pixels.len() < PARALLEL_PIXELS || !is_in_pool() {
         image.pixels.iter().map(pixel).collect()
     } else {
         image.pixels.par_iter().with_min_len(1 << 14).map(pixel).collect()
@@ -211,11 +211,29 @@ mod tests {
     }
 
     #[test]
+    fn work_is_shared_within_the_callers_pool_and_nowhere_else() {
+        let pixels = vec![Vec3::ONE; PARALLEL_PIXELS + 7];
+        let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
+        let threads = || {
+            let named = |_: Vec3| std::thread::current().name().map(str::to_owned);
+            map_pixels(&image, &tone(Curve::None), named)
+                .into_iter()
+                .collect::<std::collections::HashSet<_>>()
+        };
+        let own = std::thread::current().name().map(str::to_owned);
+        assert_eq!(threads(), [own].into(), "outside of a pool");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).thread_name(|i| format!("two-{i}"));
+        let used = pool.build().expect("a pool").install(threads);
+        assert!(used.iter().flatten().all(|name| name.starts_with("two-")) && used.len() <= 2, "{used:?}");
+    }
+
+    #[test]
     fn many_pixels_are_the_same_as_one_by_one() {
         let pixels: Vec<_> = (0..PARALLEL_PIXELS + 7).map(|i| Vec3::splat(i as f32 * 1e-5)).collect();
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let mapping = tone(Curve::Aces);
-        let developed = develop(&image, &mapping).pixels;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+        let developed = pool.install(|| develop(&image, &mapping)).pixels;
         for (pixel, &radiance) in developed.iter().zip(&image.pixels) {
             assert_eq!(*pixel, mapping.apply(radiance).to_array().map(linear_to_srgb8));
         }

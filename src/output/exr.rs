@@ -2,8 +2,14 @@
 
 use std::io::Cursor;
 
+use ::exr::block::UncompressedBlock;
+use ::exr::block::writer::ChunksWriter;
+use ::exr::error::UnitResult;
+use ::exr::image::write::layers::{LayersWriter, WritableLayers};
+use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{Chromaticities, Text};
-use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage};
+use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2};
+use rayon::prelude::*;
 
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_light, one_line};
 use crate::film::RadianceImage;
@@ -18,10 +24,42 @@ pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<V
     let layer = Layer::new(size, attributes(options), Encoding::SMALL_LOSSLESS, channels);
     let mut file = Image::from_layer(layer);
     file.attributes.chromaticities = Some(REC_709);
+    let headers = file.layer_data.infer_headers(&file.attributes);
+    let layers = file.layer_data.create_writer(&headers);
     let mut bytes = Vec::new();
-    let written = file.write().to_buffered(Cursor::new(&mut bytes));
-    written.map_err(|error| OutputError::encoder(Format::Exr, &error))?;
+    ::exr::block::write(Cursor::new(&mut bytes), headers, true, |meta, file| {
+        let block = |index| layers.extract_uncompressed_block(&meta.headers, index);
+        compress(&meta, meta.collect_ordered_block_data(block), file)
+    })
+    .map_err(|error| OutputError::encoder(Format::Exr, &error))?;
     Ok(bytes)
+}
+
+/// The encoder's own way is a pool with a thread for every core. This one stays in the pool that the caller is in, or
+/// on the caller's thread outside of one.
+fn compress(
+    meta: &MetaData,
+    mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
+    file: &mut impl ChunksWriter,
+) -> UnitResult {
+    let is_in_pool = rayon::current_thread_index().is_some();
+    let at_once = if is_in_pool { 4 * rayon::current_num_threads() } else { 1 };
+    let compressed =
+        |(index, block): (usize, UncompressedBlock)| (index, block.compress_to_chunk(&meta.headers));
+    loop {
+        let batch: Vec<_> = blocks.by_ref().take(at_once).collect();
+        if batch.is_empty() {
+            return Ok(());
+        }
+        let chunks: Vec<_> = if is_in_pool {
+            batch.into_par_iter().map(compressed).collect()
+        } else {
+            batch.into_iter().map(compressed).collect()
+        };
+        for (index, chunk) in chunks {
+            file.write_chunk(index, chunk?)?;
+        }
+    }
 }
 
 /// ITU-R BT.709 primaries, D65 white.

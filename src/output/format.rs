@@ -53,6 +53,11 @@ impl Format {
         ("ppm", Self::Ppm),
     ];
 
+    /// Every ending that names a format, without the dot.
+    pub fn endings() -> impl Iterator<Item = &'static str> {
+        Self::ENDINGS.iter().map(|(ending, _)| *ending)
+    }
+
     /// The known endings, as a message lists them.
     pub(super) fn known_endings() -> String {
         Self::ENDINGS.map(|(ending, _)| format!(".{ending}")).join(", ")

@@ -207,7 +207,12 @@ fn the_same_picture_gives_the_same_bytes() {
     let image = picture(200, 150);
     for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm] {
         let once = encode(&image, &options(BitDepth::Eight), format).expect("bytes");
-        assert!(once == encode(&image, &options(BitDepth::Eight), format).expect("bytes"), "{format}");
+        let again = || encode(&image, &options(BitDepth::Eight), format).expect("bytes");
+        assert!(once == again(), "{format}");
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            assert!(once == pool.install(again), "{format} by {threads} threads");
+        }
     }
 }
 

@@ -29,7 +29,7 @@ impl<T> Memo<T> {
         self.last.as_ref().map(|(_, value)| value)
     }
 
-    /// Whether the last value was made of these inputs; remembers them for the next call.
+    /// Remember the value and what it was made of, in place of the last one.
     pub(super) fn set(&mut self, key: Key, value: T) {
         self.last = Some((key, value));
     }
@@ -63,6 +63,11 @@ impl<N: Hash + Eq, T> Pool<N, T> {
         let entry = self.entries.get_mut(name).filter(|entry| entry.key == key)?;
         entry.used = true;
         Some(entry.value.clone())
+    }
+
+    /// The value of this name, whatever it was made of.
+    pub(super) fn latest(&self, name: &N) -> Option<&Arc<T>> {
+        self.entries.get(name).map(|entry| &entry.value)
     }
 
     /// Keep this value in place of an older one.

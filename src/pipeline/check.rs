@@ -1,13 +1,13 @@
 //! Reading and validating everything that a scene names, without rendering.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc;
 
-use super::engine::Engine;
+use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
 use super::stages::parse::Parsed;
-use super::trace::Kernel;
 use crate::assets::image::ImageEncoding;
 use crate::math::Vec3;
 use crate::scene::description::{Encoding, MaterialKind, Object, Shape};
@@ -36,8 +36,8 @@ pub struct Checked {
 pub fn check(path: &Path) -> Result<Checked, Failure> {
     let (events, _) = mpsc::channel();
     let sink = Sink { generation: 0, events, previews: PreviewSlot::default() };
-    let kernel: Kernel = super::worker::KERNEL;
-    let (parsed, meshes, textures, warnings) = Engine::new(kernel).read_all(path, &sink, add_declared)?;
+    let (parsed, meshes, textures, warnings) =
+        Engine::new(Means::default(), Arc::default()).read_all(path, &sink, add_declared)?;
     let scene = &parsed.loaded.scene;
     let triangles = |shape: &Shape| match shape {
         Shape::Mesh { file, .. } => meshes[*file].mesh.mesh.triangles.len() as u64,

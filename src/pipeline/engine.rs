@@ -8,36 +8,53 @@ use std::time::Instant;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::cache::{Memo, Pool};
-use super::plan::{Plan, plan};
-use super::protocol::{Event, Failure, Report, Request, Stage, Status};
+use super::plan::{Plan, cores, plan};
+use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Outcome, report};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, Ingredients, Keyed, accel, needed};
+use super::stages::canvas::Canvas;
+use super::stages::films::Films;
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
-use super::stages::render::{Canvas, Order, render};
+use super::stages::preview::Screen;
+use super::stages::render::{Order, render};
 use super::stages::textures::{TextureCache, Textures, textures};
-use super::stages::write::{Written, check_targets, write};
+use super::stages::write::{Written, check_targets, write, write_if_wanted};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
 use super::table::Table;
 use super::trace::{Kernel, Tracer};
-use super::watch::content::{Contents, FileRead};
+use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::scene::diagnostic::Diagnostic;
 
+/// What an engine works with; tests work with other means.
+#[derive(Clone, Copy)]
+pub(super) struct Means {
+    pub(super) kernel: Kernel,
+    /// What one film may take, at most.
+    pub(super) most_film_bytes: u64,
+}
+
+impl Default for Means {
+    fn default() -> Self {
+        Self { kernel: crate::integrators::render_tile, most_film_bytes: u64::MAX }
+    }
+}
+
 /// All that is kept from request to request.
 pub(super) struct Engine {
-    kernel: Kernel,
-    contents: Contents,
+    means: Means,
+    contents: Arc<Contents>,
     parsed: Memo<Arc<Parsed>>,
     meshes: Pool<PathBuf, KeptMesh>,
     textures: TextureCache,
     accel: AccelCache,
     lights: Memo<()>,
-    canvas: Option<Canvas>,
+    films: Films,
     written: Written,
-    /// What the canvas is rendered by.
+    /// What the current film is rendered by.
     plan: Option<Plan>,
     pool: Option<Arc<ThreadPool>>,
     /// The assets of the last scene that could be read: they stay watched while it is broken.
@@ -45,10 +62,19 @@ pub(super) struct Engine {
 }
 
 /// Orders that come while a request is under way.
+pub(super) trait Orders {
+    /// Whether the picture is to be written as it is.
+    fn wants_write(&self) -> bool;
+    /// The same, and the order is carried out.
+    fn take_write(&self) -> bool;
+    /// The size that previews are to have from now on.
+    fn take_preview(&self) -> Option<Option<PreviewSize>>;
+}
+
+/// What a request goes by while it is under way.
 pub(super) struct Meanwhile<'a> {
     pub(super) token: &'a CancelToken,
-    /// Takes an order to write the picture as it is.
-    pub(super) take_write: &'a dyn Fn() -> bool,
+    pub(super) orders: &'a dyn Orders,
 }
 
 /// Everything that is ready to be rendered.
@@ -60,16 +86,16 @@ struct Ready {
 }
 
 impl Engine {
-    pub(super) fn new(kernel: Kernel) -> Self {
+    pub(super) fn new(means: Means, contents: Arc<Contents>) -> Self {
         Self {
-            kernel,
-            contents: Contents::default(),
+            means,
+            contents,
             parsed: Memo::default(),
             meshes: Pool::default(),
             textures: TextureCache::default(),
             accel: AccelCache::default(),
             lights: Memo::default(),
-            canvas: None,
+            films: Films::default(),
             written: Written::default(),
             plan: None,
             pool: None,
@@ -82,16 +108,18 @@ impl Engine {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
+        let before = self.films.current().map(|canvas| canvas.key);
         let outcome = self.run(request, sink, meanwhile, &mut findings);
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
-            self.find_named(diagnostics, &request.scene, &mut findings, meanwhile.token);
+            findings.read_named(diagnostics, &request.scene, &self.contents, meanwhile.token);
         }
         self.say_files(&findings, sink);
         self.sweep(outcome.is_ok());
         sink.send(match outcome {
             Ok(report) => {
                 let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-                let unchanged = settled(Stage::Render) && settled(Stage::Write);
+                let is_same = self.films.current().map(|canvas| canvas.key) == before;
+                let unchanged = is_same && settled(Stage::Render) && settled(Stage::Write);
                 Event::Done { generation, report: Box::new(report), warnings: findings.warnings, unchanged }
             }
             Err(Stop::Cancelled) => Event::Cancelled { generation },
@@ -99,14 +127,31 @@ impl Engine {
         });
     }
 
+    /// Whether there is a picture without holes.
+    pub(super) fn can_write(&self) -> bool {
+        self.films.current().is_some_and(Canvas::is_covered)
+    }
+
     /// Write the picture as it is, outside of a request.
     pub(super) fn write_now(&mut self, sink: &Sink) {
-        let (Some(canvas), Some(plan)) = (&self.canvas, &self.plan) else {
-            return say_write_failed(sink, "there is no picture yet".to_owned());
+        let (Some(canvas), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
+            return sink.write_failed("there is no picture yet".to_owned());
         };
+        if !canvas.is_covered() {
+            let message = "nothing is written: the render was stopped before every pixel had a sample";
+            return sink.write_failed(message.to_owned());
+        }
         self.written.forget();
-        if let Err(message) = write(canvas, plan, &mut self.written, &self.contents, sink) {
-            say_write_failed(sink, message);
+        let (written, contents) = (&mut self.written, &self.contents);
+        if let Err(message) = pool.install(|| write(canvas, plan, written, contents, sink)) {
+            sink.write_failed(message);
+        }
+    }
+
+    /// Show the picture as it is at another size, outside of a request.
+    pub(super) fn show_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
+        if let (Some(canvas), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
+            Screen { bounds, plan, sink }.show(canvas, pool, token);
         }
     }
 
@@ -119,22 +164,25 @@ impl Engine {
     ) -> Result<Report, Stop> {
         let begin = Instant::now();
         let mut table = Table { sink, stages: Vec::new() };
-        let ready = self.prepare(request, &mut table, meanwhile.token, findings)?;
+        let snapshot = Snapshot::of(Arc::clone(&self.contents));
+        let reading = (&snapshot, meanwhile.token);
+        let ready = self.prepare(request, &mut table, reading, findings)?;
         table.run(Stage::Photons, || {
             Ok(photons(ready.plan.scene.photons.enabled, request.overrides.photons))
         })?;
         self.plan = Some(ready.plan.clone());
         let rays = table.run(Stage::Render, || self.render(request, &ready, sink, meanwhile))?;
-        table.run(Stage::Write, || self.write(request, &ready.plan, sink))?;
-        let Some(canvas) = &self.canvas else { return Err(Stop::work("the film is gone")) };
+        let is_written = table.run(Stage::Write, || self.write(request, &ready.plan, sink))?;
+        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let outcome = Outcome {
             scene: &ready.parsed.loaded.path,
             plan: &ready.plan,
             world: &ready.world.1,
             canvas,
+            films: &self.films,
             rays,
             texels_loaded: ready.texels_loaded,
-            is_written: request.write,
+            is_written,
         };
         Ok(report(&outcome, table.stages, begin.elapsed().as_secs_f64()))
     }
@@ -144,21 +192,19 @@ impl Engine {
         &mut self,
         request: &Request,
         table: &mut Table<'_>,
-        token: &CancelToken,
+        (contents, token): (&Snapshot, &CancelToken),
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
-        let parsed = table
-            .run(Stage::Parse, || parse(&request.scene, &self.contents, &mut self.parsed, findings, token))?;
-        let plan = plan(parsed.loaded.scene.clone(), &request.scene, &request.overrides)
+        let parsed =
+            table.run(Stage::Parse, || parse(&request.scene, contents, &mut self.parsed, findings, token))?;
+        let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         let settings = Box::new(plan.effective.clone());
         table.sink.send(Event::Settings { generation: request.generation, settings });
-        if request.write {
-            check_targets(&plan)?;
-        }
+        check_targets(request.write, &plan, table.sink)?;
         let pool = self.pool(plan.threads)?;
-        let (meshes, textures) = self.load(&parsed, findings, table, token, &pool)?;
-        let reading = Reading { sink: table.sink, token, contents: &self.contents, pool: &pool };
+        let reading = Reading { sink: table.sink, token, contents, pool: &pool };
+        let (meshes, textures) = self.load(&parsed, findings, table, &reading)?;
         let scene = &plan.scene;
         let from = Ingredients { scene, parsed: &parsed, meshes: &meshes, textures: &textures };
         let world = table.run(Stage::Accel, || accel(&from, &mut self.accel, &reading))?;
@@ -173,15 +219,13 @@ impl Engine {
         parsed: &Parsed,
         findings: &mut Findings,
         table: &mut Table<'_>,
-        token: &CancelToken,
-        pool: &ThreadPool,
+        reading: &Reading<'_>,
     ) -> Result<(Meshes, Textures), Stop> {
-        let reading = Reading { sink: table.sink, token, contents: &self.contents, pool };
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
-        let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, &reading))?;
+        let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, reading))?;
         let needed = needed(loaded, &found);
-        let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, &reading))?;
+        let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
         if findings.errors.is_empty() {
             self.say_files(findings, table.sink);
@@ -199,20 +243,25 @@ impl Engine {
         meanwhile: &Meanwhile<'_>,
     ) -> Result<Staged<RayCounters>, Stop> {
         let pool = self.pool(ready.plan.threads)?;
-        let (plan, contents) = (&ready.plan, &self.contents);
+        let (plan, contents, orders) = (&ready.plan, &self.contents, meanwhile.orders);
         let written = std::cell::RefCell::new(&mut self.written);
-        let pulse = |canvas: &Canvas| {
-            if (meanwhile.take_write)() {
+        let is_postponed = std::cell::Cell::new(false);
+        let pulse = |canvas: &Canvas, is_covered: bool| {
+            if !is_covered {
+                if orders.wants_write() && !is_postponed.replace(true) {
+                    sink.send(Event::WritePostponed { generation: sink.generation });
+                }
+            } else if orders.take_write() {
                 let mut written = written.borrow_mut();
                 written.forget();
                 if let Err(message) = write(canvas, plan, &mut written, contents, sink) {
-                    say_write_failed(sink, message);
+                    sink.write_failed(message);
                 }
             }
         };
         let order = Order {
             tracer: Tracer {
-                kernel: self.kernel,
+                kernel: self.means.kernel,
                 pool: &pool,
                 world: &ready.world.1,
                 settings: &plan.settings,
@@ -220,21 +269,22 @@ impl Engine {
             },
             plan,
             preview: request.preview,
+            most_film_bytes: self.means.most_film_bytes,
             force: request.force,
             sink,
             pulse: &pulse,
+            take_preview: &|| orders.take_preview(),
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
-        render(key, &mut self.canvas, &order)
+        render(key, &mut self.films, &order)
     }
 
-    fn write(&mut self, request: &Request, plan: &Plan, sink: &Sink) -> Result<Staged<()>, Stop> {
-        match &self.canvas {
-            Some(canvas) if request.write => {
-                write(canvas, plan, &mut self.written, &self.contents, sink).map_err(Stop::work)
-            }
-            _ => Ok(Staged::skipped((), "nothing is to be written")),
-        }
+    /// Whether the picture is on disk then.
+    fn write(&mut self, request: &Request, plan: &Plan, sink: &Sink) -> Result<Staged<bool>, Stop> {
+        let pool = self.pool(plan.threads)?;
+        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let (written, contents) = (&mut self.written, &self.contents);
+        pool.install(|| write_if_wanted(request.write, canvas, plan, written, contents, sink))
     }
 
     /// The pool of this many threads; kept while the number stays.
@@ -262,28 +312,6 @@ impl Engine {
         sink.files(files);
     }
 
-    /// A scene may be broken because it names a file that is not there: what the errors underline is watched as
-    /// if it were a file's name, so that its coming is noticed.
-    fn find_named(
-        &self,
-        diagnostics: &[Diagnostic],
-        scene: &Path,
-        findings: &mut Findings,
-        token: &CancelToken,
-    ) {
-        let folder = scene.parent().unwrap_or(Path::new(""));
-        for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
-            let text = place.source.get(place.span.clone()).unwrap_or("").trim_matches(['"', '\'']);
-            if text.is_empty() || text.len() > 255 || text.contains(['\n', '\0']) {
-                continue;
-            }
-            let path = folder.join(text);
-            if let Ok(content) = self.contents.read(&path, token) {
-                findings.read(FileRead { path, content });
-            }
-        }
-    }
-
     fn sweep(&mut self, success: bool) {
         self.meshes.sweep(success);
         self.textures.sweep(success);
@@ -300,9 +328,10 @@ impl Engine {
         let token = CancelToken::new();
         let mut findings = Findings::default();
         let mut all = || {
-            let parsed = parse(path, &self.contents, &mut self.parsed, &mut findings, &token)?.value;
-            let pool = self.pool(std::thread::available_parallelism().map_or(1, std::num::NonZero::get))?;
-            let reading = Reading { sink, token: &token, contents: &self.contents, pool: &pool };
+            let contents = &Snapshot::of(Arc::clone(&self.contents));
+            let parsed = parse(path, contents, &mut self.parsed, &mut findings, &token)?.value;
+            let pool = self.pool(cores())?;
+            let reading = Reading { sink, token: &token, contents, pool: &pool };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
             let mut wanted = needed(loaded, &found);
@@ -319,8 +348,4 @@ impl Engine {
             Err(Stop::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
     }
-}
-
-fn say_write_failed(sink: &Sink, message: String) {
-    sink.send(Event::WriteFailed { generation: sink.generation, message });
 }

@@ -16,10 +16,10 @@ mod report;
 pub mod settings;
 mod sink;
 mod stages;
-#[allow(missing_docs)]
 mod table;
 mod trace;
 pub mod watch;
+pub mod words;
 mod worker;
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! From a scene and what the command line changes of it to the settings that hold.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::protocol::Effective;
 use super::settings::{Overrides, View};
@@ -8,7 +9,7 @@ use crate::film::Rect;
 use crate::film::tone::{Curve, ToneMapping};
 use crate::integrators::RenderSettings;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Camera, Integrator, Scene, Shadows, Tonemap};
+use crate::scene::description::{Accel, Camera, Integrator, Render, Scene, Shadows, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -16,8 +17,9 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 pub(super) struct Plan {
     /// The scene's file name, for pictures to carry.
     pub(super) name: String,
-    /// The scene with the overrides in its `[render]` table.
-    pub(super) scene: Scene,
+    /// The scene; where the overrides ask for it, with another acceleration structure. All other overrides are in the
+    /// settings.
+    pub(super) scene: Arc<Scene>,
     pub(super) settings: RenderSettings,
     pub(super) samples: u32,
     pub(super) threads: usize,
@@ -33,9 +35,8 @@ pub(super) struct Plan {
 ///
 /// # Errors
 /// A crop outside the picture, or a file that cannot hold it.
-pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
-    override_render(&mut scene, overrides);
-    let render = &scene.render;
+pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
+    let render = &overridden(&scene.render, overrides);
     check_crop(overrides.crop, render.width, render.height)?;
     let aperture = match &scene.camera {
         Camera::LookAt { aperture, .. } | Camera::Orbiter { aperture, .. } => *aperture,
@@ -64,14 +65,23 @@ pub(super) fn plan(mut scene: Scene, path: &Path, overrides: &Overrides) -> Resu
         time_seconds: overrides.time_seconds,
         tone: tone(render.exposure, render.tonemap, settings.view),
         bit_depth,
-        effective: effective(&scene, &settings, threads, &outputs),
+        effective: effective(render, &settings, threads, &outputs),
         outputs,
-        scene,
+        scene: with_accel(scene, render.accel),
     })
 }
 
-fn override_render(scene: &mut Scene, overrides: &Overrides) {
-    let render = &mut scene.render;
+/// A scene may be large: it is copied only where it has to be another one.
+fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
+    let mut scene = Arc::clone(scene);
+    if scene.render.accel != accel {
+        Arc::make_mut(&mut scene).render.accel = accel;
+    }
+    scene
+}
+
+fn overridden(of_scene: &Render, overrides: &Overrides) -> Render {
+    let mut render = of_scene.clone();
     render.width = overrides.width.unwrap_or(render.width);
     render.height = overrides.height.unwrap_or(render.height);
     render.samples = overrides.samples.unwrap_or(render.samples);
@@ -80,6 +90,7 @@ fn override_render(scene: &mut Scene, overrides: &Overrides) {
     render.shadows = overrides.shadows.unwrap_or(render.shadows);
     render.accel = overrides.accel.unwrap_or(render.accel);
     render.seed = overrides.seed.unwrap_or(render.seed);
+    render
 }
 
 /// The command line's files, else the scene's, else the scene's name with `.png` in the working directory.
@@ -142,12 +153,12 @@ fn tone(exposure: f32, tonemap: Tonemap, view: View) -> ToneMapping {
     }
 }
 
-fn effective(scene: &Scene, settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Effective {
+fn effective(render: &Render, settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Effective {
     Effective {
         width: settings.width,
         height: settings.height,
-        samples: scene.render.samples,
-        integrator: match scene.render.integrator {
+        samples: render.samples,
+        integrator: match render.integrator {
             Integrator::Whitted => "whitted",
         },
         shadows: match settings.shadows {
@@ -158,7 +169,7 @@ fn effective(scene: &Scene, settings: &RenderSettings, threads: usize, outputs: 
         // The integrators of this version gather no photons, whatever is asked for.
         photons: false,
         dof: settings.dof,
-        accel: match scene.render.accel {
+        accel: match render.accel {
             Accel::Bvh => "bvh",
         },
         view: settings.view.name(),
@@ -168,17 +179,19 @@ fn effective(scene: &Scene, settings: &RenderSettings, threads: usize, outputs: 
     }
 }
 
-fn cores() -> usize {
+/// Threads that this machine runs at once.
+pub(super) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::tests::scene_of;
+    use crate::output::Format;
+    use crate::pipeline::tests::loaded_of;
 
     fn planned(text: &str, overrides: &Overrides) -> Plan {
-        plan(scene_of(text), Path::new("scenes/my.scene.toml"), overrides).expect("a plan")
+        plan(&loaded_of(text).scene, Path::new("scenes/my.scene.toml"), overrides).expect("a plan")
     }
 
     #[test]
@@ -195,7 +208,15 @@ mod tests {
         };
         let changed = planned(text, &overrides);
         assert_eq!((changed.settings.width, changed.settings.height, changed.samples), (8, 24, 2));
-        assert_eq!((changed.threads, changed.settings.seed, changed.scene.render.width), (3, 9, 8));
+        assert_eq!((changed.threads, changed.settings.seed, changed.effective.width), (3, 9, 8));
+    }
+
+    #[test]
+    fn a_scene_is_shared_whatever_is_overridden() {
+        let scene = loaded_of("").scene;
+        let overrides = Overrides { width: Some(8), shadows: Some(Shadows::Off), ..Default::default() };
+        let planned = plan(&scene, Path::new("a.toml"), &overrides).expect("a plan");
+        assert!(Arc::ptr_eq(&planned.scene, &scene));
     }
 
     #[test]
@@ -206,6 +227,30 @@ mod tests {
         assert!(of_scene.len() == 1 && of_scene[0].is_absolute() && of_scene[0].ends_with("a/b.exr"));
         let overrides = Overrides { outputs: vec!["x.png".into(), "y.exr".into()], ..Default::default() };
         assert_eq!(planned(scene, &overrides).outputs, overrides.outputs);
+    }
+
+    /// Neither room may know the other, so each has its list.
+    #[test]
+    fn a_scene_may_name_every_format_that_can_be_written_and_no_other() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("scene.toml");
+        let load = |ending: &str| {
+            let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
+            std::fs::write(&path, format!("[render]\noutput = \"a.{ending}\"\n{camera}")).expect("written");
+            crate::scene::load(&path)
+        };
+        for ending in Format::endings() {
+            assert!(load(ending).is_ok(), "{ending}");
+        }
+        let wrong = format!("{:?}", load("xyz").expect_err("no format"));
+        let offered = wrong.split(|c: char| !c.is_alphanumeric()).collect::<std::collections::HashSet<_>>();
+        for ending in ["png", "exr", "hdr", "jpg", "jpeg", "ppm", "webp", "tga", "bmp"] {
+            assert_eq!(
+                offered.contains(ending),
+                Format::endings().any(|known| known == ending),
+                "{ending}: {wrong}"
+            );
+        }
     }
 
     #[test]
@@ -225,9 +270,10 @@ mod tests {
             ..Default::default()
         };
         let path = Path::new("a.toml");
-        assert!(plan(scene_of(text), path, &with(31, 23, 1, 1)).is_ok());
+        let scene = loaded_of(text).scene;
+        assert!(plan(&scene, path, &with(31, 23, 1, 1)).is_ok());
         for outside in [with(31, 23, 2, 1), with(0, 0, 0, 1), with(u32::MAX, 0, 2, 2)] {
-            let wrong = plan(scene_of(text), path, &outside).expect_err("outside");
+            let wrong = plan(&scene, path, &outside).expect_err("outside");
             assert!(wrong.message.contains("32×24"), "{}", wrong.message);
         }
     }

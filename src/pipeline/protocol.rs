@@ -18,11 +18,14 @@ use crate::scene::diagnostic::Diagnostic;
 pub enum Command {
     /// Render this; whatever is under way is cancelled.
     Render(Box<Request>),
-    /// Write the picture as it is now to its files.
+    /// Write the picture as it is now to its files; if some of its pixels have no sample yet, as soon as they have.
     Write,
+    /// Previews are to have this size from now on; the picture at hand is shown again. What is rendered goes on.
+    Preview(Option<PreviewSize>),
     /// Stop the render under way.
     Cancel,
-    /// Hold the render, or let it go on. A new request is not held.
+    /// Hold the work, or let it go on: that of the newest request, whether it has begun or not. A request that comes
+    /// later is not held.
     Pause(bool),
     /// End the worker.
     Quit,
@@ -41,9 +44,21 @@ pub struct Request {
     /// ratio; none: no previews.
     pub preview: Option<PreviewSize>,
     /// Whether the finished picture is written to disk.
-    pub write: bool,
+    pub write: Writing,
     /// Render again even where nothing changed.
     pub force: bool,
+}
+
+/// Whether a finished picture is written to disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Writing {
+    /// It is not.
+    No,
+    /// It is; where that is not possible, [`Event::WriteFailed`] says so, at the beginning and at the end, and the
+    /// picture is rendered and shown all the same.
+    Try,
+    /// It is; a file that cannot be written fails the request, before anything is rendered if that can be told.
+    Must,
 }
 
 /// Upper bounds of a preview picture, in pixels of square shape.
@@ -113,12 +128,17 @@ pub enum Event {
         /// Its size.
         bytes: u64,
     },
-    /// [`Command::Write`] could not be done; a render under way goes on.
+    /// A picture could not be written; a render under way goes on.
     WriteFailed {
         /// Of which request.
         generation: u64,
         /// Which file, and why.
         message: String,
+    },
+    /// [`Command::Write`] waits until every pixel has a sample.
+    WritePostponed {
+        /// Of which request.
+        generation: u64,
     },
     /// Everything that was asked for is done.
     Done {
@@ -128,7 +148,7 @@ pub enum Event {
         report: Box<Report>,
         /// Warnings.
         warnings: Vec<Diagnostic>,
-        /// Whether the request found everything as it was, so that nothing was rendered.
+        /// Whether the request found everything as it was, so that nothing was rendered and the same picture shown.
         unchanged: bool,
     },
     /// The request could not be done. The last picture stands.
@@ -371,6 +391,10 @@ pub struct Counters {
     pub non_finite_samples: u64,
     /// Bytes held by trees.
     pub accel_memory_bytes: u64,
+    /// Films kept: that of the picture, and those that a toggle that is switched back finds again.
+    pub films: u64,
+    /// Bytes held by them.
+    pub film_memory_bytes: u64,
 }
 
 /// The slot that holds the latest preview.

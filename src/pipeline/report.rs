@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::plan::Plan;
 use super::protocol::{Counters, ImageReport, Report, SampleCounts, StageReport};
-use super::stages::render::Canvas;
+use super::stages::canvas::Canvas;
+use super::stages::films::Films;
 use crate::integrators::RayCounters;
 use crate::world::World;
 
@@ -14,6 +15,7 @@ pub(super) struct Outcome<'a> {
     pub(super) plan: &'a Plan,
     pub(super) world: &'a World,
     pub(super) canvas: &'a Canvas,
+    pub(super) films: &'a Films,
     pub(super) rays: RayCounters,
     pub(super) texels_loaded: u64,
     pub(super) is_written: bool,
@@ -63,6 +65,8 @@ fn counters(outcome: &Outcome<'_>) -> Counters {
         texture_lookups: rays.texture_lookups,
         non_finite_samples: outcome.canvas.film.non_finite_samples(),
         accel_memory_bytes: world.accel_memory_bytes() as u64,
+        films: outcome.films.count() as u64,
+        film_memory_bytes: outcome.films.memory_bytes(),
     }
 }
 

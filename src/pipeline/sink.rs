@@ -38,6 +38,10 @@ impl Sink {
         self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes });
     }
 
+    pub(super) fn write_failed(&self, message: String) {
+        self.send(Event::WriteFailed { generation: self.generation, message });
+    }
+
     pub(super) fn preview(&self, picture: Picture) {
         let latest = LatestPreview { generation: self.generation, picture: Arc::new(picture) };
         *self.previews.lock().unwrap_or_else(PoisonError::into_inner) = Some(latest);

@@ -62,6 +62,7 @@ impl Tracer<'_> {
             for _ in 0..threads.min(jobs.len()) {
                 let sender = sender.clone();
                 scope.spawn(move |_| {
+                    let _guard = StopOnPanic(stopped);
                     while !stopped.load(Ordering::Relaxed)
                         && let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed))
                         && let Ok((samples, rays)) = (self.kernel)(
@@ -87,6 +88,17 @@ impl Tracer<'_> {
         });
         // Not `check`, which would wait here while the work is held, deaf to orders.
         if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+    }
+}
+
+/// Dropped by a panic, it stops the others: their work would be thrown away.
+struct StopOnPanic<'a>(&'a AtomicBool);
+
+impl Drop for StopOnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.store(true, Ordering::Relaxed);
+        }
     }
 }
 

@@ -10,31 +10,30 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::engine::{Engine, Meanwhile};
-use super::protocol::{Command, Event, Failure, PreviewSlot, Request};
+use super::engine::{Engine, Means, Meanwhile, Orders};
+use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request};
 use super::sink::Sink;
-use super::trace::Kernel;
+use super::watch::content::Contents;
 use crate::control::CancelToken;
-
-/// What renders tiles.
-pub(super) const KERNEL: Kernel = crate::integrators::render_tile;
 
 /// Start a worker with its thread.
 ///
 /// # Errors
 /// The system has no thread left.
 pub fn start() -> std::io::Result<Handle> {
-    start_with(KERNEL)
+    start_with(Means::default())
 }
 
-/// A worker that renders tiles by another function.
-pub(super) fn start_with(kernel: Kernel) -> std::io::Result<Handle> {
+/// A worker with other means.
+pub(super) fn start_with(means: Means) -> std::io::Result<Handle> {
     let (sender, events) = mpsc::channel();
     let remote = Remote { mailbox: Arc::default(), events: sender };
     let previews = PreviewSlot::default();
-    let worker = Worker { remote: remote.clone(), previews: previews.clone(), kernel };
+    let contents = Arc::<Contents>::default();
+    let worker =
+        Worker { remote: remote.clone(), previews: previews.clone(), means, contents: contents.clone() };
     let thread = std::thread::Builder::new().name("glimt-worker".to_owned()).spawn(move || worker.work())?;
-    Ok(Handle { events, previews, remote, thread: Some(thread) })
+    Ok(Handle { events, previews, remote, contents, thread: Some(thread) })
 }
 
 /// A running worker. Dropping it ends the worker, which may take as long as a file takes to be written.
@@ -45,6 +44,7 @@ pub struct Handle {
     /// Where it puts pictures.
     pub previews: PreviewSlot,
     remote: Remote,
+    contents: Arc<Contents>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -57,6 +57,11 @@ impl Handle {
     /// A way to give orders from elsewhere.
     pub fn remote(&self) -> Remote {
         self.remote.clone()
+    }
+
+    /// What the worker knows of files, for a watcher of the same ones.
+    pub fn contents(&self) -> Arc<Contents> {
+        Arc::clone(&self.contents)
     }
 
     /// End the worker and wait for it at most this long; true: it has ended.
@@ -96,6 +101,12 @@ pub struct Remote {
 struct Mailbox {
     request: Option<Box<Request>>,
     write: bool,
+    /// The order to write came too early: it is for the request that waits.
+    is_write_postponed: bool,
+    /// Another size of the previews.
+    preview: Option<Option<PreviewSize>>,
+    /// Whether the newest request is held.
+    paused: bool,
     quit: bool,
     /// Of the request under way.
     token: CancelToken,
@@ -107,6 +118,7 @@ struct Mailbox {
 enum Task {
     Render(Box<Request>, CancelToken),
     Write,
+    Preview(Option<PreviewSize>, CancelToken),
     Quit,
 }
 
@@ -117,12 +129,16 @@ impl Remote {
         match command {
             Command::Render(request) => self.replace(&mut mailbox, request),
             Command::Write => mailbox.write = true,
+            Command::Preview(size) => mailbox.preview = Some(size),
             Command::Cancel => {
                 mailbox.token.cancel();
                 let dropped = mailbox.request.take();
                 self.say_cancelled(dropped);
             }
-            Command::Pause(paused) => mailbox.token.set_paused(paused),
+            Command::Pause(paused) => {
+                mailbox.paused = paused;
+                mailbox.token.set_paused(paused);
+            }
             Command::Quit => {
                 mailbox.token.cancel();
                 mailbox.quit = true;
@@ -139,6 +155,7 @@ impl Remote {
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
+        (mailbox.paused, mailbox.preview) = (false, None);
         let replaced = mailbox.request.replace(request);
         self.say_cancelled(replaced);
     }
@@ -154,8 +171,12 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn take_write(&self) -> bool {
-        std::mem::take(&mut self.lock().write)
+    /// Leave an order to write to the request that waits, if one does.
+    fn postpone_write(&self) -> bool {
+        let mut mailbox = self.lock();
+        let postponed = mailbox.request.is_some();
+        (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
+        postponed
     }
 
     fn next(&self) -> Task {
@@ -164,43 +185,68 @@ impl Remote {
             if mailbox.quit {
                 return Task::Quit;
             }
-            if std::mem::take(&mut mailbox.write) {
+            if mailbox.write && !(mailbox.is_write_postponed && mailbox.request.is_some()) {
+                mailbox.write = false;
                 return Task::Write;
             }
+            mailbox.is_write_postponed = false;
             if let Some(request) = mailbox.request.take() {
                 mailbox.token = CancelToken::new();
+                mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone());
+            }
+            if let Some(size) = mailbox.preview.take() {
+                mailbox.token = CancelToken::new();
+                return Task::Preview(size, mailbox.token.clone());
             }
             mailbox = self.mailbox.1.wait(mailbox).unwrap_or_else(PoisonError::into_inner);
         }
     }
 }
 
+impl Orders for Remote {
+    fn wants_write(&self) -> bool {
+        self.lock().write
+    }
+
+    fn take_write(&self) -> bool {
+        std::mem::take(&mut self.lock().write)
+    }
+
+    fn take_preview(&self) -> Option<Option<PreviewSize>> {
+        self.lock().preview.take()
+    }
+}
+
 struct Worker {
     remote: Remote,
+    contents: Arc<Contents>,
     previews: PreviewSlot,
-    kernel: Kernel,
+    means: Means,
 }
 
 impl Worker {
     fn work(self) {
-        let mut engine = Engine::new(self.kernel);
+        let mut engine = Engine::new(self.means, self.contents.clone());
         let mut sink =
             Sink { generation: 0, events: self.remote.events.clone(), previews: self.previews.clone() };
         loop {
             let outcome = match self.remote.next() {
                 Task::Quit => break,
+                Task::Write if !engine.can_write() && self.remote.postpone_write() => continue,
                 Task::Write => catch_unwind(AssertUnwindSafe(|| engine.write_now(&sink))),
+                Task::Preview(size, token) => {
+                    catch_unwind(AssertUnwindSafe(|| engine.show_now(size, &sink, &token)))
+                }
                 Task::Render(request, token) => {
                     sink.generation = request.generation;
-                    let take_write = || self.remote.take_write();
-                    let meanwhile = Meanwhile { token: &token, take_write: &take_write };
+                    let meanwhile = Meanwhile { token: &token, orders: &self.remote };
                     catch_unwind(AssertUnwindSafe(|| engine.request(&request, &sink, &meanwhile)))
                 }
             };
             if let Err(payload) = outcome {
                 // What was half done when it broke is not to be trusted.
-                engine = Engine::new(self.kernel);
+                engine = Engine::new(self.means, self.contents.clone());
                 let failure = Failure::Work(format!("internal error: {}", reason(payload.as_ref())));
                 sink.send(Event::Failed { generation: sink.generation, failure });
             }
@@ -211,4 +257,61 @@ impl Worker {
 fn reason(payload: &(dyn Any + Send)) -> &str {
     let text = payload.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a part of the renderer gave up")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::protocol::Writing;
+
+    fn render(generation: u64) -> Command {
+        Command::Render(Box::new(Request {
+            generation,
+            scene: "a.toml".into(),
+            overrides: Default::default(),
+            preview: None,
+            write: Writing::No,
+            force: false,
+        }))
+    }
+
+    fn token(remote: &Remote) -> CancelToken {
+        match remote.next() {
+            Task::Render(_, token) => token,
+            _ => panic!("a request waits"),
+        }
+    }
+
+    #[test]
+    fn a_hold_is_for_the_newest_request_whether_it_has_begun_or_not() {
+        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        remote.send(render(1));
+        let ending = token(&remote);
+        remote.send(render(2));
+        // The first is still ending when the person presses the key.
+        remote.send(Command::Pause(true));
+        assert!(ending.is_cancelled());
+        let second = token(&remote);
+        assert!(second.is_paused());
+        remote.send(Command::Pause(false));
+        assert!(!second.is_paused());
+        remote.send(Command::Pause(true));
+        remote.send(render(3));
+        assert!(!token(&remote).is_paused(), "a request that comes later is not held");
+    }
+
+    #[test]
+    fn what_waits_goes_in_its_order() {
+        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        remote.send(render(1));
+        remote.send(Command::Write);
+        remote.send(Command::Preview(None));
+        assert!(matches!(remote.next(), Task::Write), "the picture that the person sees");
+        assert!(remote.postpone_write(), "it had holes");
+        assert!(matches!(remote.next(), Task::Render(..)));
+        assert!(remote.take_write(), "the request does it");
+        assert!(!remote.take_write());
+        assert!(matches!(remote.next(), Task::Preview(None, _)));
+        assert!(!remote.postpone_write(), "no request waits that could do it");
+    }
 }

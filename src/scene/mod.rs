@@ -32,15 +32,13 @@ const MAX_PARTS: usize = 32 << 20;
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// What it means.
-    pub scene: Scene,
+    pub scene: Arc<Scene>,
     /// Its text, which every span in [`Self::scene`] points into.
     pub source: Arc<str>,
     /// The file, as named by the caller.
     pub path: PathBuf,
     /// What is probably not meant, in the order of the file.
     pub warnings: Vec<Diagnostic>,
-    /// Of the file's bytes.
-    pub content_hash: blake3::Hash,
 }
 
 impl Loaded {
@@ -73,11 +71,11 @@ pub struct Outcome {
 /// Everything that is wrong with it, and its warnings, in the order of the file. Anything but a regular file
 /// of at most [`MAX_FILE_BYTES`] bytes of UTF-8 text is refused without blocking.
 pub fn load(path: &Path) -> Result<Loaded, Vec<Diagnostic>> {
-    let (source, content_hash) = read::text(path).map_err(|problem| vec![*problem])?;
+    let source = read::text(path).map_err(|problem| vec![*problem])?;
     let Outcome { scene, diagnostics } = parse(Arc::clone(&source), path);
     match scene {
         Some(scene) => {
-            Ok(Loaded { scene, source, path: path.to_owned(), warnings: diagnostics, content_hash })
+            Ok(Loaded { scene: Arc::new(scene), source, path: path.to_owned(), warnings: diagnostics })
         }
         None => Err(diagnostics),
     }

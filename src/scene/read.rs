@@ -11,10 +11,9 @@ use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE};
 use crate::system::in_words;
 
-/// The text and the hash of its bytes. The error is one diagnostic that names the file.
-pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnostic>> {
+/// The text. The error is one diagnostic that names the file.
+pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
-    let hash = blake3::hash(&bytes);
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(problem(
             path,
@@ -24,7 +23,7 @@ pub(super) fn text(path: &Path) -> Result<(Arc<str>, blake3::Hash), Box<Diagnost
         ));
     }
     match String::from_utf8(bytes) {
-        Ok(text) => Ok((text.into(), hash)),
+        Ok(text) => Ok(text.into()),
         Err(error) => Err(not_utf8(path, error.as_bytes(), error.utf8_error().valid_up_to())),
     }
 }

@@ -114,7 +114,6 @@ fn a_mesh_file_is_listed_once_however_it_is_written() {
     std::fs::write(&path, &text).expect("written");
     let loaded = load(&path).expect("a scene");
     assert_eq!(loaded.warnings, []);
-    assert_eq!(loaded.content_hash, blake3::hash(text.as_bytes()));
     let scene = &loaded.scene;
     let files: Vec<_> = scene.mesh_files.iter().map(|file| file.value.clone()).collect();
     assert_eq!(files, [folder.path().join("a.obj"), folder.path().join("b.OFF")]);

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
-use std::time::Instant;
 
 use super::color::ColorChoice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
+pub use crate::pipeline::watch::Changed;
 
 /// How the preview is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,13 +20,6 @@ pub enum PreviewChoice {
     Ascii,
     /// No preview; the stages get the room.
     None,
-}
-
-/// A file that the scene depends on was written.
-#[derive(Clone, Copy, Debug)]
-pub struct Changed {
-    /// When the watcher noticed: the start of "from save to first changed cell".
-    pub noticed: Instant,
 }
 
 /// Everything that the front end needs.

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use super::color::ColorDepth;
 use super::event::{Window, Written};
-use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{
     AssetProgress, Effective, PreviewSize, RenderProgress, Report, Stage, StageReport,
@@ -210,6 +209,16 @@ impl State {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 
+    /// The shadows that hold now, by name.
+    pub(super) fn shadows(&self) -> &'static str {
+        match self.overrides().shadows {
+            Some(Shadows::Off) => "off",
+            Some(Shadows::Hard) => "hard",
+            Some(Shadows::Soft) => "soft",
+            None => self.effective.as_ref().map_or("soft", |effective| effective.shadows),
+        }
+    }
+
     pub(super) fn is_running(&self) -> bool {
         matches!(self.activity, Activity::Running { .. })
     }
@@ -234,16 +243,6 @@ impl State {
         {
             *since += self.now.saturating_duration_since(held);
         }
-    }
-
-    /// The preview that the window has room for: a box of square pixels, each as wide as a cell.
-    pub(super) fn preview_size(&self) -> Option<PreviewSize> {
-        if self.preview == PreviewKind::None {
-            return None;
-        }
-        let area = Layout::of(self).preview;
-        let height = (f32::from(area.height) * self.window.cell_aspect).round() as u32;
-        (area.width > 0 && height > 0).then_some(PreviewSize { width: u32::from(area.width), height })
     }
 
     /// When the state has to hear of the time again, if nothing else happens.

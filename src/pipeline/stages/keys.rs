@@ -59,16 +59,18 @@ pub(in crate::pipeline) fn world(
     camera(&mut key, &scene.camera, orbiter);
     let render = &scene.render;
     key.vec3(render.ambient).vec3(render.background).index(render.accel as usize);
-    key.u64(render.width.into()).u64(render.height.into());
     key.finish()
 }
 
 /// Everything that a film's sums depend on, apart from the number of samples.
 pub(in crate::pipeline) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
+    // Every field by name: a new one must be thought of here.
+    let RenderSettings { width, height, max_depth, shadows, shadow_samples, filter, dof, seed, view } =
+        *settings;
     let mut key = Fingerprint::new("render");
-    key.key(&world).u64(settings.width.into()).u64(settings.height.into()).u64(settings.max_depth.into());
-    key.index(settings.shadows as usize).u64(settings.shadow_samples.into()).index(settings.filter as usize);
-    key.index(settings.dof.into()).u64(settings.seed.into()).index(settings.view as usize);
+    key.key(&world).u64(width.into()).u64(height.into()).u64(max_depth.into());
+    key.index(shadows as usize).u64(shadow_samples.into()).index(filter as usize);
+    key.index(dof.into()).u64(seed.into()).index(view as usize);
     if let Some(rect) = crop {
         key.u64(rect.x.into()).u64(rect.y.into()).u64(rect.width.into()).u64(rect.height.into());
     }
@@ -155,12 +157,14 @@ fn camera(key: &mut Fingerprint, camera: &Camera, orbiter: Option<&str>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::tests::scene_of;
+    use crate::integrators::View;
+    use crate::pipeline::tests::loaded_of;
+    use crate::scene::description::{PixelFilter, Shadows};
 
     const BALL: &str = "[materials.m]\ntype = \"phong\"\ndiffuse = [1, 0, 0]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
 
     fn keys(text: &str) -> (Key, Key, Key) {
-        let scene = scene_of(text);
+        let scene = loaded_of(text).scene;
         (geometry(&scene, &[]), lights(&scene, &[]), world(&scene, &[], &[], None))
     }
 
@@ -186,20 +190,31 @@ mod tests {
 
     #[test]
     fn every_setting_of_a_render_is_part_of_its_key() {
-        let scene = scene_of(BALL);
-        let plan = crate::pipeline::plan::plan(scene, std::path::Path::new("a.toml"), &Default::default());
+        let scene = loaded_of(BALL).scene;
+        let plan = crate::pipeline::plan::plan(&scene, std::path::Path::new("a.toml"), &Default::default());
         let settings = plan.expect("a plan").settings;
         let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
+        // Without `..`: a field that is added does not compile until it has a line below.
+        let RenderSettings { width, height, max_depth, shadows, shadow_samples, filter, dof, seed, view } =
+            settings;
+        assert_eq!((shadows, filter, view), (Shadows::Soft, PixelFilter::Box, View::Beauty));
         let others = [
-            RenderSettings { max_depth: 77, ..settings },
-            RenderSettings { seed: 77, ..settings },
-            RenderSettings { dof: true, ..settings },
-            RenderSettings { width: 77, ..settings },
-            RenderSettings { shadow_samples: 77, ..settings },
-            RenderSettings { view: crate::integrators::View::Uv, ..settings },
+            RenderSettings { width: width + 1, ..settings },
+            RenderSettings { height: height + 1, ..settings },
+            RenderSettings { max_depth: max_depth + 1, ..settings },
+            RenderSettings { shadows: Shadows::Hard, ..settings },
+            RenderSettings { shadows: Shadows::Off, ..settings },
+            RenderSettings { shadow_samples: shadow_samples + 1, ..settings },
+            RenderSettings { filter: PixelFilter::Tent, ..settings },
+            RenderSettings { dof: !dof, ..settings },
+            RenderSettings { seed: seed + 1, ..settings },
+            RenderSettings { view: View::Uv, ..settings },
         ];
-        assert!(others.iter().all(|other| of(other) != of(&settings)));
+        let mut keys: Vec<Key> = others.iter().chain([&settings]).map(of).collect();
         let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
-        assert_ne!(render(Fingerprint::new("w").finish(), &settings, Some(crop)), of(&settings));
+        keys.push(render(Fingerprint::new("w").finish(), &settings, Some(crop)));
+        for (i, key) in keys.iter().enumerate() {
+            assert!(!keys[..i].contains(key), "{i} is told apart");
+        }
     }
 }

@@ -2,16 +2,17 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use rayon::prelude::*;
 
 use super::super::cache::Pool;
 use super::super::fingerprint::{Fingerprint, Key};
-use super::super::watch::content::FileRead;
+use super::super::watch::content::{Content, FileRead, may_have_changed};
 use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, Dropped, LoadedMesh};
-use crate::control::Cancelled;
+use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::Loaded;
 use crate::scene::description::Shape;
 
@@ -41,18 +42,23 @@ pub(in crate::pipeline) fn meshes(
     if files.is_empty() {
         return Ok(Staged::skipped(Vec::new(), "the scene has no mesh"));
     }
-    let before: Vec<Option<Arc<KeptMesh>>> = files
+    let before: Vec<(Content, Option<Arc<KeptMesh>>)> = files
         .iter()
         .map(|file| {
+            let name = canonical(&file.value);
             let content = reading.contents.read(&file.value, reading.token)?;
-            Ok(cache.get(&canonical(&file.value), file_key(&file.value, content)))
+            if let Some(last) = cache.latest(&name) {
+                // What it named last time it most likely names again: hashed before it is read.
+                companions(&last.companions, reading)?;
+            }
+            Ok((content, cache.get(&name, file_key(&file.value, content))))
         })
         .collect::<Result<_, Cancelled>>()?;
     let assets: Vec<Asset<KeptMesh>> = reading.pool.install(|| {
         files
             .par_iter()
             .zip(before)
-            .map(|(file, kept)| one(&file.value, kept, reading))
+            .map(|(file, (content, kept))| one(&file.value, content, kept, reading, load))
             .collect::<Result<_, _>>()
     })?;
     let mut meshes = Vec::new();
@@ -91,24 +97,35 @@ pub(in crate::pipeline) fn meshes(
     Ok(loaded_and_kept(meshes, counts))
 }
 
-/// One file: from before if it and all that it names are as they were.
+/// One file of this content: from before if it and all that it names are as they were.
 fn one(
     path: &Path,
+    content: Content,
     kept: Option<Arc<KeptMesh>>,
     reading: &Reading<'_>,
+    load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
 ) -> Result<Asset<KeptMesh>, Cancelled> {
-    let content = reading.contents.read(path, reading.token)?;
     let mut files = vec![FileRead { path: path.to_owned(), content }];
     if let Some(mesh) = kept
-        && mesh.companions == companions(mesh.companions.iter().map(|file| &file.path), reading)?
+        && mesh.companions == companions(&mesh.companions, reading)?
     {
         files.extend(mesh.companions.iter().cloned());
         return Ok(Asset { files, result: Ok((mesh, true)) });
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let result = match reading.sink.asset(&name, |progress| load(path, progress, reading.token)) {
+    let begin = SystemTime::now();
+    let read = || reading.sink.asset(&name, |progress| load(path, progress, reading.token));
+    let mut loaded = read();
+    if let Ok(mesh) = &loaded
+        && mesh.companions.iter().any(|file| is_news(file, begin, reading))
+    {
+        // Not hashed before it was read, and perhaps changed in between: now hashed, and read once more.
+        contents_of(mesh.companions.iter(), reading)?;
+        loaded = read();
+    }
+    let result = match loaded {
         Ok(mesh) => {
-            let companions = companions(mesh.companions.iter(), reading)?;
+            let companions = contents_of(mesh.companions.iter(), reading)?;
             files.extend(companions.iter().cloned());
             let mut key = Fingerprint::new("mesh");
             key.key(&file_key(path, content));
@@ -122,7 +139,17 @@ fn one(
     Ok(Asset { files, result })
 }
 
-fn companions<'a>(
+/// Whether this file may not be what was read from it since `begin`.
+fn is_news(path: &Path, begin: SystemTime, reading: &Reading<'_>) -> bool {
+    reading.contents.known(path).is_none() && may_have_changed(path, begin)
+}
+
+/// These files as they are now.
+fn companions(files: &[FileRead], reading: &Reading<'_>) -> Result<Vec<FileRead>, Cancelled> {
+    contents_of(files.iter().map(|file| &file.path), reading)
+}
+
+fn contents_of<'a>(
     paths: impl Iterator<Item = &'a PathBuf>,
     reading: &Reading<'_>,
 ) -> Result<Vec<FileRead>, Cancelled> {
@@ -134,7 +161,7 @@ fn companions<'a>(
         .collect()
 }
 
-fn file_key(path: &Path, content: super::super::watch::content::Content) -> Key {
+fn file_key(path: &Path, content: Content) -> Key {
     Fingerprint::new("file").path(path).content(content).finish()
 }
 
@@ -174,6 +201,95 @@ fn dropped(faces: &Dropped) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::sink::Sink;
+    use crate::pipeline::watch::content::{Contents, Snapshot};
+
+    const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
+
+    /// A folder with a mesh and its material, and what reads them.
+    struct Desk {
+        folder: tempfile::TempDir,
+        sink: Sink,
+        pool: rayon::ThreadPool,
+        cache: Pool<PathBuf, KeptMesh>,
+        contents: Arc<Contents>,
+    }
+
+    impl Desk {
+        fn new() -> Self {
+            let folder = tempfile::tempdir().expect("a scratch folder");
+            let events = std::sync::mpsc::channel().0;
+            let sink = Sink { generation: 0, events, previews: Default::default() };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+            let desk = Self { folder, sink, pool, cache: Pool::default(), contents: Arc::default() };
+            desk.write("a.obj", OBJ);
+            desk.write("a.mtl", "newmtl m\nKd 1 0 0\n");
+            desk
+        }
+
+        fn write(&self, name: &str, text: &str) {
+            std::fs::write(self.folder.path().join(name), text).expect("written");
+        }
+
+        fn snapshot(&self) -> Snapshot {
+            Snapshot::of(self.contents.clone())
+        }
+
+        fn hash(&self, name: &str) -> Content {
+            let path = self.folder.path().join(name);
+            Contents::default().read(&path, &CancelToken::new()).expect("not cancelled")
+        }
+
+        /// A request for `a.obj` that sees files as this snapshot does: the mesh and what is said to be in the files.
+        fn read(&mut self, contents: &Snapshot) -> (Arc<KeptMesh>, Vec<FileRead>) {
+            let text = "[[mesh]]\nfile = \"a.obj\"\n[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
+            self.write("scene.toml", text);
+            let loaded = crate::scene::load(&self.folder.path().join("scene.toml")).expect("a scene");
+            let token = CancelToken::new();
+            let reading = Reading { sink: &self.sink, token: &token, contents, pool: &self.pool };
+            let mut findings = Findings::default();
+            let meshes = meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not cancelled");
+            assert!(findings.errors.is_empty(), "{:?}", findings.errors);
+            (meshes.value[0].clone(), findings.files)
+        }
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_looked_at_is_not_taken_for_the_new_one() {
+        let mut desk = Desk::new();
+        let old = desk.hash("a.obj");
+        desk.read(&desk.snapshot());
+        // The request has hashed the file, then it changes, then the request goes on.
+        let snapshot = desk.snapshot();
+        snapshot.read(&desk.folder.path().join("a.obj"), &CancelToken::new()).expect("not cancelled");
+        desk.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
+        let (_, files) = desk.read(&snapshot);
+        assert_eq!(files[0].content, old, "whoever watches the file finds that it holds something else");
+        let (mesh, files) = desk.read(&desk.snapshot());
+        assert_eq!(mesh.mesh.mesh.triangles.len(), 2);
+        assert_eq!(files[0].content, desk.hash("a.obj"));
+    }
+
+    #[test]
+    fn a_material_that_changes_after_it_was_read_is_not_taken_for_the_new_one() {
+        let desk = Desk::new();
+        let path = desk.folder.path().join("a.obj");
+        let snapshot = desk.snapshot();
+        let token = CancelToken::new();
+        let reading = Reading { sink: &desk.sink, token: &token, contents: &snapshot, pool: &desk.pool };
+        let loads = std::sync::atomic::AtomicUsize::new(0);
+        let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
+            let mesh = load(path, progress, token);
+            if loads.fetch_add(1, std::sync::atomic::Ordering::SeqCst) == 0 {
+                desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
+            }
+            mesh
+        };
+        let asset = one(&path, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
+        let mesh = asset.result.expect("a mesh").0;
+        assert_eq!(asset.files[1].content, desk.hash("a.mtl"));
+        assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0, "the mesh has what the file is said to hold");
+    }
 
     #[test]
     fn dropped_faces_are_counted_in_words() {

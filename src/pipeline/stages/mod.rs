@@ -1,23 +1,27 @@
 //! The stages, one file each: a function of its inputs and of what is kept from before.
 
 pub(super) mod accel;
+pub(super) mod canvas;
+pub(super) mod films;
 pub(super) mod keys;
 pub(super) mod lights;
 pub(super) mod meshes;
 pub(super) mod parse;
 pub(super) mod photons;
+pub(super) mod preview;
 pub(super) mod render;
 pub(super) mod textures;
 pub(super) mod write;
 
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 
 use rayon::ThreadPool;
 
 use super::protocol::{Failure, Status};
 use super::sink::Sink;
-use super::watch::content::{Contents, FileRead};
+use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::Loaded;
@@ -69,7 +73,7 @@ impl<T> Staged<T> {
 pub(super) struct Reading<'a> {
     pub(super) sink: &'a Sink,
     pub(super) token: &'a CancelToken,
-    pub(super) contents: &'a Contents,
+    pub(super) contents: &'a Snapshot,
     pub(super) pool: &'a ThreadPool,
 }
 
@@ -86,6 +90,28 @@ impl Findings {
     pub(super) fn read(&mut self, file: FileRead) {
         if !self.files.contains(&file) {
             self.files.push(file);
+        }
+    }
+
+    /// A scene may be broken because it names a file that is not there: what the errors underline is watched as
+    /// if it were a file's name, so that its coming is noticed.
+    pub(super) fn read_named(
+        &mut self,
+        diagnostics: &[Diagnostic],
+        scene: &Path,
+        contents: &Contents,
+        token: &CancelToken,
+    ) {
+        let folder = scene.parent().unwrap_or(Path::new(""));
+        for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
+            let text = place.source.get(place.span.clone()).unwrap_or("").trim_matches(['"', '\'']);
+            if text.is_empty() || text.len() > 255 || text.contains(['\n', '\0']) {
+                continue;
+            }
+            let path = folder.join(text);
+            if let Ok(content) = contents.read(&path, token) {
+                self.read(FileRead { path, content });
+            }
         }
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::super::cache::Memo;
 use super::super::fingerprint::Fingerprint;
 use super::super::protocol::Failure;
-use super::super::watch::content::{Content, Contents, FileRead};
+use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::{Findings, Staged, Stop};
 use crate::assets::OrbiterCamera;
 use crate::assets::orbiter::load as load_orbiter;
@@ -17,7 +17,7 @@ use crate::scene::description::Camera;
 /// A scene that was understood.
 #[derive(Debug)]
 pub(in crate::pipeline) struct Parsed {
-    pub(in crate::pipeline) loaded: scene::Loaded,
+    pub(in crate::pipeline) loaded: Arc<scene::Loaded>,
     pub(in crate::pipeline) orbiter: Option<OrbiterCamera>,
     orbiter_content: Option<Content>,
 }
@@ -28,7 +28,7 @@ pub(in crate::pipeline) struct Parsed {
 /// All errors of the scene file.
 pub(in crate::pipeline) fn parse(
     path: &Path,
-    contents: &Contents,
+    contents: &Snapshot,
     memo: &mut Memo<Arc<Parsed>>,
     findings: &mut Findings,
     token: &CancelToken,
@@ -40,7 +40,7 @@ pub(in crate::pipeline) fn parse(
     let known = memo.get(key).cloned();
     let loaded = match &known {
         Some(parsed) => parsed.loaded.clone(),
-        None => scene::load(path).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?,
+        None => Arc::new(scene::load(path).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?),
     };
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(loaded.warnings.iter().cloned());
@@ -61,7 +61,7 @@ type Orbiter = (Option<OrbiterCamera>, Option<Content>);
 fn orbiter(
     loaded: &scene::Loaded,
     known: Option<&Parsed>,
-    contents: &Contents,
+    contents: &Snapshot,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<Orbiter, Stop> {

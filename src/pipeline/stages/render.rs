@@ -11,10 +11,12 @@ use super::super::pace::{Clock, Pace};
 use super::super::plan::Plan;
 use super::super::protocol::{PreviewSize, RenderProgress};
 use super::super::sink::Sink;
-use super::super::trace::{Job, Tracer, next_pass};
+use super::super::trace::{Tracer, next_pass};
+use super::canvas::{Canvas, jobs};
+use super::films::Films;
+use super::preview::Screen;
 use super::{Staged, Stop};
-use crate::film::{Film, tone::develop};
-use crate::film::{RadianceImage, Rect};
+use crate::film::{Film, Rect};
 use crate::integrators::{RayCounters, RenderSettings};
 
 /// At most this often.
@@ -24,94 +26,51 @@ const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
 /// A preview may take this part of the time at most.
 const PREVIEW_SHARE: u32 = 10;
 
-/// A film with what it is of.
-#[derive(Debug)]
-pub(in crate::pipeline) struct Canvas {
-    pub(in crate::pipeline) key: Key,
-    pub(in crate::pipeline) film: Film,
-    /// Samples that each tile has.
-    done: Vec<u32>,
-    /// A first picture at the size of the preview, shown where there are no samples yet.
-    base: Option<RadianceImage>,
-    /// The budget that ended the last render of it.
-    ended_by: Option<f64>,
-}
-
-impl Canvas {
-    fn new(key: Key, plan: &Plan) -> Result<Self, Stop> {
-        let film = Film::new(plan.settings.width, plan.settings.height, plan.crop).map_err(Stop::work)?;
-        let done = vec![0; film.tile_count()];
-        Ok(Self { key, film, done, base: None, ended_by: None })
-    }
-
-    /// Whether every pixel has this many samples.
-    pub(in crate::pipeline) fn is_complete(&self, samples: u32) -> bool {
-        self.done.iter().all(|done| *done == samples)
-    }
-
-    /// Samples that every pixel has.
-    pub(in crate::pipeline) fn samples(&self) -> u32 {
-        self.done.iter().copied().min().unwrap_or(0)
-    }
-
-    fn jobs(&self, target: u32) -> Vec<Job> {
-        jobs(&self.film, |tile| self.done[tile]..target)
-    }
-
-    /// Pixels times samples.
-    fn units(&self, samples_of: impl Fn(usize) -> u32) -> u64 {
-        let area = |tile| self.film.tile_rect(tile).map_or(0, |rect| rect.area() as u64);
-        (0..self.done.len()).map(|tile| area(tile) * u64::from(samples_of(tile))).sum()
-    }
-}
-
 /// What the stage is given.
 pub(in crate::pipeline) struct Order<'a> {
     pub(in crate::pipeline) tracer: Tracer<'a>,
     pub(in crate::pipeline) plan: &'a Plan,
     pub(in crate::pipeline) preview: Option<PreviewSize>,
+    pub(in crate::pipeline) most_film_bytes: u64,
     /// Start from an empty film whatever is kept.
     pub(in crate::pipeline) force: bool,
     pub(in crate::pipeline) sink: &'a Sink,
-    /// Called often with the film as it is, for orders that come during the render.
-    pub(in crate::pipeline) pulse: &'a dyn Fn(&Canvas),
+    /// Called often with the film as it is, for orders that come during the render; and whether every pixel of it
+    /// has a sample.
+    pub(in crate::pipeline) pulse: &'a dyn Fn(&Canvas, bool),
+    /// Takes an order for another size of the previews.
+    pub(in crate::pipeline) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
 }
 
-/// Bring the canvas to what is asked for.
+/// Bring the film of this key to what is asked for.
 ///
 /// # Errors
-/// Cancelled; no memory for the film. The canvas keeps what it has.
+/// Cancelled; no memory for the film. The film keeps what it has.
 pub(in crate::pipeline) fn render(
     key: Key,
-    canvas: &mut Option<Canvas>,
+    films: &mut Films,
     order: &Order<'_>,
 ) -> Result<Staged<RayCounters>, Stop> {
     let wanted = order.plan.samples;
-    let usable =
-        |kept: &Canvas| !order.force && kept.key == key && kept.done.iter().all(|done| *done <= wanted);
-    if !canvas.as_ref().is_some_and(usable) {
-        // The old film goes first: there may not be memory for two.
-        *canvas = None;
+    let is_other = films.current().is_some_and(|current| current.key != key);
+    films.select(key, |kept| !order.force && kept.done.iter().all(|done| *done <= wanted));
+    if films.current().is_none() {
+        films.put(|| Canvas::new(key, order.plan, order.most_film_bytes)).map_err(Stop::work)?;
     }
-    let canvas = match canvas {
-        Some(kept) => kept,
-        none => none.insert(Canvas::new(key, order.plan)?),
-    };
+    let Some(canvas) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
     let budget = order.plan.time_seconds;
     let finished = canvas.is_complete(wanted) || (budget.is_some() && canvas.ended_by == budget);
     let had = canvas.samples();
     let mut painter = Painter::new(canvas, order);
     if finished {
         painter.show();
-        return Ok(Staged::reused(RayCounters::default(), "nothing that it shows changed"));
+        let why = if is_other { "its film was kept" } else { "nothing that it shows changed" };
+        return Ok(Staged::reused(RayCounters::default(), why));
     }
     painter.canvas.ended_by = None;
-    painter.canvas.film.set_complete(false);
     painter.paint()?;
     let rays = painter.rays;
-    let complete = painter.canvas.is_complete(wanted);
-    painter.canvas.film.set_complete(complete);
-    Ok(match (!complete, had) {
+    Ok(match (!painter.canvas.is_complete(wanted), had) {
         (true, _) => {
             canvas.ended_by = budget;
             Staged::done(rays, "the time was up")
@@ -125,10 +84,15 @@ pub(in crate::pipeline) fn render(
 struct Painter<'a> {
     canvas: &'a mut Canvas,
     order: &'a Order<'a>,
+    screen: Screen<'a>,
     clock: Clock,
     pace: Pace,
+    fraction: f64,
     units: u64,
+    total_units: u64,
     rays: RayCounters,
+    /// Whether some pixels have no sample yet: until they have, nothing but a cancel ends the render.
+    is_first: bool,
     is_over_time: bool,
     next_progress: Instant,
     next_preview: Instant,
@@ -137,13 +101,18 @@ struct Painter<'a> {
 impl<'a> Painter<'a> {
     fn new(canvas: &'a mut Canvas, order: &'a Order<'a>) -> Self {
         let units = canvas.units(|tile| canvas.done[tile]);
-        let total = canvas.units(|_| order.plan.samples);
+        let total_units = canvas.units(|_| order.plan.samples);
+        let bounds = (order.take_preview)().unwrap_or(order.preview);
         Self {
+            is_first: !canvas.is_covered(),
             canvas,
             order,
+            screen: Screen { bounds, plan: order.plan, sink: order.sink },
             clock: Clock::start(),
-            pace: Pace::new(units, total),
+            pace: Pace::new(units, total_units),
+            fraction: 0.0,
             units,
+            total_units,
             rays: RayCounters::default(),
             is_over_time: false,
             next_progress: Instant::now(),
@@ -153,16 +122,18 @@ impl<'a> Painter<'a> {
 
     fn paint(&mut self) -> Result<(), Stop> {
         self.say_progress(false);
-        if self.canvas.samples() == 0 {
-            self.coarse()?;
+        if self.is_first {
+            if self.canvas.base.is_none() {
+                self.coarse()?;
+            }
+            self.pass(1)?;
+            self.is_first = false;
+            self.canvas.base = None;
+            self.show();
+            self.tick();
         }
         while !self.canvas.is_complete(self.order.plan.samples) && !self.is_over_time {
-            let first = self.canvas.samples() == 0;
             self.pass(next_pass(self.canvas.samples(), self.order.plan.samples))?;
-            if first {
-                self.canvas.base = None;
-                self.show();
-            }
         }
         self.show();
         self.say_progress(true);
@@ -193,55 +164,59 @@ impl<'a> Painter<'a> {
             self.next_progress = now + PROGRESS_INTERVAL;
             self.say_progress(false);
         }
-        if now >= self.next_preview {
-            self.show();
+        if let Some(bounds) = (self.order.take_preview)() {
+            (self.screen.bounds, self.next_preview) = (bounds, now);
         }
-        (self.order.pulse)(self.canvas);
+        if now >= self.next_preview && self.screen.show_some(self.canvas) {
+            self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
+        }
+        (self.order.pulse)(self.canvas, !self.is_first);
         let seconds = self.clock.seconds(self.order.tracer.token.is_paused());
-        self.is_over_time = self.order.plan.time_seconds.is_some_and(|budget| seconds >= budget);
+        let budget = self.order.plan.time_seconds;
+        self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
     }
 
     fn say_progress(&mut self, is_last: bool) {
         let elapsed_seconds = self.clock.seconds(self.order.tracer.token.is_paused());
         let (mut fraction, mut eta_seconds) = self.pace.at(elapsed_seconds, self.units);
         if let Some(budget) = self.order.plan.time_seconds {
-            let left = (budget - elapsed_seconds).max(0.0);
+            // The first pass is finished whatever the budget is.
+            let of_first = eta_seconds.map_or(0.0, |eta| eta * self.share_of_first());
+            let left = (budget - elapsed_seconds).max(of_first);
             eta_seconds = Some(eta_seconds.unwrap_or(left).min(left));
-            // Time passes even where work stands still, and neither falls.
-            fraction = fraction.max((elapsed_seconds / budget).min(1.0));
+            // Time passes even where work stands still.
+            fraction = fraction.max(elapsed_seconds / (elapsed_seconds + left)).min(1.0);
         }
-        if is_last {
-            (fraction, eta_seconds) = (1.0, Some(0.0));
-        }
+        self.fraction = if is_last { 1.0 } else { self.fraction.max(fraction) };
         self.order.sink.progress(RenderProgress {
-            fraction,
+            fraction: self.fraction,
             elapsed_seconds,
-            eta_seconds,
-            samples: (self.units / self.canvas.units(|_| 1).max(1)) as u32,
+            eta_seconds: if is_last { Some(0.0) } else { eta_seconds },
+            samples: (self.units / self.canvas.film.crop().area() as u64) as u32,
             total_samples: self.order.plan.samples,
         });
     }
 
-    /// The film as it is, into the slot.
-    fn show(&mut self) {
-        let Some((width, height)) = self.preview_size() else { return };
-        let begin = Instant::now();
-        let base = self.canvas.base.as_ref().filter(|base| (base.width, base.height) == (width, height));
-        let image = self.canvas.film.preview(width, height, base);
-        self.order.sink.preview(develop(&image, &self.order.plan.tone));
-        self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(begin.elapsed() * PREVIEW_SHARE);
+    /// Of the work that is left, the part that the first pass is.
+    fn share_of_first(&self) -> f64 {
+        if !self.is_first {
+            return 0.0;
+        }
+        let pixels = self.canvas.film.crop().area() as u64;
+        pixels.saturating_sub(self.units) as f64 / self.total_units.saturating_sub(self.units).max(1) as f64
     }
 
-    fn preview_size(&self) -> Option<(u32, u32)> {
-        let settings = &self.order.plan.settings;
-        self.order.preview.and_then(|bounds| fit(settings.width, settings.height, bounds))
+    fn show(&mut self) {
+        let Tracer { pool, token, .. } = self.order.tracer;
+        self.screen.show(self.canvas, pool, token);
+        self.next_preview = Instant::now() + PREVIEW_INTERVAL;
     }
 
     /// A first picture with one sample at the preview's own resolution, where that is much less work than one pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let plan = self.order.plan;
         let (full_width, full_height) = (plan.settings.width, plan.settings.height);
-        let Some((width, height)) = self.preview_size() else { return Ok(()) };
+        let Some((width, height)) = self.screen.size() else { return Ok(()) };
         let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
         if pixels(width, height) * 2 > pixels(full_width, full_height) {
             return Ok(());
@@ -263,28 +238,6 @@ impl<'a> Painter<'a> {
     }
 }
 
-/// The tiles that lack samples, in the film's order.
-fn jobs(film: &Film, samples_of: impl Fn(usize) -> std::ops::Range<u32>) -> Vec<Job> {
-    let job = |tile| Some(Job { tile, rect: film.tile_rect(tile)?, samples: samples_of(tile) });
-    film.tile_order().into_iter().filter_map(job).filter(|job| !job.samples.is_empty()).collect()
-}
-
-/// The largest picture of this aspect ratio inside the bounds.
-fn fit(width: u32, height: u32, bounds: PreviewSize) -> Option<(u32, u32)> {
-    if bounds.width == 0 || bounds.height == 0 {
-        return None;
-    }
-    let (w, h) = (u64::from(width), u64::from(height));
-    let (bound_w, bound_h) = (u64::from(bounds.width), u64::from(bounds.height));
-    let rounded = |a: u64, b: u64| ((2 * a + b) / (2 * b)).max(1);
-    let (w, h) = if w * bound_h >= h * bound_w {
-        (bound_w, rounded(h * bound_w, w).min(bound_h))
-    } else {
-        (rounded(w * bound_h, h).min(bound_w), bound_h)
-    };
-    Some((w as u32, h as u32))
-}
-
 /// The pixels of a smaller picture that lie under a rectangle of a larger one.
 fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
     let along = |start: u32, len: u32, from: u32, to: u32| {
@@ -301,16 +254,6 @@ fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_preview_keeps_the_aspect_ratio_inside_its_bounds() {
-        let bounds = |width, height| PreviewSize { width, height };
-        assert_eq!(fit(640, 480, bounds(80, 48)), Some((64, 48)));
-        assert_eq!(fit(640, 480, bounds(64, 100)), Some((64, 48)));
-        assert_eq!(fit(10_000, 1, bounds(80, 48)), Some((80, 1)));
-        assert_eq!(fit(1, 10_000, bounds(80, 48)), Some((1, 48)));
-        assert_eq!(fit(1, 1, bounds(0, 48)), None);
-    }
 
     #[test]
     fn a_crop_covers_its_part_of_a_smaller_picture() {

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::super::fingerprint::{Fingerprint, Key};
 use super::super::plan::Plan;
+use super::super::protocol::Writing;
 use super::super::sink::Sink;
 use super::super::watch::content::{Content, Contents};
-use super::render::Canvas;
+use super::canvas::Canvas;
 use super::{Staged, Stop};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
@@ -25,16 +26,54 @@ impl Written {
     }
 }
 
-/// Look at all targets before work is put into a picture for them.
+/// Look at all targets before work is put into a picture for them, and say what is wrong.
 ///
 /// # Errors
-/// The first that cannot be written.
-pub(in crate::pipeline) fn check_targets(plan: &Plan) -> Result<(), Stop> {
+/// The first that cannot be written, where it must be.
+pub(in crate::pipeline) fn check_targets(writing: Writing, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
+    match writing {
+        Writing::No => Ok(()),
+        Writing::Must => find_targets(plan).map_err(Stop::work),
+        Writing::Try => {
+            if let Err(error) = find_targets(plan) {
+                sink.write_failed(error.to_string());
+            }
+            Ok(())
+        }
+    }
+}
+
+fn find_targets(plan: &Plan) -> Result<(), OutputError> {
     let check = |path: &PathBuf| {
         let format = output::check_target(path)?;
         format.check_picture(plan.settings.width, plan.settings.height, BitDepth::try_from(plan.bit_depth)?)
     };
-    plan.outputs.iter().try_for_each(check).map_err(|error: OutputError| Stop::work(error))
+    plan.outputs.iter().try_for_each(check)
+}
+
+/// The last stage of a request; whether the picture is on disk then.
+///
+/// # Errors
+/// What went wrong, where the picture must be written.
+pub(in crate::pipeline) fn write_if_wanted(
+    writing: Writing,
+    canvas: &Canvas,
+    plan: &Plan,
+    written: &mut Written,
+    contents: &Contents,
+    sink: &Sink,
+) -> Result<Staged<bool>, Stop> {
+    if writing == Writing::No {
+        return Ok(Staged::skipped(false, "nothing is to be written"));
+    }
+    match write(canvas, plan, written, contents, sink) {
+        Ok(Staged { status, why, .. }) => Ok(Staged { value: true, status, why }),
+        Err(message) if writing == Writing::Try => {
+            sink.write_failed(message.clone());
+            Ok(Staged::skipped(false, message))
+        }
+        Err(message) => Err(Stop::work(message)),
+    }
 }
 
 /// Write the film as it is to every output that does not hold it already. All outputs are tried.

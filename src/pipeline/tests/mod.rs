@@ -7,14 +7,17 @@ use std::fs;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::pipeline::protocol::{Command, Event, Failure, PreviewSize, Report, Request, Stage, Status};
+use crate::pipeline::engine::Means;
+use crate::pipeline::protocol::{
+    Command, Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing,
+};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::trace::Kernel;
-use crate::pipeline::worker::{Handle, KERNEL, start_with};
-use crate::scene::description::Scene;
+use crate::pipeline::worker::{Handle, start_with};
+use crate::scene::Loaded;
 
 /// A scene of this text; a camera is added where there is none.
-pub(in crate::pipeline) fn scene_of(text: &str) -> Scene {
+pub(in crate::pipeline) fn loaded_of(text: &str) -> Loaded {
     let place = "position = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let text = if text.contains("[camera]\n") {
         text.replace("[camera]\n", &format!("[camera]\n{place}"))
@@ -24,7 +27,7 @@ pub(in crate::pipeline) fn scene_of(text: &str) -> Scene {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    crate::scene::load(&path).expect("a scene that is right").scene
+    crate::scene::load(&path).expect("a scene that is right")
 }
 
 pub(super) const SCENE: &str = r#"
@@ -60,6 +63,8 @@ intensity = [10, 10, 10]
 
 pub(super) const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
+pub(super) const KERNEL: Kernel = crate::integrators::render_tile;
+
 pub(super) struct Bench {
     pub(super) folder: tempfile::TempDir,
     pub(super) worker: Handle,
@@ -67,6 +72,7 @@ pub(super) struct Bench {
     pub(super) overrides: Overrides,
     pub(super) preview: Option<PreviewSize>,
     pub(super) force: bool,
+    pub(super) writing: Writing,
 }
 
 impl Bench {
@@ -75,11 +81,23 @@ impl Bench {
     }
 
     pub(super) fn with(scene: &str, kernel: Kernel) -> Self {
+        Self::with_means(scene, Means { kernel, ..Means::default() })
+    }
+
+    pub(super) fn with_means(scene: &str, means: Means) -> Self {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let output = folder.path().join("out.ppm");
         let overrides = Overrides { outputs: vec![output], threads: Some(2), ..Default::default() };
-        let worker = start_with(kernel).expect("a thread");
-        let bench = Self { folder, worker, generation: 0, overrides, preview: None, force: false };
+        let worker = start_with(means).expect("a thread");
+        let bench = Self {
+            folder,
+            worker,
+            generation: 0,
+            overrides,
+            preview: None,
+            force: false,
+            writing: Writing::Must,
+        };
         bench.write("scene.toml", scene);
         bench.write("one.obj", OBJ);
         bench.write("skin.ppm", "P6\n1 1\n255\nabc");
@@ -107,7 +125,7 @@ impl Bench {
             scene: self.path("scene.toml"),
             overrides: self.overrides.clone(),
             preview: self.preview,
-            write: true,
+            write: self.writing,
             force: self.force,
         })));
         self.generation
@@ -166,10 +184,7 @@ pub(super) fn statuses(report: &Report) -> String {
     report.stages.iter().map(|stage| letter(stage.status)).collect()
 }
 
-/// Whether the lights stage says anything of lights depends on the world; it is left out here.
 #[track_caller]
 pub(super) fn assert_statuses(report: &Report, expected: &str) {
-    let mut found = statuses(report);
-    found.remove(Stage::Lights as usize);
-    assert_eq!(found, expected, "parse meshes textures accel photons render write");
+    assert_eq!(statuses(report), expected, "parse meshes textures accel lights photons render write");
 }

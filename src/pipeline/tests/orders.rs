@@ -1,13 +1,14 @@
 //! Cancelling, holding, writing, failing.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Rect, TileSamples};
 use crate::integrators::{RayCounters, RenderSettings};
+use crate::pipeline::engine::Means;
 use crate::world::World;
 
 /// As the real one, and slowly: a tile takes until it is told to stop.
@@ -90,27 +91,36 @@ fn the_worker_survives_a_panic() {
     assert!(bench.done().0.image.complete);
 }
 
-#[test]
-fn a_film_that_does_not_fit_is_an_error() {
-    let mut bench =
-        Bench::new(&SCENE.replace("width = 40", "width = 32768").replace("height = 30", "height = 32768"));
-    // 2³⁰ pixels need 28 GiB; a machine that may have them is let off.
-    bench.overrides.time_seconds = Some(0.01);
-    bench.overrides.outputs = vec![bench.path("out.png")];
-    if let Some(available) = available_memory_bytes()
-        && available < 26 << 30
-    {
-        assert!(matches!(bench.failed(), Failure::Work(_)));
-        bench.edit("32768", "16");
-        bench.overrides = Overrides { outputs: vec![bench.path("out.ppm")], ..Default::default() };
-        bench.done();
-    }
+static TILES: AtomicUsize = AtomicUsize::new(0);
+
+fn breaks_first(
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile broke");
+    slow(world, settings, tile, samples, token)
 }
 
-fn available_memory_bytes() -> Option<u64> {
-    let text = fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? << 10)
+#[test]
+fn a_panic_is_heard_before_the_pass_is_over() {
+    let scene = SCENE.replace("width = 40", "width = 1280").replace("height = 30", "height = 1280");
+    let mut bench = Bench::with(&scene, breaks_first);
+    assert!(matches!(bench.failed(), Failure::Work(_)));
+    let tiles = TILES.load(Ordering::SeqCst);
+    assert!(tiles < 40 * 40 / 4, "{tiles} tiles were rendered for nothing");
+}
+
+#[test]
+fn a_film_that_does_not_fit_is_an_error() {
+    let means = Means { most_film_bytes: 100_000, ..Means::default() };
+    let mut bench = Bench::with_means(&SCENE.replace("width = 40", "width = 400"), means);
+    assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("400×30")));
+    assert!(!bench.path("out.ppm").exists());
+    bench.edit("400", "40");
+    bench.done();
 }
 
 #[test]
@@ -122,7 +132,7 @@ fn previews_fit_their_bounds_and_a_new_size_renders_nothing() {
     let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
     assert_eq!((latest.generation, latest.picture.width, latest.picture.height), (generation, 12, 9));
     bench.preview = Some(PreviewSize { width: 20, height: 30 });
-    assert_statuses(&bench.done().0, "rrrrsrr");
+    assert_statuses(&bench.done().0, "rrrrrsrr");
     let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
     assert_eq!((latest.picture.width, latest.picture.height), (20, 15));
 }
@@ -137,6 +147,107 @@ fn slow(
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     std::thread::sleep(Duration::from_millis(2));
     KERNEL(world, settings, tile, samples, token)
+}
+
+#[test]
+fn another_size_of_the_preview_interrupts_nothing() {
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
+    let until_wide = |bench: &Bench, wide: u32| {
+        loop {
+            let event = bench.next();
+            assert!(matches!(event, Event::Preview { .. } | Event::Progress { .. }), "{event:?}");
+            let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
+            if latest.picture.width == wide {
+                assert_eq!(latest.generation, of);
+                return;
+            }
+        }
+    };
+    let order = |width| Command::Preview(Some(PreviewSize { width, height: 100 }));
+    bench.worker.send(order(24));
+    until_wide(&bench, 24);
+    bench.worker.send(Command::Pause(true));
+    bench.worker.send(order(32));
+    until_wide(&bench, 32);
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+    bench.worker.send(order(36));
+    until_wide(&bench, 36);
+}
+
+/// Many tiles, so that orders come during the first pass.
+fn wide() -> String {
+    SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")
+}
+
+/// The comment of the picture on disk that says how many samples it has.
+fn samples_on_disk(bench: &Bench) -> String {
+    let text = String::from_utf8_lossy(&bench.picture()).into_owned();
+    let line = text.lines().find_map(|line| line.strip_prefix("# glimt:samples: "));
+    line.expect("the picture says so").to_owned()
+}
+
+#[test]
+fn a_budget_that_ends_in_the_first_pass_waits_for_its_end() {
+    let mut bench = Bench::with(&wide(), slow);
+    bench.overrides.time_seconds = Some(0.001);
+    let report = bench.done().0;
+    assert!(report.image.samples.min >= 1, "{:?}", report.image.samples);
+    assert!(!report.image.complete);
+    assert!(!samples_on_disk(&bench).starts_with('0'));
+}
+
+#[test]
+fn write_in_the_first_pass_waits_for_its_end() {
+    let mut bench = Bench::with(&wide(), slow);
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
+    while !matches!(bench.next(), Event::Written { .. }) {}
+    assert_eq!(samples_on_disk(&bench), "1");
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+}
+
+#[test]
+fn write_is_refused_once_the_first_pass_was_stopped() {
+    let mut bench = Bench::with(&wide(), slow);
+    bench.write("out.ppm", "the old one");
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::WritePostponed { .. }) {}
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+    let is_refusal = |event: Event| match event {
+        Event::WriteFailed { message, .. } => message.contains("before every pixel had a sample"),
+        _ => false,
+    };
+    assert!(is_refusal(bench.next()), "the one that waited");
+    bench.worker.send(Command::Write);
+    assert!(is_refusal(bench.next()), "and one that comes later");
+    assert_eq!(bench.picture(), b"the old one");
+}
+
+#[test]
+fn a_write_that_waits_is_done_by_the_request_that_comes_in_between() {
+    let mut bench = Bench::with(&wide(), slow);
+    bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::WritePostponed { .. }) {}
+    bench.writing = Writing::No;
+    bench.overrides.samples = Some(2);
+    let of = bench.send();
+    let events = bench.until_end(of);
+    assert!(
+        events.iter().any(|event| matches!(event, Event::Written { generation, .. } if *generation == of))
+    );
+    assert!(!events.iter().any(|event| matches!(event, Event::WriteFailed { .. })));
 }
 
 #[test]
@@ -227,6 +338,29 @@ fn a_target_that_cannot_be_written_fails_before_the_render() {
     let mut bench = Bench::with(SCENE, endless);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("nowhere")));
+}
+
+#[test]
+fn a_target_that_cannot_be_written_is_said_and_the_picture_shown_all_the_same() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
+    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    bench.writing = Writing::Try;
+    let of = bench.send();
+    let events = bench.until_end(of);
+    let failed =
+        |event: &Event| matches!(event, Event::WriteFailed { message, .. } if message.contains("nowhere"));
+    let first = events.iter().position(failed).expect("it is said");
+    let shown = events.iter().position(|event| matches!(event, Event::Preview { .. })).expect("it is shown");
+    assert!(first < shown, "before the work");
+    let Some(Event::Done { report, .. }) = events.last() else { panic!("{:?}", events.last()) };
+    assert_eq!((report.image.path.as_deref(), report.image.complete), (None, true));
+    let write = &report.stages[Stage::Write as usize];
+    assert!(write.status == Status::Skipped && write.why.contains("nowhere"), "{write:?}");
+    // Mended while it was rendered, or by the next request.
+    fs::create_dir(bench.path("nowhere")).expect("a folder");
+    assert_statuses(&bench.done().0, "rrrrrsrd");
+    assert!(bench.path("nowhere/out.png").exists());
 }
 
 #[test]

@@ -1,46 +1,50 @@
 //! What each edit redoes, and what is said of files.
 
 use super::*;
+use crate::scene::description::Shadows;
 
 #[test]
 fn each_edit_redoes_only_what_reads_it() {
     let mut bench = Bench::new(SCENE);
-    assert_statuses(&bench.done().0, "ddddsdd");
+    assert_statuses(&bench.done().0, "dddddsdd");
 
     let (report, unchanged) = bench.done();
-    assert_statuses(&report, "rrrrsrr");
+    assert_statuses(&report, "rrrrrsrr");
     assert!(unchanged, "the same file again");
 
     bench.edit("[camera]", "# a comment\n[camera]");
     let (report, unchanged) = bench.done();
-    assert_statuses(&report, "drrrsrr");
+    assert_statuses(&report, "drrrrsrr");
     assert!(unchanged, "a comment");
 
     bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
     let (report, unchanged) = bench.done();
-    assert_statuses(&report, "drrrsdd");
+    assert_statuses(&report, "drrrrsdd");
     assert!(!unchanged, "a material");
 
+    bench.edit("intensity = [10, 10, 10]", "intensity = [9, 10, 10]");
+    assert_statuses(&bench.done().0, "drrrdsdd");
+
     bench.edit("position = [0, 1, 4]", "position = [0, 1, 5]");
-    assert_statuses(&bench.done().0, "drrrsdd");
+    assert_statuses(&bench.done().0, "drrrrsdd");
 
     bench.edit("exposure = 0.0", "exposure = 1.0");
     let (report, unchanged) = bench.done();
-    assert_statuses(&report, "drrrsrd");
+    assert_statuses(&report, "drrrrsrd");
     assert!(!unchanged, "the exposure");
 
     bench.edit("translate = [0, 0, 0]", "translate = [1, 0, 0]");
     let report = bench.done().0;
-    assert_statuses(&report, "drrdsdd");
+    assert_statuses(&report, "drrdrsdd");
     assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree is kept");
 
     bench.write("skin.ppm", "P6\n1 1\n255\nxyz");
     let report = bench.done().0;
-    assert_statuses(&report, "rrdrsdd");
+    assert_statuses(&report, "rrdrrsdd");
     assert!(report.counters.texels_loaded > 0);
 
     bench.write("one.obj", &format!("{OBJ}f 1 3 2\n"));
-    assert_statuses(&bench.done().0, "rdrdsdd");
+    assert_statuses(&bench.done().0, "rdrdrsdd");
 }
 
 #[test]
@@ -49,10 +53,55 @@ fn files_that_a_mesh_names_are_part_of_it() {
     bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");
     bench.write("one.obj", &format!("mtllib one.mtl\n{OBJ}"));
     bench.done();
-    assert_statuses(&bench.done().0, "rrrrsrr");
+    assert_statuses(&bench.done().0, "rrrrrsrr");
     bench.write("one.mtl", "newmtl a\nKd 0 1 0\n");
     let report = bench.done().0;
     assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Done);
+}
+
+#[test]
+fn a_file_is_hashed_once_by_a_request_whatever_asks_for_it() {
+    let textures = "[textures.skin]\nfile = \"skin.ppm\"\n";
+    let twice = format!("{textures}[textures.bumps]\nfile = \"skin.ppm\"\nencoding = \"linear\"\n");
+    let scene = SCENE.replace(textures, &twice).replace("\"skin\" }", "\"skin\" }\nnormal_map = \"bumps\"");
+    let mut bench = Bench::new(&scene);
+    bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");
+    bench.write("one.obj", &format!("mtllib one.mtl\n{OBJ}"));
+    for round in 0..2 {
+        bench.done();
+        let mut hashed = std::mem::take(&mut *bench.worker.contents().hashed.lock().expect("not poisoned"));
+        hashed.sort();
+        let names = ["one.mtl", "one.obj", "out.ppm", "scene.toml", "skin.ppm"];
+        assert_eq!(hashed, names.map(|name| bench.path(name)), "round {round}");
+    }
+}
+
+#[test]
+fn a_toggle_that_is_switched_back_finds_its_film_again() {
+    let mut bench = Bench::new(SCENE);
+    bench.done();
+    let soft = bench.picture();
+    bench.overrides.shadows = Some(Shadows::Off);
+    let (report, _) = bench.done();
+    assert_eq!(report.stages[Stage::Render as usize].status, Status::Done);
+    assert_eq!(report.counters.films, 2);
+    assert!(report.counters.film_memory_bytes >= 2 * 40 * 30 * 28);
+    bench.overrides.shadows = None;
+    bench.writing = Writing::No;
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "rrrrrsrs");
+    assert!(!unchanged, "another picture is shown than before");
+    bench.writing = Writing::Must;
+    let (report, _) = bench.done();
+    assert_statuses(&report, "rrrrrsrd");
+    assert_eq!(report.counters.camera_rays, 0);
+    assert_eq!(bench.picture(), soft);
+    bench.force = true;
+    assert_eq!(
+        bench.done().0.stages[Stage::Render as usize].status,
+        Status::Done,
+        "unless asked to begin anew"
+    );
 }
 
 #[test]
@@ -60,7 +109,7 @@ fn a_picture_that_was_deleted_is_written_again() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     fs::remove_file(bench.path("out.ppm")).expect("removed");
-    assert_statuses(&bench.done().0, "rrrrsrd");
+    assert_statuses(&bench.done().0, "rrrrrsrd");
     assert!(bench.path("out.ppm").exists());
 }
 
@@ -70,7 +119,7 @@ fn a_scene_without_files_says_why_stages_are_skipped() {
     let text = text.replace("[textures.skin]\nfile = \"skin.ppm\"\n", "");
     let text = text.replace("[[mesh]]\nfile = \"one.obj\"\nmaterial = \"wall\"\ntranslate = [0, 0, 0]\n", "");
     let report = Bench::new(&text).done().0;
-    assert_statuses(&report, "dssdsdd");
+    assert_statuses(&report, "dssddsdd");
     let why = |stage: Stage| report.stages[stage as usize].why.clone();
     assert_eq!(why(Stage::Meshes), "the scene has no mesh");
     assert_eq!(why(Stage::Textures), "no visible material names a texture");

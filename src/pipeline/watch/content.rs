@@ -5,7 +5,7 @@ use std::fs::{self, File, Metadata};
 use std::io::Read;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use crate::control::{CancelToken, Cancelled};
@@ -41,6 +41,49 @@ const CHUNK: usize = 1 << 20;
 #[derive(Debug, Default)]
 pub struct Contents {
     known: Mutex<HashMap<PathBuf, (Stamp, Content)>>,
+    /// Files that were read through.
+    #[cfg(test)]
+    pub(in crate::pipeline) hashed: Mutex<Vec<PathBuf>>,
+}
+
+/// What files hold as one request sees them: each is asked for once, so that everything made of a file goes by the
+/// same answer. A file that changes after that is found by whoever watches it.
+#[derive(Debug)]
+pub(in crate::pipeline) struct Snapshot {
+    contents: Arc<Contents>,
+    seen: Mutex<HashMap<PathBuf, Content>>,
+}
+
+impl Snapshot {
+    pub(in crate::pipeline) fn of(contents: Arc<Contents>) -> Self {
+        Self { contents, seen: Mutex::default() }
+    }
+
+    /// What the file held when this request first asked.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(in crate::pipeline) fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
+        if let Some(content) = self.known(path) {
+            return Ok(content);
+        }
+        let content = self.contents.read(path, token)?;
+        Ok(*self.seen().entry(path.to_owned()).or_insert(content))
+    }
+
+    /// What was answered before.
+    pub(in crate::pipeline) fn known(&self, path: &Path) -> Option<Content> {
+        self.seen().get(path).copied()
+    }
+
+    fn seen(&self) -> MutexGuard<'_, HashMap<PathBuf, Content>> {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Whether a file may have changed since then.
+pub(in crate::pipeline) fn may_have_changed(path: &Path, since: SystemTime) -> bool {
+    fs::metadata(path).is_ok_and(|metadata| !Stamp::of(&metadata).is_settled(since))
 }
 
 /// What changes with every change of a file, given some time between changes.
@@ -98,7 +141,7 @@ impl Contents {
         if let Some(content) = known {
             return Ok(content);
         }
-        let content = if stamp.len > MOST_HASHED { stamp.content() } else { hash(path, token)? };
+        let content = if stamp.len > MOST_HASHED { stamp.content() } else { self.hash(path, token)? };
         if stamp.is_settled(now) {
             self.known().insert(path.to_owned(), (stamp, content));
         } else {
@@ -110,6 +153,12 @@ impl Contents {
     /// Forget all files but these.
     pub fn retain(&self, mut keep: impl FnMut(&Path) -> bool) {
         self.known().retain(|path, _| keep(path));
+    }
+
+    fn hash(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
+        #[cfg(test)]
+        self.hashed.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+        hash(path, token)
     }
 
     fn known(&self) -> MutexGuard<'_, HashMap<PathBuf, (Stamp, Content)>> {
@@ -167,6 +216,20 @@ mod tests {
         let first = read(3 << 40);
         assert!(matches!(first, Content::Hash(_)));
         assert_ne!(first, read((3 << 40) + 1));
+    }
+
+    #[test]
+    fn a_request_sees_one_content_of_a_file() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("file");
+        let token = CancelToken::new();
+        let contents = Arc::new(Contents::default());
+        let snapshot = Snapshot::of(contents.clone());
+        fs::write(&path, "a").expect("written");
+        let first = snapshot.read(&path, &token).expect("not cancelled");
+        fs::write(&path, "b").expect("written");
+        assert_eq!(snapshot.read(&path, &token), Ok(first));
+        assert_ne!(Snapshot::of(contents).read(&path, &token), Ok(first), "the next request sees the change");
     }
 
     #[test]

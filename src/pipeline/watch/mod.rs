@@ -10,6 +10,7 @@ mod folders;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
@@ -31,7 +32,7 @@ const POLL: Duration = Duration::from_millis(200);
 /// Some file holds something else.
 #[derive(Clone, Copy, Debug)]
 pub struct Changed {
-    /// When the first sign of it came.
+    /// When the first sign of it came: the start of "from save to first changed cell".
     pub noticed: Instant,
 }
 
@@ -50,19 +51,24 @@ enum Message {
 }
 
 impl Watcher {
-    /// Watch nothing yet. `poll`: do not rely on the system's notifications.
+    /// Watch nothing yet. `poll`: do not rely on the system's notifications. `contents`: what the worker knows, so
+    /// that no file is hashed twice.
     ///
     /// # Errors
     /// The system has no thread left.
-    pub fn start(poll: bool, changed: impl FnMut(Changed) + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(
+        poll: bool,
+        contents: Arc<Contents>,
+        changed: impl FnMut(Changed) + Send + 'static,
+    ) -> std::io::Result<Self> {
         let (orders, received) = mpsc::channel();
         let hints = orders.clone();
         let folders = Folders::new(poll, move || {
             // The watcher is gone: nobody wants hints.
             let _ = hints.send(Message::Hint);
         });
-        let (contents, files) = (Contents::default(), HashMap::new());
-        let watch = Watch { folders, contents, files, signs: None, pending: Vec::new(), changed };
+        let watch =
+            Watch { folders, contents, files: HashMap::new(), signs: None, pending: Vec::new(), changed };
         std::thread::Builder::new().name("glimt-watch".to_owned()).spawn(move || watch.run(&received))?;
         Ok(Self { orders })
     }
@@ -82,7 +88,7 @@ impl Drop for Watcher {
 
 struct Watch<F> {
     folders: Folders,
-    contents: Contents,
+    contents: Arc<Contents>,
     /// What the files held when that was last said, or when they were last read.
     files: HashMap<PathBuf, Content>,
     /// When the first sign of a change came, and the latest.

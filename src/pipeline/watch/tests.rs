@@ -19,7 +19,7 @@ impl Scratch {
         let folder = tempfile::tempdir().expect("a scratch folder");
         fs::write(folder.path().join("a.toml"), "0").expect("written");
         let (sender, changes) = channel();
-        let watcher = Watcher::start(poll, move |changed| {
+        let watcher = Watcher::start(poll, Arc::default(), move |changed| {
             let _ = sender.send(changed);
         });
         let watcher = watcher.expect("a thread");

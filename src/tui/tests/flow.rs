@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::{BLUE, RED, cells_of};
-use crate::pipeline::protocol::{self, Failure, PreviewSize};
+use crate::pipeline::protocol::{self, Command, Failure, PreviewSize, Writing};
 use crate::tui::event::{Effect, Event, KeyPress, Signal, Source};
 use crate::tui::fixtures::*;
 use crate::tui::state::Activity;
@@ -15,7 +15,7 @@ fn the_first_request_has_room_for_the_preview() {
     let effects = crate::tui::update::start(&mut state);
     let request = request(&effects).expect("a request");
     assert_eq!(request.preview, Some(PreviewSize { width: 51, height: 40 }));
-    assert_eq!((request.generation, request.write, request.force), (1, true, false));
+    assert_eq!((request.generation, request.write, request.force), (1, Writing::Try, false));
 }
 
 #[test]
@@ -103,25 +103,33 @@ fn another_window_asks_for_another_preview_once_it_is_quiet() {
     assert!(cells_of(&mut desk, RED) > 51 * 20, "the picture at hand is scaled meanwhile");
     desk.now += Duration::from_millis(50);
     desk.event(Event::Resize(window(200, 60)));
-    assert!(desk.wait(100).is_empty());
+    assert!(desk.wait(50).is_empty());
     let effects = desk.wait(50);
-    let request = request(&effects).expect("a request");
-    assert_eq!(request.preview, desk.state.preview_size());
-    assert_eq!(request.preview, Some(PreviewSize { width: 153, height: 112 }));
-    assert!(!request.force);
+    assert!(matches!(
+        effects[..],
+        [Effect::Send(Command::Preview(Some(PreviewSize { width: 153, height: 112 })))]
+    ));
+    desk.event(Event::Picture { generation: 1, picture: plain_picture(149, 112, BLUE) });
+    assert!(cells_of(&mut desk, BLUE) > 0, "the same request shows its picture again");
     desk.finish(RED);
     desk.event(Event::Resize(window(200, 60)));
     assert!(desk.wait(1000).is_empty(), "the same size asks for nothing");
 }
 
 #[test]
-fn a_long_render_is_not_given_up_for_the_window() {
-    let mut desk = Desk::new();
-    desk.now += Duration::from_secs(5);
-    desk.event(Event::Resize(window(120, 40)));
-    assert!(desk.wait(200).is_empty());
-    let effects = desk.worker(done(1, Vec::new(), false));
-    assert!(request(&effects).is_some(), "it is asked for afterwards");
+fn a_render_goes_on_in_another_window_held_or_not() {
+    for is_held in [false, true] {
+        let mut desk = Desk::new();
+        desk.now += Duration::from_secs(5);
+        if is_held {
+            desk.press(' ');
+        }
+        desk.event(Event::Resize(window(120, 40)));
+        let effects = desk.wait(200);
+        assert!(matches!(effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
+        assert_eq!((desk.state.generation, desk.state.paused), (1, is_held));
+        assert!(desk.worker(done(1, Vec::new(), false)).is_empty());
+    }
 }
 
 #[test]

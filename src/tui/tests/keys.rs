@@ -1,7 +1,7 @@
 //! What each key does, and that the help says so.
 
 use super::RED;
-use crate::pipeline::protocol::{self, Command};
+use crate::pipeline::protocol::{self, Command, Writing};
 use crate::pipeline::settings::{Overrides, View};
 use crate::scene::description::Shadows;
 use crate::scene::diagnostic::Severity;
@@ -48,7 +48,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             let effects = desk.key(key);
             let wanted = if action == Action::NextView { View::Normal } else { View::Shadow };
             let request = request(&effects).expect("a request");
-            assert_eq!((request.overrides.view, request.write), (Some(wanted), false));
+            assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
             assert!(desk.text().contains(&format!("view {}", wanted.name())));
         }
         Action::TogglePause => {
@@ -135,9 +135,10 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
     assert!(desk.text().contains("shadows off") && desk.text().contains("view depth"));
     let effects = desk.press('s');
     let soft = request(&effects).expect("a request");
-    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), true));
+    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), Writing::Try));
     let effects = desk.press('V');
-    assert!(!request(&effects).expect("a request").write, "only the view of the command line is written");
+    let write = request(&effects).expect("a request").write;
+    assert_eq!(write, Writing::No, "only the view of the command line is written");
     let effects = desk.press('0');
     assert_eq!(request(&effects).map(|it| it.overrides.clone()), Some(base));
 }
@@ -188,4 +189,22 @@ fn pausing_nothing_is_explained() {
     desk.finish(RED);
     assert!(desk.press(' ').is_empty());
     assert!(desk.text().contains("nothing is rendering"));
+}
+
+#[test]
+fn a_picture_that_is_written_later_says_so_and_then_that_it_is() {
+    let mut desk = Desk::new();
+    desk.press('w');
+    desk.worker(protocol::Event::WritePostponed { generation: 1 });
+    assert!(desk.text().contains("as soon as every pixel has a sample"), "{}", desk.text());
+    desk.worker(protocol::Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1 });
+    assert!(desk.text().contains("wrote cornell.png"), "{}", desk.text());
+}
+
+#[test]
+fn a_render_that_is_stopped_is_no_longer_held() {
+    let mut desk = Desk::new();
+    desk.press(' ');
+    desk.worker(protocol::Event::Cancelled { generation: 1 });
+    assert!(!desk.state.paused && !desk.text().contains("paused"), "{}", desk.text());
 }

@@ -53,23 +53,13 @@ fn told(state: &mut State, message: &str) -> Vec<Effect> {
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    let next = match shadows(state) {
+    let next = match state.shadows() {
         "soft" => Shadows::Hard,
         "hard" => Shadows::Off,
         _ => Shadows::Soft,
     };
     state.toggles.shadows = Some(next);
     render(state, false)
-}
-
-/// The shadows that hold now, by name.
-pub(in crate::tui) fn shadows(state: &State) -> &'static str {
-    match state.overrides().shadows {
-        Some(Shadows::Off) => "off",
-        Some(Shadows::Hard) => "hard",
-        Some(Shadows::Soft) => "soft",
-        None => state.effective.as_ref().map_or("soft", |effective| effective.shadows),
-    }
 }
 
 /// A scene whose depth of field is off although nothing switched it off has a pinhole for a lens.

@@ -3,21 +3,18 @@
 mod keys;
 mod worker;
 
-pub(super) use keys::shadows;
-
 use std::time::{Duration, Instant};
 
 use super::ExitStatus;
 use super::event::{Effect, Event, Signal, Source, Window};
 use super::options::Changed;
 use super::state::{Activity, PendingChange, PreviewKind, Shown, State};
+use super::view::layout::Layout;
 use crate::film::Picture;
-use crate::pipeline::protocol::{Command, Request};
+use crate::pipeline::protocol::{Command, Request, Writing};
 
 /// The window must keep its size for this long before another preview is asked for.
-const RESIZE_QUIET: Duration = Duration::from_millis(120);
-/// A request that has been under way for longer is not given up for the sake of the preview's size.
-const TOO_DEAR_TO_RESTART: Duration = Duration::from_secs(1);
+const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
 /// The first request.
 pub(super) fn start(state: &mut State) -> Vec<Effect> {
@@ -52,7 +49,7 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
 /// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
 fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.generation += 1;
-    state.requested = state.preview_size();
+    state.requested = Layout::preview_size(state);
     state.resize_due = None;
     state.dirty = true;
     let request = Request {
@@ -60,7 +57,7 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.scene.clone(),
         overrides: state.overrides(),
         preview: state.requested,
-        write: state.view() == state.base_view(),
+        write: if state.view() == state.base_view() { Writing::Try } else { Writing::No },
         force,
     };
     let mut effects = Vec::new();
@@ -101,7 +98,7 @@ fn shown(state: &mut State, generation: u64) -> Vec<Effect> {
 fn resize(state: &mut State, window: Window) -> Vec<Effect> {
     state.window = window;
     state.dirty = true;
-    state.resize_due = (state.preview_size() != state.requested).then(|| state.now + RESIZE_QUIET);
+    state.resize_due = (Layout::preview_size(state) != state.requested).then(|| state.now + RESIZE_QUIET);
     Vec::new()
 }
 
@@ -114,23 +111,17 @@ fn tick(state: &mut State) -> Vec<Effect> {
         return Vec::new();
     }
     state.resize_due = None;
-    if state.paused || state.running_for().is_some_and(|time| time > TOO_DEAR_TO_RESTART) {
-        return Vec::new();
-    }
     resized_preview(state)
 }
 
-/// Another preview where the window has another size than the one that was asked for.
+/// The same picture at another size where the window has another one than was asked for; what is rendered goes on.
 fn resized_preview(state: &mut State) -> Vec<Effect> {
-    let change = state.change;
-    let size = state.preview_size();
+    let size = Layout::preview_size(state);
     if size == state.requested || size.is_none() {
         return Vec::new();
     }
-    let effects = render(state, false);
-    // A save that is still on its way is measured to the picture that replaces its own.
-    state.change = change.map(|change| PendingChange { generation: state.generation, ..change });
-    effects
+    state.requested = size;
+    vec![Effect::Send(Command::Preview(size))]
 }
 
 fn signalled(signal: Signal) -> Effect {

@@ -1,6 +1,6 @@
 //! What the worker's events do to the state. Those of older generations do nothing.
 
-use super::{resized_preview, say};
+use super::say;
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
@@ -33,12 +33,14 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             state.asked_to_write = false;
             say(state, format!("error: {}", visible(&message)));
         }
-        Event::Done { report, warnings, unchanged, .. } => {
-            return done(state, report, warnings, unchanged);
+        Event::WritePostponed { .. } => {
+            say(state, "the image is written as soon as every pixel has a sample");
         }
+        Event::Done { report, warnings, unchanged, .. } => done(state, report, warnings, unchanged),
         Event::Failed { failure, .. } => failed(state, failure),
         Event::Cancelled { .. } => {
             state.activity = Activity::Cancelled;
+            state.set_paused(false);
             state.assets.clear();
         }
     }
@@ -55,6 +57,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Preview { generation }
         | Event::Written { generation, .. }
         | Event::WriteFailed { generation, .. }
+        | Event::WritePostponed { generation }
         | Event::Files { generation, .. }
         | Event::Done { generation, .. }
         | Event::Failed { generation, .. }
@@ -102,7 +105,7 @@ fn mended(state: &mut State) {
     }
 }
 
-fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) -> Vec<Effect> {
+fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
     mended(state);
     for stage in &report.stages {
         record(state, stage.clone());
@@ -120,7 +123,6 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
         state.change = None;
         state.first_change = None;
     }
-    resized_preview(state)
 }
 
 fn failed(state: &mut State, failure: Failure) {

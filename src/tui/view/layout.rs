@@ -2,6 +2,7 @@
 
 use ratatui::layout::Rect;
 
+use crate::pipeline::protocol::PreviewSize;
 use crate::tui::state::{PreviewKind, State};
 
 /// The areas of the screen; one that has no room is empty.
@@ -30,6 +31,16 @@ impl Layout {
     /// For the state's window.
     pub(in crate::tui) fn of(state: &State) -> Self {
         Self::new(state.window.columns, state.window.rows, state.preview)
+    }
+
+    /// The preview that the window has room for: a box of square pixels, each as wide as a cell.
+    pub(in crate::tui) fn preview_size(state: &State) -> Option<PreviewSize> {
+        if state.preview == PreviewKind::None {
+            return None;
+        }
+        let area = Self::of(state).preview;
+        let height = (f32::from(area.height) * state.window.cell_aspect).round() as u32;
+        (area.width > 0 && height > 0).then_some(PreviewSize { width: u32::from(area.width), height })
     }
 
     fn new(columns: u16, rows: u16, preview: PreviewKind) -> Self {

@@ -11,7 +11,6 @@ use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP};
 use crate::tui::state::{Activity, PreviewKind, State};
-use crate::tui::update::shadows;
 
 /// The scene's name and size on the left, what is going on on the right.
 pub(super) fn header(state: &State, area: Rect, buffer: &mut Buffer) {
@@ -98,7 +97,7 @@ pub(super) fn status(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.status;
     let help = keymap::of(Action::ToggleHelp).map_or(String::new(), |it| format!("{} {}", it.label, it.hint));
     let mut words = vec![
-        format!("shadows {}", shadows(state)),
+        format!("shadows {}", state.shadows()),
         format!("photons {}", on_off(state.effective.as_ref().is_some_and(|it| it.photons))),
         format!("dof {}", on_off(depth_of_field(state))),
         format!("view {}", state.view().name()),

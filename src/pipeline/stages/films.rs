@@ -1,0 +1,161 @@
+//! The films of the last settings: a toggle that is switched back finds its film again.
+
+use super::super::fingerprint::Key;
+use super::canvas::Canvas;
+
+/// Memory for films that are not the current one.
+const MOST_KEPT_BYTES: u64 = 256 << 20;
+
+/// The current film and those before it.
+#[derive(Debug)]
+pub(in crate::pipeline) struct Films {
+    current: Option<Canvas>,
+    /// The least recently used first.
+    kept: Vec<Canvas>,
+    most_kept_bytes: u64,
+}
+
+impl Default for Films {
+    fn default() -> Self {
+        Self { current: None, kept: Vec::new(), most_kept_bytes: MOST_KEPT_BYTES }
+    }
+}
+
+impl Films {
+    pub(in crate::pipeline) fn current(&self) -> Option<&Canvas> {
+        self.current.as_ref()
+    }
+
+    pub(in crate::pipeline) fn current_mut(&mut self) -> Option<&mut Canvas> {
+        self.current.as_mut()
+    }
+
+    /// The film of this key becomes the current one if it is kept and of use; else there is none. The one before is
+    /// kept where there is room for it.
+    pub(super) fn select(&mut self, key: Key, is_usable: impl FnOnce(&Canvas) -> bool) {
+        if self.current.as_ref().is_none_or(|current| current.key != key) {
+            let kept = self.kept.iter().position(|canvas| canvas.key == key);
+            let found = kept.map(|index| self.kept.remove(index));
+            if let Some(before) = std::mem::replace(&mut self.current, found) {
+                self.keep(before);
+            }
+        }
+        self.current.take_if(|current| !is_usable(current));
+    }
+
+    /// A film in the place of the current one. Where there is no memory for it beside those that are kept, they go.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub(super) fn put<E>(&mut self, make: impl Fn() -> Result<Canvas, E>) -> Result<&mut Canvas, E> {
+        self.current = None;
+        let canvas = match make() {
+            Err(_) if !self.kept.is_empty() => {
+                self.kept.clear();
+                make()
+            }
+            made => made,
+        }?;
+        Ok(self.current.insert(canvas))
+    }
+
+    /// How many there are.
+    pub(in crate::pipeline) fn count(&self) -> usize {
+        self.kept.len() + usize::from(self.current.is_some())
+    }
+
+    /// Bytes that all of them take.
+    pub(in crate::pipeline) fn memory_bytes(&self) -> u64 {
+        self.kept.iter().chain(&self.current).map(Canvas::memory_bytes).sum()
+    }
+
+    /// One too large for the budget is dropped alone; the others make room for one that is not.
+    fn keep(&mut self, canvas: Canvas) {
+        let size = canvas.memory_bytes();
+        if size > self.most_kept_bytes || canvas.units(|tile| canvas.done[tile]) == 0 {
+            return;
+        }
+        while self.kept.iter().map(Canvas::memory_bytes).sum::<u64>() + size > self.most_kept_bytes {
+            self.kept.remove(0);
+        }
+        self.kept.push(canvas);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::pipeline::fingerprint::Fingerprint;
+    use crate::pipeline::plan::plan;
+    use crate::pipeline::tests::loaded_of;
+
+    fn key(name: &str) -> Key {
+        Fingerprint::new(name).finish()
+    }
+
+    /// Of 64×32 pixels, with samples.
+    fn canvas(name: &str) -> Canvas {
+        let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
+        let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
+        let mut canvas = Canvas::new(key(name), &plan, u64::MAX).expect("a film");
+        canvas.done.fill(1);
+        canvas
+    }
+
+    fn films(names: &[&str], most_kept_bytes: u64) -> Films {
+        let mut films = Films { most_kept_bytes, ..Films::default() };
+        for name in names {
+            films.select(key(name), |_| true);
+            films.put(|| Ok::<_, ()>(canvas(name))).expect("a film");
+        }
+        films
+    }
+
+    fn finds(films: &mut Films, name: &str) -> bool {
+        films.select(key(name), |_| true);
+        films.current().is_some_and(|current| current.key == key(name))
+    }
+
+    #[test]
+    fn the_least_recently_used_go_first() {
+        let room_for_two = 2 * canvas("a").memory_bytes();
+        let mut films = films(&["a", "b", "c"], room_for_two);
+        assert_eq!(films.count(), 3);
+        assert_eq!(films.memory_bytes(), 3 * canvas("a").memory_bytes());
+        assert!(finds(&mut films, "a"), "the oldest is there, and is now the newest");
+        assert!(!finds(&mut films, "d"), "never seen; a, b and c do not all fit beside it");
+        assert!(finds(&mut films, "a") && finds(&mut films, "c"));
+        assert!(!finds(&mut films, "b"));
+    }
+
+    #[test]
+    fn a_film_beyond_the_budget_is_dropped_and_costs_the_others_nothing() {
+        let mut films = films(&["a", "b"], canvas("a").memory_bytes());
+        films
+            .put(|| {
+                let mut large = canvas("large");
+                large.base = Some(crate::film::RadianceImage::black(100, 100));
+                Ok::<_, ()>(large)
+            })
+            .expect("a film");
+        assert!(finds(&mut films, "a"));
+        assert!(!finds(&mut films, "large"));
+    }
+
+    #[test]
+    fn what_is_of_no_use_is_dropped_and_kept_films_make_room_for_a_new_one() {
+        let mut films = films(&["a", "b"], u64::MAX);
+        films.select(key("a"), |_| false);
+        assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));
+        films.select(key("c"), |_| true);
+        let tries = std::cell::Cell::new(0);
+        let made = films.put(|| {
+            tries.set(tries.get() + 1);
+            if tries.get() == 1 { Err("no memory") } else { Ok(canvas("c")) }
+        });
+        assert!(made.is_ok());
+        assert_eq!(films.count(), 1);
+    }
+}

@@ -1,0 +1,100 @@
+//! The film as it is, at the size of a screen, into the slot.
+
+use std::time::{Duration, Instant};
+
+use rayon::ThreadPool;
+
+use super::super::plan::Plan;
+use super::super::protocol::PreviewSize;
+use super::super::sink::Sink;
+use super::canvas::Canvas;
+use crate::control::CancelToken;
+use crate::film::{Previewer, tone::develop};
+
+/// The longest that a film is taken up without a look at the orders.
+const PATIENCE: Duration = Duration::from_millis(4);
+
+/// What is shown, and where.
+#[derive(Clone, Copy)]
+pub(in crate::pipeline) struct Screen<'a> {
+    /// None: nothing is shown.
+    pub(in crate::pipeline) bounds: Option<PreviewSize>,
+    pub(in crate::pipeline) plan: &'a Plan,
+    pub(in crate::pipeline) sink: &'a Sink,
+}
+
+impl Screen<'_> {
+    /// Columns and rows of the pictures.
+    pub(super) fn size(&self) -> Option<(u32, u32)> {
+        let settings = &self.plan.settings;
+        self.bounds.and_then(|bounds| fit(settings.width, settings.height, bounds))
+    }
+
+    /// The whole film, unless that is cancelled. For when no tile is being rendered, as the pool helps.
+    pub(in crate::pipeline) fn show(&self, canvas: &mut Canvas, pool: &ThreadPool, token: &CancelToken) {
+        let Some(size) = self.size() else { return };
+        while !pool.install(|| catch_up(canvas, size)) {
+            if token.is_cancelled() {
+                return;
+            }
+        }
+        self.say(canvas);
+    }
+
+    /// The same between two tiles, on this thread and for a short time; what is left is for the next call. Whether a
+    /// picture came of it.
+    pub(super) fn show_some(&self, canvas: &mut Canvas) -> bool {
+        let Some(size) = self.size() else { return false };
+        catch_up(canvas, size);
+        let is_whole = canvas.previewer.as_ref().is_some_and(Previewer::is_whole);
+        if is_whole {
+            self.say(canvas);
+        }
+        is_whole
+    }
+
+    fn say(&self, canvas: &Canvas) {
+        if let Some(previewer) = &canvas.previewer {
+            let image = previewer.picture(canvas.base.as_ref());
+            self.sink.preview(develop(&image, &self.plan.tone));
+        }
+    }
+}
+
+/// Take up what changed, for a short time; whether that was all.
+fn catch_up(canvas: &mut Canvas, (width, height): (u32, u32)) -> bool {
+    canvas.previewer.take_if(|previewer| previewer.size() != (width, height));
+    let previewer = canvas.previewer.get_or_insert_with(|| Previewer::new(width, height));
+    previewer.update(&canvas.film, Some(Instant::now() + PATIENCE))
+}
+
+/// The largest picture of this aspect ratio inside the bounds.
+fn fit(width: u32, height: u32, bounds: PreviewSize) -> Option<(u32, u32)> {
+    if bounds.width == 0 || bounds.height == 0 {
+        return None;
+    }
+    let (w, h) = (u64::from(width), u64::from(height));
+    let (bound_w, bound_h) = (u64::from(bounds.width), u64::from(bounds.height));
+    let rounded = |a: u64, b: u64| ((2 * a + b) / (2 * b)).max(1);
+    let (w, h) = if w * bound_h >= h * bound_w {
+        (bound_w, rounded(h * bound_w, w).min(bound_h))
+    } else {
+        (rounded(w * bound_h, h).min(bound_w), bound_h)
+    };
+    Some((w as u32, h as u32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preview_keeps_the_aspect_ratio_inside_its_bounds() {
+        let bounds = |width, height| PreviewSize { width, height };
+        assert_eq!(fit(640, 480, bounds(80, 48)), Some((64, 48)));
+        assert_eq!(fit(640, 480, bounds(64, 100)), Some((64, 48)));
+        assert_eq!(fit(10_000, 1, bounds(80, 48)), Some((80, 1)));
+        assert_eq!(fit(1, 10_000, bounds(80, 48)), Some((1, 48)));
+        assert_eq!(fit(1, 1, bounds(0, 48)), None);
+    }
+}
