@@ -55,7 +55,7 @@ impl SurfacePoint {
         Self {
             point,
             shadow_point: point,
-            error: rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32),
+            error: error(point, reach),
             normal,
             shading_normal: normal,
             uv,
@@ -64,6 +64,12 @@ impl SurfacePoint {
             barycentric: Vec3::new(1.0 - uv.x - uv.y, uv.x, uv.y),
         }
     }
+}
+
+/// Bound on each component's error of a point that was computed in double precision from lengths up to `reach`, and of
+/// the next test from there.
+pub fn error(point: Vec3, reach: f64) -> Vec3 {
+    rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32)
 }
 
 /// Bound on the relative error of the `f64` arithmetic of a hit, its surface and the next test from there.
@@ -78,6 +84,7 @@ pub fn rounding_error(point: Vec3) -> Vec3 {
 /// stands, and towards −z where it lies and faces up.
 pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
     let across = DVec3::Y.cross(n);
-    let u = if across.length_squared() > 1e-12 { across.normalize() } else { DVec3::X };
+    let u = if across.length_squared() > 1e-12 { across } else { DVec3::X - n * n.x };
+    let u = u.normalize();
     (u, n.cross(u))
 }

@@ -5,6 +5,8 @@ mod direct;
 mod glass;
 mod mirror;
 mod robust;
+mod round;
+mod round_lights;
 mod scenes;
 mod shading;
 mod speckle;
