@@ -147,3 +147,81 @@ impl Cone {
 fn mirrored(p: DVec2) -> DVec2 {
     DVec2::new(p.x, -p.y)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::math::Vec3;
+
+    /// On the ground, its tip at y = 2, its base of radius 1.
+    fn hat(capped: bool) -> Cone {
+        Cone::new(DVec3::ZERO, DVec3::Y * 2.0, 1.0, capped)
+    }
+
+    fn met(cone: &Cone, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
+        let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
+        let hit = cone.intersect(&ray)?;
+        Some((hit.t, hit.primitive, cone.surface(&ray, &hit).normal))
+    }
+
+    #[test]
+    fn side_and_base_from_outside_and_inside() {
+        let right = Vec3::new(2.0, 1.0, 0.0).normalize();
+        let closed = hat(true);
+        assert_eq!(met(&closed, [9.0, 1.0, 0.0], Vec3::NEG_X), Some((8.5, 0, right)));
+        assert_eq!(met(&closed, [0.0, 1.0, 0.0], Vec3::X), Some((0.5, 0, right)));
+        assert_eq!(met(&closed, [0.5, -3.0, 0.0], Vec3::Y), Some((3.0, 1, Vec3::NEG_Y)));
+        assert_eq!(met(&closed, [0.5, 0.5, 0.0], Vec3::NEG_Y), Some((0.5, 1, Vec3::NEG_Y)));
+        assert_eq!(met(&closed, [0.5, 5.0, 0.0], Vec3::NEG_Y), Some((4.0, 0, right)));
+        // The image of the side beyond the tip is no part of it.
+        assert_eq!(met(&closed, [-9.0, 3.0, 0.0], Vec3::X), None);
+        assert_eq!(met(&closed, [0.5, 2.5, 0.0], Vec3::Y), None);
+    }
+
+    #[test]
+    fn lines_as_steep_as_the_side_meet_it_once() {
+        // Along (−1, 2): parallel to the left side, through the right one and the base.
+        let slope = Vec3::new(-1.0, -2.0, 0.0);
+        let right = Vec3::new(2.0, 1.0, 0.0).normalize();
+        for capped in [true, false] {
+            let into = met(&hat(capped), [2.5, 5.0, 0.0], slope);
+            assert_eq!(into, Some((2.0, 0, right)), "{capped}");
+        }
+        assert_eq!(met(&hat(false), [-0.5, -1.0, 0.0], -slope), Some((1.0, 0, right)));
+        assert_eq!(met(&hat(false), [-1.5, 1.0, 0.0], slope), None);
+        assert_eq!(met(&hat(true), [-1.5, 1.0, 0.0], slope), None);
+    }
+
+    #[test]
+    fn the_tip_is_as_sharp_as_it_is() {
+        // Rays past the tip at a millionth of its radius there decide right, near the tip as anywhere.
+        for below in [1e-3_f64, 1e-6, 1e-9] {
+            let radius = below / 2.0;
+            for (factor, is_hit) in [(1.0 - 1e-5, true), (1.0 + 1e-5, false)] {
+                let origin = DVec3::new(radius * factor, 2.0 - below, -5.0);
+                let ray = RayF64 { origin, direction: DVec3::Z, t_max: f64::INFINITY };
+                assert_eq!(hat(true).intersect(&ray).is_some(), is_hit, "{below} {factor}");
+            }
+        }
+    }
+
+    #[test]
+    fn texture_coordinates_rise_from_base_to_tip() {
+        let ray = Ray::new(Vec3::new(9.0, 0.5, 0.0), Vec3::NEG_X).to_f64();
+        let hit = hat(true).intersect(&ray).expect("aimed at it");
+        let surface = hat(true).surface(&ray, &hit);
+        assert_eq!(surface.uv, Vec2::new(0.5, 0.25));
+        assert!((surface.dpdv - Vec3::new(-1.0, 2.0, 0.0)).length() < 1e-6);
+        let (point, normal) = hat(true).side(0.5, 0.25);
+        assert!((point - DVec3::new(0.75, 0.5, 0.0)).length() < 1e-14);
+        assert!((normal.as_vec3() - surface.normal).length() < 1e-6);
+    }
+
+    #[test]
+    fn bounds_are_tight() {
+        let slanting = Cone::new(DVec3::ZERO, DVec3::new(3.0, 4.0, 0.0), 1.0, true).bounds();
+        assert!((slanting.min - Vec3::new(-0.8, -0.6, -1.0)).abs().max_element() < 1e-6);
+        assert!((slanting.max - Vec3::new(3.0, 4.0, 1.0)).abs().max_element() < 1e-6);
+    }
+}

@@ -124,3 +124,64 @@ impl Cylinder {
         end(-self.half_length).union(end(self.half_length))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::math::Vec3;
+
+    /// About the axis x = 1, z = 0, from y = 0 to y = 4.
+    fn bar(capped: bool) -> Cylinder {
+        Cylinder::new(DVec3::X, DVec3::new(1.0, 4.0, 0.0), 0.5, capped)
+    }
+
+    fn met(cylinder: &Cylinder, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
+        let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
+        let hit = cylinder.intersect(&ray)?;
+        Some((hit.t, hit.primitive, cylinder.surface(&ray, &hit).normal))
+    }
+
+    #[test]
+    fn side_and_caps_from_outside_and_inside() {
+        let closed = bar(true);
+        let (down, up) = (Vec3::NEG_Y, Vec3::Y);
+        assert_eq!(met(&closed, [-3.0, 1.0, 0.0], Vec3::X), Some((3.5, 0, Vec3::NEG_X)));
+        assert_eq!(met(&closed, [1.0, 1.0, 0.0], Vec3::X), Some((0.5, 0, Vec3::X)));
+        assert_eq!(met(&closed, [1.25, 9.0, 0.25], down), Some((5.0, 2, up)));
+        assert_eq!(met(&closed, [1.25, 3.0, 0.25], down), Some((3.0, 1, down)));
+        assert_eq!(met(&closed, [1.25, -3.0, 0.25], up), Some((3.0, 1, down)));
+        assert_eq!(met(&closed, [1.25, 5.0, 0.25], up), None);
+        assert_eq!(met(&closed, [1.6, -3.0, 0.0], up), None);
+        assert_eq!(met(&closed, [-3.0, 4.5, 0.0], Vec3::X), None);
+    }
+
+    #[test]
+    fn a_tube_is_seen_through() {
+        let tube = bar(false);
+        assert_eq!(met(&tube, [1.25, 9.0, 0.25], Vec3::NEG_Y), None);
+        // In at the upper end, out through the side at x = 1.5 from inside: the front is still outside.
+        let slanting = met(&tube, [0.5, 5.0, 0.0], Vec3::new(1.0, -2.0, 0.0));
+        assert_eq!(slanting, Some((1.0, 0, Vec3::X)));
+    }
+
+    #[test]
+    fn texture_coordinates_go_around_and_along() {
+        let ray = Ray::new(Vec3::new(9.0, 3.0, 0.0), Vec3::NEG_X).to_f64();
+        let hit = bar(true).intersect(&ray).expect("aimed at it");
+        let surface = bar(true).surface(&ray, &hit);
+        assert_eq!(surface.uv, Vec2::new(0.5, 0.75));
+        assert!((surface.dpdv - Vec3::Y * 4.0).length() < 1e-6);
+        assert!((surface.dpdu - Vec3::NEG_Z * std::f32::consts::PI).length() < 1e-6);
+        let (point, normal) = bar(true).side(0.5, 0.75);
+        assert!((point - DVec3::new(1.5, 3.0, 0.0)).length() < 1e-14 && (normal - DVec3::X).length() < 1e-14);
+    }
+
+    #[test]
+    fn bounds_are_tight() {
+        let slanting = Cylinder::new(DVec3::ZERO, DVec3::new(3.0, 4.0, 0.0), 1.0, true).bounds();
+        // A disk of radius 1 reaches √(1 − n²) along an axis.
+        assert!((slanting.min - Vec3::new(-0.8, -0.6, -1.0)).abs().max_element() < 1e-6);
+        assert!((slanting.max - Vec3::new(3.8, 4.6, 1.0)).abs().max_element() < 1e-6);
+    }
+}

@@ -88,3 +88,20 @@ pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
     let u = u.normalize();
     (u, n.cross(u))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tangents_are_perpendicular_also_next_to_the_vertical() {
+        for tilt in [0.0, 1e-9, 9e-7, 1.1e-6, 0.3, 1.0] {
+            for n in [DVec3::new(tilt, 1.0, 0.0), DVec3::new(-tilt, -1.0, tilt)].map(DVec3::normalize) {
+                let (u, v) = flat_axes(n);
+                let off = [u.dot(n), v.dot(n), u.dot(v), u.length() - 1.0, u.cross(v).dot(n) - 1.0];
+                assert!(off.iter().all(|off| off.abs() < 1e-15), "{n}: {off:?}");
+            }
+        }
+        assert_eq!(flat_axes(DVec3::Y), (DVec3::X, DVec3::NEG_Z));
+    }
+}

@@ -17,6 +17,9 @@ use crate::math::DVec3;
 /// More than halving takes from the whole line to its last digit.
 const MOST_STEPS: u32 = 200;
 
+/// Half the width of the neighbourhood of the axis in which slopes change their sign.
+const KINK: f64 = 1e-9;
+
 /// A line near a torus about z whose circle has radius 1.
 pub(super) struct UnitLine {
     /// The line's point nearest to the centre.
@@ -89,7 +92,8 @@ impl UnitLine {
         }
     }
 
-    /// The ends of the piece on which g is concave, where q³ < w; on the axis they are one place, of a kink.
+    /// The ends of the piece on which g is concave, where q³ < w. A line through the axis has a kink there, which the
+    /// piece is kept wide enough to hold: nothing is crossed so near to the axis.
     fn inflections(&self) -> Option<[f64; 2]> {
         let (p, d) = (self.foot.truncate(), self.direction.truncate());
         let a = d.length_squared();
@@ -97,7 +101,7 @@ impl UnitLine {
         let ring = w.cbrt();
         let half = ((ring * ring - w / a) / a).sqrt();
         let middle = -p.dot(d) / a;
-        (half >= 0.0).then_some([middle - half, middle + half])
+        (half >= 0.0).then(|| [middle - half.max(KINK), middle + half.max(KINK)])
     }
 
     /// The first crossing on a piece that starts on a known side.
@@ -141,14 +145,83 @@ impl UnitLine {
                 return None;
             }
             let next = x.s - x.value / x.slope;
-            if x.value * sign <= 0.0 || !(next > x.s) {
+            if !(next > x.s) {
                 break;
             }
             if !(next < high.s) {
                 return None;
             }
+            let before = x;
             x = self.at(next);
+            if x.value * sign <= 0.0 {
+                // Rounding went too far.
+                return Some(self.between(before.s, x.s, before, sign < 0.0));
+            }
         }
         Some(x.s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A small generator for lines.
+    fn random(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((*state >> 11) as f64) / (1_u64 << 53) as f64 * 2.0 - 1.0
+    }
+
+    /// Lines that come near the circle, some along the axis or through it.
+    fn lines(tube: f64) -> impl Iterator<Item = UnitLine> {
+        let mut state = 3;
+        (0..30_000).map(move |i| {
+            let mut next = || random(&mut state);
+            let (sin, cos) = (next() * 4.0).sin_cos();
+            let near = DVec3::new(cos, sin, 0.0) + DVec3::new(next(), next(), next()) * (1.2 * tube);
+            let direction = match i % 4 {
+                0 => DVec3::Z,
+                1 => near - DVec3::Z * next(),
+                _ => DVec3::new(next(), next(), next()),
+            };
+            let direction = direction.normalize();
+            UnitLine { foot: near - direction * near.dot(direction), direction, tube }
+        })
+    }
+
+    #[test]
+    fn crossings_have_all_their_digits_however_slim_the_tube() {
+        for tube in [1e-6, 1e-3, 0.3, 0.99] {
+            let mut found = 0;
+            for line in lines(tube) {
+                let Some((from, to)) = line.surroundings(0.01) else { continue };
+                let Some(s) = line.first_crossing(from, to) else { continue };
+                found += 1;
+                let p = line.foot + line.direction * s;
+                let off = ((p.truncate().length() - 1.0).hypot(p.z) - tube).abs();
+                assert!(off < 2e-15, "{off} at tube {tube}");
+            }
+            assert!(found > 10_000, "{found}");
+        }
+    }
+
+    #[test]
+    fn between_inflections_the_slope_rises_and_falls_as_told() {
+        for line in lines(0.4) {
+            let Some([first, second]) = line.inflections() else { continue };
+            let slope = |s: f64| line.at(s).slope;
+            for (low, high, is_convex) in
+                [(first - 1.0, first, true), (first, second, false), (second, second + 1.0, true)]
+            {
+                let steps = (0..=8).map(|i| slope(low + (high - low) * (0.01 + 0.98 * f64::from(i) / 8.0)));
+                let steps: Vec<f64> = steps.collect();
+                let room = 1e-9;
+                let right = steps.windows(2).all(|pair| {
+                    let rise = pair[1] - pair[0];
+                    if is_convex { rise > -room } else { rise < room }
+                });
+                assert!(right, "{steps:?} convex {is_convex} from {low} to {high}");
+            }
+        }
     }
 }

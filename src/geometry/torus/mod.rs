@@ -117,3 +117,70 @@ impl Torus {
         self.frame.ball_bounds(0.0, self.radius, self.tube)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+
+    /// About y, from 1.5 to 2.5.
+    fn ring() -> Torus {
+        Torus::new(DVec3::ZERO, DVec3::Y * 7.0, 2.0, 0.5)
+    }
+
+    fn met(origin: [f32; 3], direction: Vec3) -> Option<(f32, Vec3)> {
+        let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
+        let hit = ring().intersect(&ray)?;
+        Some((hit.t, ring().surface(&ray, &hit).normal))
+    }
+
+    #[test]
+    fn the_four_roots_of_a_line_through_the_middle() {
+        for (x, expected) in [
+            (-9.0, Some((6.5, Vec3::NEG_X))),
+            (-2.0, Some((0.5, Vec3::X))),
+            (0.0, Some((1.5, Vec3::NEG_X))),
+            (2.25, Some((0.25, Vec3::X))),
+            (2.75, None),
+        ] {
+            assert_eq!(met([x, 0.0, 0.0], Vec3::X), expected, "from {x}");
+        }
+    }
+
+    #[test]
+    fn lines_along_the_axis() {
+        assert_eq!(met([0.0, 9.0, 0.0], Vec3::NEG_Y), None);
+        assert_eq!(met([1.499, 9.0, 0.0], Vec3::NEG_Y), None);
+        assert_eq!(met([2.0, 9.0, 0.0], Vec3::NEG_Y), Some((8.5, Vec3::Y)));
+        assert_eq!(met([2.0, 0.25, 0.0], Vec3::NEG_Y), Some((0.75, Vec3::NEG_Y)));
+        assert_eq!(met([2.501, 9.0, 0.0], Vec3::NEG_Y), None);
+    }
+
+    #[test]
+    fn starts_on_the_surface_are_no_hits() {
+        assert_eq!(met([2.5, 0.0, 0.0], Vec3::X), None);
+        assert_eq!(met([2.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(1.0));
+        assert_eq!(met([1.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(3.0));
+    }
+
+    #[test]
+    fn texture_coordinates_are_in_the_middle_outside() {
+        let ray = Ray::new(Vec3::new(9.0, 0.0, 0.0), Vec3::NEG_X).to_f64();
+        let hit = ring().intersect(&ray).expect("aimed at it");
+        let surface = ring().surface(&ray, &hit);
+        let pi = std::f32::consts::PI;
+        assert_eq!(surface.uv, Vec2::splat(0.5));
+        assert!((surface.dpdu - Vec3::NEG_Z * (5.0 * pi)).length() < 1e-5);
+        assert!((surface.dpdv - Vec3::Y * pi).length() < 1e-5);
+        let (point, normal) = ring().place(0.5, 0.75);
+        assert!((point - DVec3::new(2.0, 0.5, 0.0)).length() < 1e-14 && (normal - DVec3::Y).length() < 1e-14);
+    }
+
+    #[test]
+    fn bounds_are_tight() {
+        let slanting = Torus::new(DVec3::ZERO, DVec3::new(3.0, 4.0, 0.0), 2.0, 0.5).bounds();
+        for corner in [-slanting.min, slanting.max] {
+            assert!((corner - Vec3::new(2.1, 1.7, 2.5)).abs().max_element() < 1e-6);
+        }
+    }
+}

@@ -162,7 +162,8 @@ fn tori_are_hit_where_their_distance_is_nothing() {
                         let off = if i % 4 < 2 { 0.0 } else { 10.0_f64.powf(-8.0 * random.unit()) };
                         Ray::new((center + out * (across + off) - n * 5.0).as_vec3(), n.as_vec3())
                     }
-                    // In the plane of the circle.
+                    // In the plane of the circle, and there through the axis.
+                    _ if i % 12 < 6 => aim(center + out * 6.0, center),
                     _ => aim(
                         center + n.cross(random.direction()) * 6.0,
                         center + out * (radius * random.unit()),

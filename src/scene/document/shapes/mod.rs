@@ -83,8 +83,8 @@ fn direction(table: &Table<'_>, name: &'static str, what: &str) -> Option<DVec3>
     let direction = if key.is_given() { key.vector(Limits::Any)? } else { DVec3::Y };
     if direction.try_normalize().is_none() {
         let issue = Issue::error(key.span()?, format!("the {what} has no direction"))
-            .label("a vector of length 0")
-            .help(format!("`{name}` may have any other length, such as [0, 1, 0] for upwards"));
+            .label(format!("`{name}` is of length 0"))
+            .help("any other length will do, such as [0, 1, 0] for upwards");
         table.context.report(issue);
         return None;
     }
