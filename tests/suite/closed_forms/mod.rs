@@ -7,6 +7,7 @@ mod mirror;
 mod robust;
 mod round;
 mod round_lights;
+mod round_properties;
 mod scenes;
 mod shading;
 mod speckle;
