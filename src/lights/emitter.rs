@@ -1,6 +1,7 @@
 //! Shapes that emit.
 
 use super::rectangle::{QuadEmitter, SeenQuad};
+use super::round::RoundEmitter;
 use super::sphere::{SeenSphere, SphereEmitter};
 use super::triangles::TriangleEmitter;
 use super::{LightSample, Source};
@@ -26,6 +27,8 @@ pub enum Emitter {
     Quad(QuadEmitter),
     /// Triangles.
     Triangles(TriangleEmitter),
+    /// A disk, cylinder, cone or torus.
+    Round(RoundEmitter),
 }
 
 impl AreaLight {
@@ -35,6 +38,7 @@ impl AreaLight {
             Emitter::Sphere(sphere) => SeenShape::Sphere(sphere.seen_from(point)?),
             Emitter::Quad(quad) => SeenShape::Quad(quad.seen_from(point)?),
             Emitter::Triangles(triangles) => SeenShape::Triangles(triangles, point),
+            Emitter::Round(round) => SeenShape::Round(round, point),
         };
         Some(SeenLight::Area(self, shape))
     }
@@ -46,6 +50,7 @@ impl AreaLight {
             Emitter::Sphere(sphere) => sphere.middle(point, self.radiance, source),
             Emitter::Quad(quad) => quad.middle(point, self.radiance, source),
             Emitter::Triangles(triangles) => triangles.middle(point, self.radiance, self.object),
+            Emitter::Round(round) => round.middle(point, self.radiance, self.object),
         }
     }
 }
@@ -68,6 +73,8 @@ pub enum SeenShape<'a> {
     Quad(SeenQuad<'a>),
     /// Triangles, and the point.
     Triangles(&'a TriangleEmitter, Vec3),
+    /// A disk, cylinder, cone or torus, and the point.
+    Round(&'a RoundEmitter, Vec3),
 }
 
 impl SeenLight<'_> {
@@ -83,6 +90,7 @@ impl SeenLight<'_> {
                     SeenShape::Triangles(triangles, point) => {
                         triangles.sample(*point, u, light.radiance, light.object)
                     }
+                    SeenShape::Round(round, point) => round.sample(*point, u, light.radiance, light.object),
                 }
             }
         }

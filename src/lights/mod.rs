@@ -3,6 +3,7 @@
 pub mod emitter;
 pub mod point;
 pub mod rectangle;
+pub mod round;
 pub mod sphere;
 pub mod triangles;
 
