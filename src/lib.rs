@@ -38,7 +38,7 @@
 //! accel       -> geometry math control
 //! sampling    -> math
 //! materials   -> math
-//! lights      -> sampling math
+//! lights      -> geometry sampling math
 //! scene       -> math system
 //! assets      -> geometry materials math control system
 //! world       -> scene assets accel materials lights geometry math control
