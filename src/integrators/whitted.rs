@@ -3,6 +3,7 @@
 
 use super::batch::{PathRay, Queues, RayQueue, ShadowQueue, Tracer};
 use super::direct::{self, PhongVertex};
+use super::medium::Inside;
 use super::{POLL_INTERVAL, RayCounters, View, glass};
 use crate::control::Cancelled;
 use crate::geometry::ray::offset_origin;
@@ -102,8 +103,9 @@ impl Wave<'_> {
     fn shade(&mut self, mut path: PathRay, hit: &Hit) {
         let world = self.tracer.world;
         let surface = world.geometry.surface(&path.ray, hit);
-        let material = &world.materials[world.material_index(hit)];
-        path.throughput *= glass::absorption(world, &path, hit, &surface);
+        let index = world.material_index(hit);
+        let material = &world.materials[index];
+        path.throughput *= glass::absorption(world, &path, hit.shape.t, &surface, material);
         let emission = material.emission();
         let front = surface.normal.dot(path.ray.direction) < 0.0;
         if emission != Vec3::ZERO && front && self.tracer.settings.view == View::Beauty {
@@ -115,7 +117,10 @@ impl Wave<'_> {
         match material {
             Material::Phong(phong) => self.shade_phong(&path, &surface, phong),
             Material::Mirror(mirror) => self.shade_mirror(&path, &surface, mirror),
-            Material::Glass(glass) => self.shade_glass(&path, hit, &surface, glass),
+            Material::Glass(glass) => {
+                let part = Inside { object: hit.object, material: index as u32 };
+                self.shade_glass(&path, part, &surface, glass);
+            }
         }
     }
 
