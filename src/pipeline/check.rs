@@ -6,12 +6,10 @@ use std::sync::mpsc;
 use super::engine::Engine;
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
-use super::stages::parse::Parsed;
 use super::trace::Kernel;
 use crate::math::Vec3;
-use crate::scene::description::{Encoding, MaterialKind, Object, Shape};
+use crate::scene::description::{MaterialKind, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
-use crate::world::{NeededTexture, SourceEncoding, TextureSource};
 
 /// What a scene that is right consists of.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +34,7 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
     let (events, _) = mpsc::channel();
     let sink = Sink { generation: 0, events, previews: PreviewSlot::default() };
     let kernel: Kernel = super::worker::KERNEL;
-    let (parsed, meshes, textures, warnings) = Engine::new(kernel).read_all(path, &sink, add_declared)?;
+    let (parsed, meshes, textures, warnings) = Engine::new(kernel).read_all(path, &sink)?;
     let scene = &parsed.loaded.scene;
     let triangles = |shape: &Shape| match shape {
         Shape::Mesh { file, .. } => meshes[*file].mesh.mesh.triangles.len() as u64,
@@ -58,25 +56,4 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
         lights: (scene.lights.len() + scene.objects.iter().filter(emits).count()) as u64,
         warnings,
     })
-}
-
-/// The textures of the scene file that no visible material names.
-fn add_declared(parsed: &Parsed, wanted: &mut Vec<NeededTexture>) {
-    for (index, texture) in parsed.loaded.scene.textures.iter().enumerate() {
-        if wanted.iter().any(|one| one.source.path == texture.file.value) {
-            continue;
-        }
-        let encoding = match texture.encoding {
-            Encoding::Auto => SourceEncoding::Color,
-            Encoding::Srgb => SourceEncoding::Srgb,
-            Encoding::Linear => SourceEncoding::Linear,
-        };
-        let source = TextureSource { path: texture.file.value.clone(), encoding };
-        wanted.push(NeededTexture {
-            source,
-            name: texture.name.clone(),
-            declared: Some(index),
-            mesh_file: None,
-        });
-    }
 }

@@ -16,7 +16,7 @@ use super::stages::accel::{AccelCache, Ingredients, Keyed, accel, needed};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
 use super::stages::render::{Canvas, Order, render};
-use super::stages::textures::{TextureCache, Textures, textures};
+use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::write::{Written, check_targets, write};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
 use super::table::Table;
@@ -295,7 +295,6 @@ impl Engine {
         &mut self,
         path: &Path,
         sink: &Sink,
-        declared: impl Fn(&Parsed, &mut Vec<crate::world::NeededTexture>),
     ) -> Result<(Arc<Parsed>, Meshes, Textures, Vec<Diagnostic>), Failure> {
         let token = CancelToken::new();
         let mut findings = Findings::default();
@@ -306,7 +305,7 @@ impl Engine {
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
             let mut wanted = needed(loaded, &found);
-            declared(&parsed, &mut wanted);
+            add_declared(loaded, &mut wanted);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             Ok((parsed, found, texels))
         };

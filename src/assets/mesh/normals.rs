@@ -16,11 +16,6 @@ const COMPARED: usize = 64;
 /// Triangles whose weights are held at a time.
 const BATCH: usize = 1 << 16;
 
-/// Give the mesh the normals of [`vertex_normals`], in place of any that it has.
-pub fn smooth_normals(mesh: &mut TriangleMesh) {
-    mesh.normals = vertex_normals(mesh);
-}
-
 /// A unit normal for each vertex, weighted by angle, on the front side of the faces around it. Vertices that the
 /// file separates at one place get one normal where their own agree within 45 degrees. Where faces cancel each
 /// other, the vertex gets one face's normal. The result does not depend on the number of threads.

@@ -17,6 +17,7 @@ use crate::assets::image::{ImageEncoding, ImageLimits, load};
 use crate::control::Cancelled;
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
+use crate::scene::description::Encoding;
 use crate::world::{NeededTexture, SourceEncoding, TextureSource};
 
 /// The cache of textures: one entry per file and reading of its numbers.
@@ -83,6 +84,27 @@ pub(in crate::pipeline) fn textures(
         }
     }
     Ok(loaded_and_kept(textures, counts))
+}
+
+/// For `check`: also the textures of the scene file that no visible material names.
+pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
+    for (index, texture) in loaded.scene.textures.iter().enumerate() {
+        if wanted.iter().any(|one| one.source.path == texture.file.value) {
+            continue;
+        }
+        let encoding = match texture.encoding {
+            Encoding::Auto => SourceEncoding::Color,
+            Encoding::Srgb => SourceEncoding::Srgb,
+            Encoding::Linear => SourceEncoding::Linear,
+        };
+        let source = TextureSource { path: texture.file.value.clone(), encoding };
+        wanted.push(NeededTexture {
+            source,
+            name: texture.name.clone(),
+            declared: Some(index),
+            mesh_file: None,
+        });
+    }
 }
 
 fn load_one(
