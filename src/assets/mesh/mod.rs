@@ -6,6 +6,7 @@ mod mtl;
 mod normals;
 mod obj;
 mod off;
+mod places;
 mod ply;
 mod polygon;
 mod text;
