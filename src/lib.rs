@@ -42,7 +42,7 @@
 //! world       -> scene assets accel materials lights geometry sampling math control
 //! film        -> math
 //! integrators -> world scene materials lights geometry sampling film math control
-//! output      -> film math
+//! output      -> film math control
 //! pipeline    -> integrators world assets scene film output geometry materials math control
 //! tui         -> pipeline scene film math
 //! cli         -> pipeline tui output scene film

@@ -60,6 +60,9 @@ pub enum OutputError {
         /// What to do.
         way_out: &'static str,
     },
+    /// The work was told to stop.
+    #[error("cancelled")]
+    Cancelled(#[from] crate::control::Cancelled),
     /// The system refused.
     #[error("cannot write {}: {}; {}", path.display(), words(source), way_out(source))]
     File {

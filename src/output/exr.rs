@@ -1,14 +1,18 @@
 //! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP.
 
-use std::io::Cursor;
-
 use ::exr::meta::attribute::{Chromaticities, Text};
 use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage};
 
+use super::stoppable::Stoppable;
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_light, one_line};
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, OutputError> {
+pub(super) fn encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
     let size = (image.width as usize, image.height as usize);
     let pixel = |position: Vec2<usize>| {
         let color = image.pixels[position.y() * size.0 + position.x()];
@@ -18,10 +22,10 @@ pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<V
     let layer = Layer::new(size, attributes(options), Encoding::SMALL_LOSSLESS, channels);
     let mut file = Image::from_layer(layer);
     file.attributes.chromaticities = Some(REC_709);
-    let mut bytes = Vec::new();
-    let written = file.write().to_buffered(Cursor::new(&mut bytes));
+    let mut bytes = Stoppable::new(token);
+    let written = file.write().to_buffered(&mut bytes);
     written.map_err(|error| OutputError::encoder(Format::Exr, &error))?;
-    Ok(bytes)
+    Ok(bytes.into_bytes())
 }
 
 /// ITU-R BT.709 primaries, D65 white.

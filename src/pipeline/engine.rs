@@ -105,9 +105,9 @@ impl Engine {
             return say_write_failed(sink, "there is no picture yet".to_owned());
         };
         self.written.forget();
-        if let Err(message) = write(canvas, plan, &mut self.written, &self.contents, sink) {
-            say_write_failed(sink, message);
-        }
+        // A token that nobody cancels: this picture was asked for by hand.
+        let token = CancelToken::new();
+        say_if_failed(sink, write(canvas, plan, &mut self.written, &self.contents, sink, &token));
     }
 
     fn run(
@@ -125,7 +125,7 @@ impl Engine {
         })?;
         self.plan = Some(ready.plan.clone());
         let rays = table.run(Stage::Render, || self.render(request, &ready, sink, meanwhile))?;
-        table.run(Stage::Write, || self.write(request, &ready.plan, sink))?;
+        table.run(Stage::Write, || self.write(request, &ready.plan, sink, meanwhile.token))?;
         let Some(canvas) = &self.canvas else { return Err(Stop::work("the film is gone")) };
         let outcome = Outcome {
             scene: &ready.parsed.loaded.path,
@@ -205,9 +205,7 @@ impl Engine {
             if (meanwhile.take_write)() {
                 let mut written = written.borrow_mut();
                 written.forget();
-                if let Err(message) = write(canvas, plan, &mut written, contents, sink) {
-                    say_write_failed(sink, message);
-                }
+                say_if_failed(sink, write(canvas, plan, &mut written, contents, sink, &CancelToken::new()));
             }
         };
         let order = Order {
@@ -228,10 +226,16 @@ impl Engine {
         render(key, &mut self.canvas, &order)
     }
 
-    fn write(&mut self, request: &Request, plan: &Plan, sink: &Sink) -> Result<Staged<()>, Stop> {
+    fn write(
+        &mut self,
+        request: &Request,
+        plan: &Plan,
+        sink: &Sink,
+        token: &CancelToken,
+    ) -> Result<Staged<()>, Stop> {
         match &self.canvas {
             Some(canvas) if request.write => {
-                write(canvas, plan, &mut self.written, &self.contents, sink).map_err(Stop::work)
+                write(canvas, plan, &mut self.written, &self.contents, sink, token)
             }
             _ => Ok(Staged::skipped((), "nothing is to be written")),
         }
@@ -317,6 +321,12 @@ impl Engine {
             Err(Stop::Failed(failure)) => Err(failure),
             Err(Stop::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
+    }
+}
+
+fn say_if_failed(sink: &Sink, written: Result<Staged<()>, Stop>) {
+    if let Err(Stop::Failed(Failure::Work(message))) = written {
+        say_write_failed(sink, message);
     }
 }
 
