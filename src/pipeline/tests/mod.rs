@@ -60,7 +60,7 @@ intensity = [10, 10, 10]
 
 pub(super) const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-pub(super) struct Bench {
+pub(in crate::pipeline) struct Bench {
     pub(super) folder: tempfile::TempDir,
     pub(super) worker: Handle,
     pub(super) generation: u64,
