@@ -41,6 +41,7 @@ impl Medium {
         let place = same.or_else(|| known.iter().rposition(|own| own.object == glass.object))?;
         self.inside[place..usize::from(self.count)].rotate_left(1);
         self.count -= 1;
+        self.inside[usize::from(self.count)] = Inside::default();
         Some(self)
     }
 }
