@@ -1,6 +1,7 @@
 //! Lights: where light comes from, as seen from a point.
 
 pub mod emitter;
+pub mod lanes;
 pub mod point;
 pub mod rectangle;
 pub mod sphere;
@@ -60,10 +61,5 @@ impl Light {
             Self::Point(light) => light.sample(point),
             Self::Area(light) => light.middle(point),
         }
-    }
-
-    /// Whether one sample tells all: a light without extent.
-    pub fn is_delta(&self) -> bool {
-        matches!(self, Self::Point(_))
     }
 }

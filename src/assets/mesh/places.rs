@@ -11,6 +11,9 @@ const BUCKET: usize = 1 << 12;
 /// Vertices between two polls of the token.
 const BATCH: usize = 1 << 16;
 
+/// A hash and the vertex that it is of.
+type Entry = (u32, u32);
+
 /// The places of more than one vertex, each as its vertices in ascending order. Any order of places may come, but always
 /// the same.
 pub(super) fn shared(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
@@ -42,11 +45,7 @@ fn hash_of(position: Vec3) -> u32 {
 }
 
 /// Vertices behind their hashes, by the upper bits of those, and where each bucket ends.
-fn scatter(
-    hashes: &[u32],
-    bits: u32,
-    token: &CancelToken,
-) -> Result<(Vec<(u32, u32)>, Vec<usize>), Cancelled> {
+fn scatter(hashes: &[u32], bits: u32, token: &CancelToken) -> Result<(Vec<Entry>, Vec<usize>), Cancelled> {
     let bucket = |hash: u32| (u64::from(hash) >> (32 - bits)) as usize;
     let mut ends = vec![0; 1 << bits];
     for hashes in hashes.chunks(BATCH) {
@@ -59,7 +58,7 @@ fn scatter(
     }
     let mut entries = vec![(0, 0); hashes.len()];
     for (vertex, &hash) in (0_u32..).zip(hashes) {
-        if vertex as usize % BATCH == 0 {
+        if (vertex as usize).is_multiple_of(BATCH) {
             token.check()?;
         }
         let end = &mut ends[bucket(hash)];
@@ -70,11 +69,7 @@ fn scatter(
 }
 
 /// The shared places of one bucket: equal hashes first, equal places among those.
-fn in_bucket(
-    bucket: &[(u32, u32)],
-    positions: &[Vec3],
-    token: &CancelToken,
-) -> Result<Vec<Vec<u32>>, Cancelled> {
+fn in_bucket(bucket: &[Entry], positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
     token.check()?;
     let mut entries = bucket.to_vec();
     entries.sort_unstable();
