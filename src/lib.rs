@@ -44,7 +44,7 @@
 //! world       -> scene assets accel materials lights geometry math control
 //! film        -> math
 //! integrators -> world scene materials lights geometry sampling film math control
-//! output      -> film math system
+//! output      -> film math control system
 //! pipeline    -> integrators world assets scene film output materials math control
 //! tui         -> pipeline scene film math
 //! cli         -> pipeline tui output scene film

@@ -1,5 +1,6 @@
 //! Shapes that emit.
 
+use super::lanes::Lanes;
 use super::rectangle::{QuadEmitter, SeenQuad};
 use super::round::RoundEmitter;
 use super::sphere::{SeenSphere, SphereEmitter};
@@ -78,20 +79,23 @@ pub enum SeenShape<'a> {
 }
 
 impl SeenLight<'_> {
-    /// One way for light to arrive; none where the part that was chosen sends nothing.
-    pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
-        match self {
-            Self::Only(sample) => Some(*sample),
-            Self::Area(light, shape) => {
-                let source = Source::Object(light.object);
-                match shape {
-                    SeenShape::Sphere(sphere) => Some(sphere.sample(u, light.radiance, source)),
-                    SeenShape::Quad(quad) => Some(quad.sample(u, light.radiance, source)),
-                    SeenShape::Triangles(triangles, point) => {
-                        triangles.sample(*point, u, light.radiance, light.object)
-                    }
-                    SeenShape::Round(round, point) => round.sample(*point, u, light.radiance, light.object),
-                }
+    /// Ways for light to arrive by the first numbers of each lane, which `take` gets in order; none where the part that was
+    /// chosen sends nothing.
+    pub fn samples(&self, u: [Lanes; 2], count: usize, mut take: impl FnMut(LightSample)) {
+        let (light, shape) = match self {
+            Self::Only(sample) => return (0..count).for_each(|_| take(*sample)),
+            Self::Area(light, shape) => (light, shape),
+        };
+        let (radiance, source) = (light.radiance, Source::Object(light.object));
+        let each = (0..count).map(|i| [u[0][i], u[1][i]]);
+        match shape {
+            SeenShape::Quad(quad) => quad.samples(u, radiance, source).take(count).for_each(take),
+            SeenShape::Sphere(sphere) => each.for_each(|u| take(sphere.sample(u, radiance, source))),
+            SeenShape::Triangles(triangles, point) => {
+                each.filter_map(|u| triangles.sample(*point, u, radiance, light.object)).for_each(take);
+            }
+            SeenShape::Round(round, point) => {
+                each.filter_map(|u| round.sample(*point, u, radiance, light.object)).for_each(take);
             }
         }
     }

@@ -34,8 +34,8 @@ impl World {
         let geometry = match reuse.filter(|old| old.geometry.serves(&described, &parts.meshes)) {
             Some(old) => Arc::clone(&old.geometry),
             None => {
-                let shapes = described.iter().map(|shape| lower_shape(shape, &parts.meshes)).collect();
-                Arc::new(Geometry::build(shapes, described, token)?)
+                let shapes = described.iter().map(|shape| lower_shape(shape, &parts.meshes, token));
+                Arc::new(Geometry::build(shapes.collect::<Result<_, _>>()?, described, token)?)
             }
         };
         let (materials, object_materials) = lower_materials(scene, parts);
@@ -52,8 +52,12 @@ impl World {
     }
 }
 
-fn lower_shape(shape: &description::Shape, meshes: &[Arc<MeshTree>]) -> Shape {
-    match *shape {
+fn lower_shape(
+    shape: &description::Shape,
+    meshes: &[Arc<MeshTree>],
+    token: &CancelToken,
+) -> Result<Shape, Cancelled> {
+    Ok(match *shape {
         description::Shape::Sphere { center, radius } => Shape::Sphere(Sphere { center, radius }),
         description::Shape::Quad { corner, u, v } => Shape::Quad(Parallelogram::new(corner, u, v)),
         description::Shape::Plane { point, normal } => Shape::Plane(Plane::new(point, normal)),
@@ -74,11 +78,11 @@ fn lower_shape(shape: &description::Shape, meshes: &[Arc<MeshTree>]) -> Shape {
                 smooth,
             };
             if smooth {
-                instance.tree.normals();
+                instance.tree.prepare_normals(token)?;
             }
             Shape::Mesh(Box::new(instance))
         }
-    }
+    })
 }
 
 /// The scene's materials, then each mesh file's, then the one for triangles without any.

@@ -14,7 +14,7 @@ use super::{assert_close, assert_mean, lambert, v};
 #[track_caller]
 pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     for (samples, shadow_samples) in [(256, 1), (16, 16)] {
-        let values = lit.clone().shadows(Shadows::Soft, shadow_samples).values(samples, 64);
+        let values = lit.clone().shadows(Shadows::Soft, shadow_samples).values(samples, 256);
         assert_mean(&format!("{what}, {shadow_samples} shadow rays"), &values, 0.7 * irradiance / PI);
     }
 }
