@@ -38,13 +38,13 @@
 //! accel       -> geometry math control
 //! sampling    -> math
 //! materials   -> math
-//! lights      -> sampling math
+//! lights      -> geometry sampling math
 //! scene       -> math system
 //! assets      -> geometry materials math control system
 //! world       -> scene assets accel materials lights geometry math control
 //! film        -> math
 //! integrators -> world scene materials lights geometry sampling film math control
-//! output      -> film math system
+//! output      -> film math control system
 //! pipeline    -> integrators world assets scene film output materials math control
 //! tui         -> pipeline scene film math
 //! cli         -> pipeline tui output scene film

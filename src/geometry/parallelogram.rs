@@ -69,11 +69,6 @@ impl Parallelogram {
     pub fn area(&self) -> f64 {
         self.normal.length()
     }
-
-    /// Unit normal of the front.
-    pub fn unit_normal(&self) -> DVec3 {
-        self.normal.normalize()
-    }
 }
 
 #[cfg(test)]

@@ -61,10 +61,10 @@ impl RayF64 {
         self.origin + self.direction * t
     }
 
-    /// `t` as `f32`, if the ray has such a point.
+    /// `t` as `f32`, if the ray has such a point and that is finite.
     pub fn accept(&self, t: f64) -> Option<f32> {
         let single = t as f32;
-        (single > 0.0 && f64::from(single) <= self.t_max).then_some(single)
+        (single > 0.0 && single < f32::INFINITY && f64::from(single) <= self.t_max).then_some(single)
     }
 }
 

@@ -55,7 +55,7 @@ impl SurfacePoint {
         Self {
             point,
             shadow_point: point,
-            error: rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32),
+            error: error(point, reach),
             normal,
             shading_normal: normal,
             uv,
@@ -64,6 +64,12 @@ impl SurfacePoint {
             barycentric: Vec3::new(1.0 - uv.x - uv.y, uv.x, uv.y),
         }
     }
+}
+
+/// Bound on each component's error of a point that was computed in double precision from lengths up to `reach`, and of
+/// the next test from there.
+pub fn error(point: Vec3, reach: f64) -> Vec3 {
+    rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32)
 }
 
 /// Bound on the relative error of the `f64` arithmetic of a hit, its surface and the next test from there.
@@ -78,6 +84,24 @@ pub fn rounding_error(point: Vec3) -> Vec3 {
 /// stands, and towards −z where it lies and faces up.
 pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
     let across = DVec3::Y.cross(n);
-    let u = if across.length_squared() > 1e-12 { across.normalize() } else { DVec3::X };
+    let u = if across.length_squared() > 1e-12 { across } else { DVec3::X - n * n.x };
+    let u = u.normalize();
     (u, n.cross(u))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tangents_are_perpendicular_also_next_to_the_vertical() {
+        for tilt in [0.0, 1e-9, 9e-7, 1.1e-6, 0.3, 1.0] {
+            for n in [DVec3::new(tilt, 1.0, 0.0), DVec3::new(-tilt, -1.0, tilt)].map(DVec3::normalize) {
+                let (u, v) = flat_axes(n);
+                let off = [u.dot(n), v.dot(n), u.dot(v), u.length() - 1.0, u.cross(v).dot(n) - 1.0];
+                assert!(off.iter().all(|off| off.abs() < 1e-15), "{n}: {off:?}");
+            }
+        }
+        assert_eq!(flat_axes(DVec3::Y), (DVec3::X, DVec3::NEG_Z));
+    }
 }

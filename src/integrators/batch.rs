@@ -1,5 +1,6 @@
 //! Queues of rays, and the rays of the camera.
 
+use std::cell::RefCell;
 use std::ops::Range;
 
 use super::RenderSettings;
@@ -43,33 +44,18 @@ impl SampleBlock {
     }
 }
 
-/// Rays on their way, an array for each of their parts.
-#[derive(Default)]
-pub struct RayQueue {
-    /// The rays; directions are unit vectors.
-    pub ray: Vec<Ray>,
-    /// What radiance that they meet counts in their sample.
-    pub throughput: Vec<Vec3>,
-    /// The sample that they belong to.
-    pub slot: Vec<u32>,
-    /// Tells the paths of one sample apart.
-    pub path: Vec<u32>,
-    /// The glass that they are in.
-    pub medium: Vec<Medium>,
-}
-
-/// A ray for the queue.
+/// A ray on its way.
 #[derive(Clone, Copy)]
 pub struct PathRay {
-    /// The ray.
+    /// The ray; its direction is a unit vector.
     pub ray: Ray,
-    /// See [`RayQueue::throughput`].
+    /// What radiance that it meets counts in its sample.
     pub throughput: Vec3,
-    /// See [`RayQueue::slot`].
+    /// The sample that it belongs to.
     pub slot: u32,
-    /// See [`RayQueue::path`].
+    /// Tells the paths of one sample apart.
     pub path: u32,
-    /// See [`RayQueue::medium`].
+    /// The glass that it is in.
     pub medium: Medium,
 }
 
@@ -80,89 +66,53 @@ impl PathRay {
     }
 }
 
-impl RayQueue {
-    /// Rays in it.
-    pub fn len(&self) -> usize {
-        self.ray.len()
+/// A shadow ray with what it brings if nothing is in its way.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowRay {
+    /// Segment from a surface to a light.
+    pub ray: Ray,
+    /// The light that may be hit.
+    pub source: Source,
+    /// Radiance for the sample.
+    pub contribution: Vec3,
+    /// The sample.
+    pub slot: u32,
+}
+
+/// The memory of batches, used again by each.
+#[derive(Default)]
+pub struct Queues {
+    /// Rays of this round; camera rays at first.
+    pub rays: Vec<PathRay>,
+    /// Rays of the next round.
+    pub next: Vec<PathRay>,
+    /// Shadow rays of this round.
+    pub shadows: Vec<ShadowRay>,
+    /// What the rays of this round hit.
+    pub hits: Vec<Option<Hit>>,
+    /// Random numbers of a point's samples of one light.
+    pub numbers: Vec<[f32; 2]>,
+}
+
+impl Queues {
+    /// What a thread holds between tiles.
+    const MOST_SHADOWS: usize = 1 << 18;
+
+    /// Those that this thread left from its last tile; [`Queues::leave`] them for the next.
+    pub fn of_thread() -> Self {
+        QUEUES.take()
     }
 
-    /// Put a ray at its end.
-    pub fn push(&mut self, ray: PathRay) {
-        self.ray.push(ray.ray);
-        self.throughput.push(ray.throughput);
-        self.slot.push(ray.slot);
-        self.path.push(ray.path);
-        self.medium.push(ray.medium);
-    }
-
-    /// Forget all rays, keep the memory.
-    pub fn clear(&mut self) {
-        self.ray.clear();
-        self.throughput.clear();
-        self.slot.clear();
-        self.path.clear();
-        self.medium.clear();
-    }
-
-    /// The ray at a place.
-    pub fn get(&self, i: usize) -> PathRay {
-        PathRay {
-            ray: self.ray[i],
-            throughput: self.throughput[i],
-            slot: self.slot[i],
-            path: self.path[i],
-            medium: self.medium[i],
+    /// For the next tile of this thread, unless many lights made them very long.
+    pub fn leave(self) {
+        if self.shadows.capacity() <= Self::MOST_SHADOWS {
+            QUEUES.set(self);
         }
     }
 }
 
-/// Shadow rays with what they bring if nothing is in their way.
-#[derive(Default)]
-pub struct ShadowQueue {
-    /// Segments from surfaces to lights.
-    pub ray: Vec<Ray>,
-    /// Lights that may be hit.
-    pub source: Vec<Source>,
-    /// Radiance for the sample.
-    pub contribution: Vec<Vec3>,
-    /// The sample.
-    pub slot: Vec<u32>,
-}
-
-impl ShadowQueue {
-    /// Put a ray at its end.
-    pub fn push(&mut self, ray: Ray, source: Source, contribution: Vec3, slot: u32) {
-        self.ray.push(ray);
-        self.source.push(source);
-        self.contribution.push(contribution);
-        self.slot.push(slot);
-    }
-
-    /// Rays in it.
-    pub fn len(&self) -> usize {
-        self.ray.len()
-    }
-
-    /// Forget all rays, keep the memory.
-    pub fn clear(&mut self) {
-        self.ray.clear();
-        self.source.clear();
-        self.contribution.clear();
-        self.slot.clear();
-    }
-}
-
-/// The memory of a tile's batches, used again by each.
-#[derive(Default)]
-pub struct Queues {
-    /// Rays of this round; camera rays at first.
-    pub rays: RayQueue,
-    /// Rays of the next round.
-    pub next: RayQueue,
-    /// Shadow rays of this round.
-    pub shadows: ShadowQueue,
-    /// What the rays of this round hit.
-    pub hits: Vec<Option<Hit>>,
+thread_local! {
+    static QUEUES: RefCell<Queues> = RefCell::default();
 }
 
 /// What all rays of a tile have in common.
@@ -179,16 +129,15 @@ pub struct Tracer<'a> {
 
 impl Tracer<'_> {
     /// Rays through the pixels of some slots, in place of what is in the queue.
-    pub fn camera_rays(&self, slots: Range<u32>, queue: &mut RayQueue) {
+    pub fn camera_rays(&self, slots: Range<u32>, queue: &mut Vec<PathRay>) {
         queue.clear();
-        for slot in slots {
-            queue.push(self.camera_ray(slot));
-        }
+        queue.extend(slots.map(|slot| self.camera_ray(slot)));
     }
 
     fn camera_ray(&self, slot: u32) -> PathRay {
-        let (x, y, _) = self.block.place(slot);
-        let [fx, fy, lx, ly] = self.block.sampler(self.settings.seed, slot).get4(Purpose::CAMERA);
+        let (x, y, sample) = self.block.place(slot);
+        let sampler = PixelSampler::new(self.settings.seed, x, y, sample);
+        let [fx, fy, lx, ly] = sampler.get4(Purpose::CAMERA);
         let sample = filter(self.settings.filter).sample(Vec2::new(fx, fy));
         let place = (sample.offset + Vec2::splat(0.5)).as_dvec2();
         let lens = if self.settings.dof { warp::disk(Vec2::new(lx, ly)) } else { Vec2::ZERO };

@@ -1,11 +1,12 @@
 //! Direct light at a Phong surface: every light with its own shadow rays.
 
 use super::View;
-use super::batch::PathRay;
+use super::batch::{PathRay, ShadowRay};
 use super::whitted::Wave;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::LightSample;
+use crate::lights::lanes::{LANES, Lanes};
+use crate::lights::{LightSample, SeenLight};
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::color::luminance;
@@ -24,6 +25,8 @@ pub(super) struct PhongVertex<'a> {
     /// Shading normal on the same side: the interpolated one, bent by a normal map.
     shading_normal: Vec3,
     to_eye: Vec3,
+    /// Cosine between the smooth and the shading normal; none where nothing bends them apart.
+    bend: Option<f32>,
 }
 
 impl<'a> PhongVertex<'a> {
@@ -35,25 +38,19 @@ impl<'a> PhongVertex<'a> {
     ) -> Self {
         let to_eye = -path.ray.direction;
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
-        Self {
-            path,
-            surface,
-            bsdf,
-            normal: surface.normal * side,
-            smooth_normal: surface.shading_normal * side,
-            shading_normal: shading_normal * side,
-            to_eye,
-        }
+        let (smooth_normal, shading_normal) = (surface.shading_normal * side, shading_normal * side);
+        let bend = (smooth_normal != shading_normal).then(|| smooth_normal.dot(shading_normal));
+        let normal = surface.normal * side;
+        Self { path, surface, bsdf, normal, smooth_normal, shading_normal, to_eye, bend }
     }
 
     /// What a sample of a light brings unoccluded; 0 where the light is behind the smooth surface or its bent normal.
     fn reflected(&self, sample: &LightSample, view: View) -> Vec3 {
         let cosine = self.shading_normal.dot(sample.direction);
-        let smooth = self.smooth_normal.dot(sample.direction);
-        if !(cosine > 0.0 && smooth > 0.0) {
+        if !(cosine > 0.0) {
             return Vec3::ZERO;
         }
-        let arriving = sample.weight * (cosine * self.terminator(cosine, smooth));
+        let arriving = sample.weight * (cosine * self.terminator(cosine, sample.direction));
         let specular = || self.bsdf.specular_value(self.shading_normal, self.to_eye, sample.direction);
         match view {
             View::Diffuse => arriving * self.bsdf.diffuse_value(),
@@ -63,12 +60,16 @@ impl<'a> PhongVertex<'a> {
         }
     }
 
-    /// Softens the edge where bent normals leave the light of the surface that they are on; 1 where nothing bends them
-    /// (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
-    fn terminator(&self, cosine: f32, smooth: f32) -> f32 {
-        let between = self.smooth_normal.dot(self.shading_normal);
+    /// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing
+    /// bends them (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+    fn terminator(&self, cosine: f32, direction: Vec3) -> f32 {
+        let Some(between) = self.bend else { return 1.0 };
+        let smooth = self.smooth_normal.dot(direction);
+        if !(smooth > 0.0) {
+            return 0.0;
+        }
         let g = (smooth / (cosine * between)).min(1.0);
-        if !(between > 0.0) { 1.0 } else { -g * g * g + g * g + g }
+        if between > 0.0 { -g * g * g + g * g + g } else { 1.0 }
     }
 
     fn shadow_origin(&self) -> Vec3 {
@@ -78,35 +79,29 @@ impl<'a> PhongVertex<'a> {
 
 /// Light a point: contributions that nothing can stop are added, the others wait for their shadow rays.
 pub(super) fn light(wave: &mut Wave<'_>, vertex: &PhongVertex<'_>) {
-    let settings = wave.tracer.settings;
-    let sampler = wave.tracer.block.sampler(settings.seed, vertex.path.slot);
+    let (world, settings) = (wave.tracer.world, wave.tracer.settings);
     let mut arrivals = Arrivals::new(wave, vertex);
-    for (number, light) in (0_u32..).zip(&arrivals.wave.tracer.world.lights) {
+    for (number, light) in (0_u32..).zip(&world.lights) {
         if settings.shadows == Shadows::Hard {
-            arrivals.push(light.middle(vertex.surface.point), 1);
+            if let Some(sample) = light.middle(vertex.surface.point) {
+                arrivals.push(&sample, 1.0);
+            }
             continue;
         }
-        let Some(seen) = light.seen_from(vertex.surface.point) else { continue };
-        let repetitions = if light.is_delta() { 1 } else { settings.shadow_samples };
-        for i in 0..repetitions {
-            let u =
-                if light.is_delta() { [0.5; 2] } else { numbers(&sampler, vertex, number, (i, repetitions)) };
-            arrivals.push(seen.sample(u), repetitions);
+        match light.seen_from(vertex.surface.point) {
+            Some(SeenLight::Only(sample)) => arrivals.push(&sample, 1.0),
+            Some(seen) => arrivals.push_samples(&seen, number),
+            None => {}
         }
     }
     arrivals.finish();
-}
-
-/// Two random numbers for the `i`-th of some samples of a light; two lights share four numbers.
-fn numbers(sampler: &PixelSampler, vertex: &PhongVertex<'_>, light: u32, (i, n): (u32, u32)) -> [f32; 2] {
-    let [a, b, c, d] = sampler.get4_of(Purpose::at_vertex(vertex.path.path, light / 2), i, n);
-    if light.is_multiple_of(2) { [a, b] } else { [c, d] }
 }
 
 /// Takes what arrives at a vertex to the queue of shadow rays.
 struct Arrivals<'a, 'w, 'v> {
     wave: &'a mut Wave<'w>,
     vertex: &'a PhongVertex<'v>,
+    sampler: PixelSampler,
     shadow_origin: Vec3,
     /// Length of the queue before.
     first: usize,
@@ -117,13 +112,32 @@ struct Arrivals<'a, 'w, 'v> {
 impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
     fn new(wave: &'a mut Wave<'w>, vertex: &'a PhongVertex<'v>) -> Self {
         let first = wave.shadows.len();
-        Self { wave, vertex, shadow_origin: vertex.shadow_origin(), first, total: 0.0 }
+        let sampler = wave.tracer.block.sampler(wave.tracer.settings.seed, vertex.path.slot);
+        Self { wave, vertex, sampler, shadow_origin: vertex.shadow_origin(), first, total: 0.0 }
     }
 
-    fn push(&mut self, sample: Option<LightSample>, repetitions: u32) {
-        let Some(sample) = sample else { return };
+    /// As many samples of a light as the settings ask for.
+    fn push_samples(&mut self, light: &SeenLight<'_>, number: u32) {
+        let (settings, path) = (self.wave.tracer.settings, self.vertex.path);
+        let numbers = self.sampler.get2_all(Purpose::at_vertex(path.path, number), settings.shadow_samples);
+        self.wave.numbers.clear();
+        self.wave.numbers.extend(numbers);
+        let count = self.wave.numbers.len();
+        let share = 1.0 / count as f32;
+        for start in (0..count).step_by(LANES) {
+            let used = (count - start).min(LANES);
+            let lane = |of: usize| -> Lanes {
+                std::array::from_fn(|i| self.wave.numbers[start + i.min(used - 1)][of])
+            };
+            let numbers = [lane(0), lane(1)];
+            light.samples(numbers, used, |sample| self.push(&sample, share));
+        }
+    }
+
+    /// One sample, which counts as this share of its light.
+    fn push(&mut self, sample: &LightSample, share: f32) {
         let settings = self.wave.tracer.settings;
-        let value = self.vertex.reflected(&sample, settings.view) / repetitions as f32;
+        let value = self.vertex.reflected(sample, settings.view) * share;
         if value == Vec3::ZERO {
             return;
         }
@@ -132,20 +146,16 @@ impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
         if settings.shadows == Shadows::Off && settings.view != View::Shadow {
             self.wave.radiance[slot as usize] += contribution;
         } else {
-            self.wave.shadows.push(
-                Ray::segment(self.shadow_origin, sample.target),
-                sample.source,
-                contribution,
-                slot,
-            );
+            let ray = Ray::segment(self.shadow_origin, sample.target);
+            self.wave.shadows.push(ShadowRay { ray, source: sample.source, contribution, slot });
         }
     }
 
     /// In the view of shadows contributions are parts of the whole that could arrive.
     fn finish(self) {
         if self.wave.tracer.settings.view == View::Shadow {
-            for contribution in &mut self.wave.shadows.contribution[self.first..] {
-                *contribution /= self.total;
+            for shadow in &mut self.wave.shadows[self.first..] {
+                shadow.contribution /= self.total;
             }
         }
     }

@@ -1,14 +1,14 @@
 //! Rays at the surface of glass.
 
 use super::batch::PathRay;
-use super::medium::Medium;
+use super::medium::{Inside, Medium};
 use super::whitted::{Wave, leaving, reflected};
 use crate::geometry::SurfacePoint;
 use crate::materials::fresnel::{dielectric, refract};
 use crate::materials::{Glass, Material};
 use crate::math::Vec3;
 use crate::sampling::Purpose;
-use crate::world::{Hit, World};
+use crate::world::World;
 
 /// A ray is split in two while the weaker part counts at least this much of its sample; below, chance takes one of them.
 const LEAST_SPLIT: f32 = 0.01;
@@ -16,23 +16,26 @@ const LEAST_SPLIT: f32 = 0.01;
 /// Number of the decision between reflection and refraction.
 const CHOICE: u32 = u32::MAX;
 
-/// What glass leaves of radiance along a ray to its hit: the innermost glass that it is in, or, for a ray that started
-/// inside without knowing, the glass whose back it hits.
-pub fn absorption(world: &World, path: &PathRay, hit: &Hit, surface: &SurfacePoint) -> Vec3 {
-    let of = |material: &Material| match material {
-        Material::Glass(glass) => glass.transmittance(hit.shape.t),
-        _ => Vec3::ONE,
+/// What glass leaves of radiance along a ray to its hit at `distance`: the innermost glass that it is in, or, for a ray that
+/// started inside without knowing, the glass whose back it hits.
+pub fn absorption(
+    world: &World,
+    path: &PathRay,
+    distance: f32,
+    surface: &SurfacePoint,
+    material: &Material,
+) -> Vec3 {
+    let from_inside = || surface.normal.dot(path.ray.direction) > 0.0;
+    let glass = match (path.medium.innermost(), material) {
+        (Some(inside), _) => glass_of(world, inside),
+        (None, Material::Glass(glass)) if from_inside() => Some(glass),
+        _ => None,
     };
-    if let Some(object) = path.medium.innermost() {
-        return glass_of(world, object).map_or(Vec3::ONE, |glass| glass.transmittance(hit.shape.t));
-    }
-    let from_inside = surface.normal.dot(path.ray.direction) > 0.0;
-    if from_inside { of(&world.materials[world.material_index(hit)]) } else { Vec3::ONE }
+    glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
-fn glass_of(world: &World, object: u32) -> Option<&Glass> {
-    let first = Hit { shape: crate::geometry::ShapeHit::at(0.0), object };
-    match &world.materials[world.material_index(&first)] {
+fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
+    match &world.materials[inside.material as usize] {
         Material::Glass(glass) => Some(glass),
         _ => None,
     }
@@ -40,19 +43,27 @@ fn glass_of(world: &World, object: u32) -> Option<&Glass> {
 
 /// Index of refraction of what a ray is in.
 fn ior(world: &World, medium: Medium) -> f32 {
-    medium.innermost().and_then(|object| glass_of(world, object)).map_or(1.0, |glass| glass.ior)
+    medium.innermost().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
 
 impl Wave<'_> {
-    pub(super) fn shade_glass(&mut self, path: &PathRay, hit: &Hit, surface: &SurfacePoint, glass: &Glass) {
+    /// At the surface of a glass, which is `part` of an object.
+    pub(super) fn shade_glass(
+        &mut self,
+        path: &PathRay,
+        part: Inside,
+        surface: &SurfacePoint,
+        glass: &Glass,
+    ) {
         let world = self.tracer.world;
         let entering = surface.normal.dot(path.ray.direction) < 0.0;
         let (near, far, inside) = if entering {
-            (ior(world, path.medium), glass.ior, path.medium.entered(hit.object))
+            (ior(world, path.medium), glass.ior, path.medium.entered(part))
         } else {
-            let left = path.medium.left(hit.object);
-            let near = if path.medium.is_in(hit.object) { ior(world, path.medium) } else { glass.ior };
-            (near, ior(world, left), left)
+            match path.medium.left(part) {
+                Some(left) => (ior(world, path.medium), ior(world, left), left),
+                None => (glass.ior, ior(world, path.medium), path.medium),
+            }
         };
         let eta = far / near;
         let (reflectance, Some(direction)) = boundary(surface, path.ray.direction, eta) else {

@@ -1,42 +1,48 @@
 //! Which glass a ray is in.
 
-/// The glass objects around a ray, the innermost last. Glass nested deeper than the list is long forgets the outermost.
+/// A glass that a ray is in: the parts of one object may be of several.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Inside {
+    /// The object.
+    pub object: u32,
+    /// The material of the surface that the ray entered by.
+    pub material: u32,
+}
+
+/// The glass around a ray, the innermost last. Glass nested deeper than the list is long forgets the outermost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Medium {
-    objects: [u32; 4],
+    inside: [Inside; 4],
     count: u8,
 }
 
 impl Medium {
-    /// The innermost object.
-    pub fn innermost(&self) -> Option<u32> {
-        self.count.checked_sub(1).map(|last| self.objects[usize::from(last)])
+    /// The innermost glass.
+    pub fn innermost(&self) -> Option<Inside> {
+        self.count.checked_sub(1).map(|last| self.inside[usize::from(last)])
     }
 
-    /// Whether the ray is inside an object, as far as it knows.
-    pub fn is_in(&self, object: u32) -> bool {
-        self.objects[..usize::from(self.count)].contains(&object)
-    }
-
-    /// After entering an object.
-    pub fn entered(mut self, object: u32) -> Self {
-        if usize::from(self.count) == self.objects.len() {
-            self.objects.rotate_left(1);
+    /// After entering a glass.
+    pub fn entered(mut self, glass: Inside) -> Self {
+        if usize::from(self.count) == self.inside.len() {
+            self.inside.rotate_left(1);
             self.count -= 1;
         }
-        self.objects[usize::from(self.count)] = object;
+        self.inside[usize::from(self.count)] = glass;
         self.count += 1;
         self
     }
 
-    /// After leaving an object; nothing changes for one that it was not in.
-    pub fn left(mut self, object: u32) -> Self {
-        let count = usize::from(self.count);
-        if let Some(place) = self.objects[..count].iter().rposition(|&own| own == object) {
-            self.objects[place..count].rotate_left(1);
-            self.count -= 1;
-        }
-        self
+    /// After leaving a glass; none where the ray was in none of that object, as far as it knows. A surface of several
+    /// glasses may be entered by one and left by another: then the object's innermost is left.
+    pub fn left(mut self, glass: Inside) -> Option<Self> {
+        let known = &self.inside[..usize::from(self.count)];
+        let same = known.iter().rposition(|&own| own == glass);
+        let place = same.or_else(|| known.iter().rposition(|own| own.object == glass.object))?;
+        self.inside[place..usize::from(self.count)].rotate_left(1);
+        self.count -= 1;
+        self.inside[usize::from(self.count)] = Inside::default();
+        Some(self)
     }
 }
 
@@ -44,17 +50,33 @@ impl Medium {
 mod tests {
     use super::*;
 
+    const fn part(object: u32, material: u32) -> Inside {
+        Inside { object, material }
+    }
+
     #[test]
     fn nested_and_overlapping_glass() {
+        let (seven, nine) = (part(7, 0), part(9, 1));
         let air = Medium::default();
-        let in_both = air.entered(7).entered(9);
-        assert_eq!(in_both.innermost(), Some(9));
-        assert_eq!(in_both.left(7).innermost(), Some(9));
-        assert_eq!(in_both.left(9).innermost(), Some(7));
-        assert_eq!(in_both.left(9).left(7).innermost(), None);
-        assert_eq!(air.left(3), air);
-        let deep = (0..6).fold(air, Medium::entered);
-        assert!(deep.is_in(5) && !deep.is_in(0));
-        assert_eq!(deep.innermost(), Some(5));
+        let in_both = air.entered(seven).entered(nine);
+        assert_eq!(in_both.innermost(), Some(nine));
+        assert_eq!(in_both.left(seven), Some(air.entered(nine)));
+        assert_eq!(in_both.left(nine), Some(air.entered(seven)));
+        assert_eq!(
+            in_both.left(nine).and_then(|one| one.left(seven)).and_then(|none| none.innermost()),
+            None
+        );
+        assert_eq!(air.left(part(3, 0)), None);
+        let deep = (0..6).fold(air, |medium, object| medium.entered(part(object, 0)));
+        assert_eq!(deep.innermost(), Some(part(5, 0)));
+        assert_eq!(deep.left(part(0, 0)), None);
+    }
+
+    #[test]
+    fn parts_of_one_object_are_told_apart_by_their_material() {
+        let both = Medium::default().entered(part(1, 0)).entered(part(1, 5));
+        assert_eq!(both.left(part(1, 0)), Some(Medium::default().entered(part(1, 5))));
+        // Entered by material 0, left by material 2.
+        assert_eq!(Medium::default().entered(part(1, 0)).left(part(1, 2)), Some(Medium::default()));
     }
 }

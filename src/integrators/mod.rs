@@ -160,7 +160,7 @@ pub fn render_tile(
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
     let tracer = Tracer { world, settings, block: &block, token };
-    let mut queues = Queues::default();
+    let mut queues = Queues::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
         tracer.camera_rays(slots, &mut queues.rays);
@@ -171,5 +171,6 @@ pub fn render_tile(
             whitted::trace(&tracer, &mut queues, &mut radiance, &mut counters)?;
         }
     }
+    queues.leave();
     Ok((TileSamples { rect: block.tile, samples: block.samples.len() as u32, radiance }, counters))
 }

@@ -16,10 +16,9 @@ pub fn shade(
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
     closest_hits(tracer, queues)?;
-    let cameras = &queues.rays;
-    for (i, hit) in queues.hits.iter().enumerate() {
+    for (path, hit) in queues.rays.iter().zip(&queues.hits) {
         let Some(hit) = hit else { continue };
-        let surface = tracer.world.geometry.surface(&cameras.ray[i], hit);
+        let surface = tracer.world.geometry.surface(&path.ray, hit);
         let material = &tracer.world.materials[tracer.world.material_index(hit)];
         let value = match tracer.settings.view {
             View::Normal => (normal(&surface, material, counters) + Vec3::ONE) * 0.5,
@@ -28,7 +27,7 @@ pub fn shade(
             View::Uv => fraction(surface.uv).extend(0.0),
             _ => albedo(material, surface.uv, counters),
         };
-        radiance[cameras.slot[i] as usize] = value * cameras.throughput[i];
+        radiance[path.slot as usize] = value * path.throughput;
     }
     Ok(())
 }

@@ -1,8 +1,9 @@
 //! Direct light by Phong, mirror, glass and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*,
 //! 1980), over queues instead of recursion.
 
-use super::batch::{PathRay, Queues, RayQueue, ShadowQueue, Tracer};
+use super::batch::{PathRay, Queues, ShadowRay, Tracer};
 use super::direct::{self, PhongVertex};
+use super::medium::Inside;
 use super::{POLL_INTERVAL, RayCounters, View, glass};
 use crate::control::Cancelled;
 use crate::geometry::ray::offset_origin;
@@ -21,16 +22,16 @@ pub fn trace(
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
     let mut depth = 0;
-    while queues.rays.len() > 0 {
+    while !queues.rays.is_empty() {
         closest_hits(tracer, queues)?;
         queues.next.clear();
-        let Queues { rays, next, shadows, hits } = queues;
-        let mut wave = Wave { tracer, depth, next, shadows, radiance, counters };
-        for (i, hit) in hits.iter().enumerate() {
-            let path = rays.get(i);
+        let Queues { rays, next, shadows, hits, numbers } = queues;
+        shadows.clear();
+        let mut wave = Wave { tracer, depth, next, shadows, numbers, radiance, counters };
+        for (path, hit) in rays.iter().zip(hits.iter()) {
             match hit {
-                Some(hit) => wave.shade(path, hit),
-                None => wave.leave(&path),
+                Some(hit) => wave.shade(*path, hit),
+                None => wave.leave(path),
             }
         }
         trace_shadows(tracer, shadows, radiance, counters)?;
@@ -43,9 +44,9 @@ pub fn trace(
 /// The nearest hit of every ray in the queue.
 pub fn closest_hits(tracer: &Tracer<'_>, queues: &mut Queues) -> Result<(), Cancelled> {
     queues.hits.clear();
-    for rays in queues.rays.ray.chunks(POLL_INTERVAL) {
+    for rays in queues.rays.chunks(POLL_INTERVAL) {
         tracer.token.check()?;
-        queues.hits.extend(rays.iter().map(|ray| tracer.world.geometry.closest(ray)));
+        queues.hits.extend(rays.iter().map(|path| tracer.world.geometry.closest(&path.ray)));
     }
     Ok(())
 }
@@ -53,22 +54,21 @@ pub fn closest_hits(tracer: &Tracer<'_>, queues: &mut Queues) -> Result<(), Canc
 /// Add the contributions that arrive, in the order of the queue.
 fn trace_shadows(
     tracer: &Tracer<'_>,
-    shadows: &mut ShadowQueue,
+    shadows: &[ShadowRay],
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
-    for i in 0..shadows.len() {
-        if i % POLL_INTERVAL == 0 {
-            tracer.token.check()?;
-        }
-        let visible = tracer.settings.shadows == Shadows::Off
-            || !tracer.world.geometry.occluded(&shadows.ray[i], shadows.source[i]);
-        if visible {
-            radiance[shadows.slot[i] as usize] += shadows.contribution[i];
+    for some in shadows.chunks(POLL_INTERVAL) {
+        tracer.token.check()?;
+        for shadow in some {
+            let visible = tracer.settings.shadows == Shadows::Off
+                || !tracer.world.geometry.occluded(&shadow.ray, shadow.source);
+            if visible {
+                radiance[shadow.slot as usize] += shadow.contribution;
+            }
         }
     }
     counters.shadow_rays += shadows.len() as u64;
-    shadows.clear();
     Ok(())
 }
 
@@ -77,8 +77,9 @@ pub(super) struct Wave<'a> {
     pub(super) tracer: &'a Tracer<'a>,
     /// Scatterings before the hits of this round.
     pub(super) depth: u32,
-    pub(super) next: &'a mut RayQueue,
-    pub(super) shadows: &'a mut ShadowQueue,
+    pub(super) next: &'a mut Vec<PathRay>,
+    pub(super) shadows: &'a mut Vec<ShadowRay>,
+    pub(super) numbers: &'a mut Vec<[f32; 2]>,
     pub(super) radiance: &'a mut [Vec3],
     pub(super) counters: &'a mut RayCounters,
 }
@@ -102,8 +103,9 @@ impl Wave<'_> {
     fn shade(&mut self, mut path: PathRay, hit: &Hit) {
         let world = self.tracer.world;
         let surface = world.geometry.surface(&path.ray, hit);
-        let material = &world.materials[world.material_index(hit)];
-        path.throughput *= glass::absorption(world, &path, hit, &surface);
+        let index = world.material_index(hit);
+        let material = &world.materials[index];
+        path.throughput *= glass::absorption(world, &path, hit.shape.t, &surface, material);
         let emission = material.emission();
         let front = surface.normal.dot(path.ray.direction) < 0.0;
         if emission != Vec3::ZERO && front && self.tracer.settings.view == View::Beauty {
@@ -115,7 +117,10 @@ impl Wave<'_> {
         match material {
             Material::Phong(phong) => self.shade_phong(&path, &surface, phong),
             Material::Mirror(mirror) => self.shade_mirror(&path, &surface, mirror),
-            Material::Glass(glass) => self.shade_glass(&path, hit, &surface, glass),
+            Material::Glass(glass) => {
+                let part = Inside { object: hit.object, material: index as u32 };
+                self.shade_glass(&path, part, &surface, glass);
+            }
         }
     }
 

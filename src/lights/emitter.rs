@@ -1,6 +1,8 @@
 //! Shapes that emit.
 
+use super::lanes::Lanes;
 use super::rectangle::{QuadEmitter, SeenQuad};
+use super::round::RoundEmitter;
 use super::sphere::{SeenSphere, SphereEmitter};
 use super::triangles::TriangleEmitter;
 use super::{LightSample, Source};
@@ -26,6 +28,8 @@ pub enum Emitter {
     Quad(QuadEmitter),
     /// Triangles.
     Triangles(TriangleEmitter),
+    /// A disk, cylinder, cone or torus.
+    Round(RoundEmitter),
 }
 
 impl AreaLight {
@@ -35,6 +39,7 @@ impl AreaLight {
             Emitter::Sphere(sphere) => SeenShape::Sphere(sphere.seen_from(point)?),
             Emitter::Quad(quad) => SeenShape::Quad(quad.seen_from(point)?),
             Emitter::Triangles(triangles) => SeenShape::Triangles(triangles, point),
+            Emitter::Round(round) => SeenShape::Round(round, point),
         };
         Some(SeenLight::Area(self, shape))
     }
@@ -46,6 +51,7 @@ impl AreaLight {
             Emitter::Sphere(sphere) => sphere.middle(point, self.radiance, source),
             Emitter::Quad(quad) => quad.middle(point, self.radiance, source),
             Emitter::Triangles(triangles) => triangles.middle(point, self.radiance, self.object),
+            Emitter::Round(round) => round.middle(point, self.radiance, self.object),
         }
     }
 }
@@ -68,22 +74,28 @@ pub enum SeenShape<'a> {
     Quad(SeenQuad<'a>),
     /// Triangles, and the point.
     Triangles(&'a TriangleEmitter, Vec3),
+    /// A disk, cylinder, cone or torus, and the point.
+    Round(&'a RoundEmitter, Vec3),
 }
 
 impl SeenLight<'_> {
-    /// One way for light to arrive; none where the part that was chosen sends nothing.
-    pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
-        match self {
-            Self::Only(sample) => Some(*sample),
-            Self::Area(light, shape) => {
-                let source = Source::Object(light.object);
-                match shape {
-                    SeenShape::Sphere(sphere) => Some(sphere.sample(u, light.radiance, source)),
-                    SeenShape::Quad(quad) => Some(quad.sample(u, light.radiance, source)),
-                    SeenShape::Triangles(triangles, point) => {
-                        triangles.sample(*point, u, light.radiance, light.object)
-                    }
-                }
+    /// Ways for light to arrive by the first numbers of each lane, which `take` gets in order; none where the part that was
+    /// chosen sends nothing.
+    pub fn samples(&self, u: [Lanes; 2], count: usize, mut take: impl FnMut(LightSample)) {
+        let (light, shape) = match self {
+            Self::Only(sample) => return (0..count).for_each(|_| take(*sample)),
+            Self::Area(light, shape) => (light, shape),
+        };
+        let (radiance, source) = (light.radiance, Source::Object(light.object));
+        let each = (0..count).map(|i| [u[0][i], u[1][i]]);
+        match shape {
+            SeenShape::Quad(quad) => quad.samples(u, radiance, source).take(count).for_each(take),
+            SeenShape::Sphere(sphere) => each.for_each(|u| take(sphere.sample(u, radiance, source))),
+            SeenShape::Triangles(triangles, point) => {
+                each.filter_map(|u| triangles.sample(*point, u, radiance, light.object)).for_each(take);
+            }
+            SeenShape::Round(round, point) => {
+                each.filter_map(|u| round.sample(*point, u, radiance, light.object)).for_each(take);
             }
         }
     }

@@ -1,8 +1,10 @@
 //! Lights: where light comes from, as seen from a point.
 
 pub mod emitter;
+pub mod lanes;
 pub mod point;
 pub mod rectangle;
+pub mod round;
 pub mod sphere;
 pub mod triangles;
 
@@ -45,17 +47,6 @@ pub enum Source {
     Primitive(u32, u32),
 }
 
-impl Source {
-    /// Whether a hit is on the light itself.
-    pub fn is(&self, object: u32, primitive: u32) -> bool {
-        match *self {
-            Self::Nothing => false,
-            Self::Object(own) => own == object,
-            Self::Primitive(own, part) => own == object && part == primitive,
-        }
-    }
-}
-
 impl Light {
     /// The light as seen from a point; none where it certainly sends nothing there.
     pub fn seen_from(&self, point: Vec3) -> Option<SeenLight<'_>> {
@@ -65,21 +56,11 @@ impl Light {
         }
     }
 
-    /// Sample the light as seen from `point`; none where it sends nothing there.
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        self.seen_from(point)?.sample(u)
-    }
-
     /// The middle of the light with all that it sends, as if it came from there.
     pub fn middle(&self, point: Vec3) -> Option<LightSample> {
         match self {
             Self::Point(light) => light.sample(point),
             Self::Area(light) => light.middle(point),
         }
-    }
-
-    /// Whether one sample tells all: a light without extent.
-    pub fn is_delta(&self) -> bool {
-        matches!(self, Self::Point(_))
     }
 }

@@ -2,6 +2,7 @@
 
 use std::f32::consts::PI;
 
+use super::lanes::{LANES, Lanes, map, sin_cos, zip};
 use super::{LightSample, Source};
 use crate::math::{DVec3, Vec3};
 
@@ -88,21 +89,36 @@ pub struct SeenQuad<'a> {
 }
 
 impl SeenQuad<'_> {
-    /// Uniform over the solid angle of a rectangle, over the area of another parallelogram.
-    pub fn sample(&self, u: [f32; 2], radiance: Vec3, source: Source) -> LightSample {
-        if let (Some(spherical), Some(rectangle)) = (&self.spherical, &self.quad.rectangle) {
-            let local = spherical.sample(u);
-            let offset = rectangle.x * local.x + rectangle.y * local.y + self.quad.normal * local.z;
-            let weight = radiance * spherical.solid_angle;
-            return LightSample {
-                target: self.point + offset,
-                direction: offset.normalize(),
-                weight,
-                source,
-            };
-        }
-        let offset = self.to_corner + self.quad.u * u[0] + self.quad.v * u[1];
-        self.quad.by_area(self.point, offset, radiance, source)
+    /// Uniform over the solid angle of a rectangle, over the area of another parallelogram; one for each lane.
+    pub fn samples(
+        &self,
+        u: [Lanes; 2],
+        radiance: Vec3,
+        source: Source,
+    ) -> impl Iterator<Item = LightSample> {
+        let spherical = self.spherical.as_ref().zip(self.quad.rectangle.as_ref());
+        let ([x, y, z], nearness, solid_angle) = match spherical {
+            Some((spherical, rectangle)) => {
+                let (offset, nearness) = spherical.directions(u, rectangle, self.quad.normal);
+                (offset, nearness, spherical.solid_angle)
+            }
+            None => (self.offsets(u), [0.0; LANES], 0.0),
+        };
+        let by_angle = spherical.is_some();
+        (0..LANES).map(move |i| {
+            let offset = Vec3::new(x[i], y[i], z[i]);
+            if !by_angle {
+                return self.quad.by_area(self.point, offset, radiance, source);
+            }
+            let (target, direction) = (self.point + offset, offset * nearness[i]);
+            LightSample { target, direction, weight: radiance * solid_angle, source }
+        })
+    }
+
+    /// Coordinates of points uniform over the area, from the point that sees them.
+    fn offsets(&self, u: [Lanes; 2]) -> [Lanes; 3] {
+        let (quad, corner) = (self.quad, self.to_corner);
+        [0, 1, 2].map(|axis| zip(u[0], u[1], |s, t| corner[axis] + quad.u[axis] * s + quad.v[axis] * t))
     }
 }
 
@@ -146,22 +162,39 @@ impl Rectangle {
 }
 
 impl SphericalRectangle {
-    /// A point of the rectangle, uniform over its solid angle.
-    fn sample(&self, u: [f32; 2]) -> Vec3 {
+    /// Coordinates of points uniform over the solid angle, and one over their distances.
+    fn directions(&self, u: [Lanes; 2], rectangle: &Rectangle, normal: Vec3) -> ([Lanes; 3], Lanes) {
+        let (x, y) = self.samples(u);
+        let away = normal * self.z;
+        let axis = |axis: usize| zip(x, y, |x, y| rectangle.x[axis] * x + rectangle.y[axis] * y + away[axis]);
+        let offset = [axis(0), axis(1), axis(2)];
+        let squares = offset.map(|axis| map(axis, |x| x * x));
+        let flat = zip(squares[0], squares[1], |x, y| x + y);
+        (offset, zip(flat, squares[2], |flat, z| 1.0 / (flat + z).sqrt()))
+    }
+
+    /// Coordinates of points of the rectangle along its sides, uniform over its solid angle.
+    fn samples(&self, u: [Lanes; 2]) -> (Lanes, Lanes) {
         // A slice of the sphere up to x takes its share of the solid angle.
-        let (sin, cos) = (u[0] * self.solid_angle + self.start).sin_cos();
-        let slope = (cos * self.lower - self.upper) / sin;
-        let slope2 = slope * slope;
-        let lower2 = self.lower * self.lower;
-        // cos² and sin² of the slice's direction in the plane of x and z.
-        let x = (-self.z * slope.signum() / (slope2 + lower2 - 1.0).max(f32::MIN_POSITIVE).sqrt())
-            .clamp(self.x[0], self.x[1]);
-        // Along the slice, heights on the unit circle are uniform.
-        let d2 = x * x + self.z * self.z;
-        let [h0, h1] = self.y.map(|y| y / (d2 + y * y).sqrt());
-        let h = h0 + u[1] * (h1 - h0);
-        let rest = 1.0 - h * h;
-        let y = if rest > 0.0 { (h * (d2 / rest).sqrt()).clamp(self.y[0], self.y[1]) } else { self.y[1] };
-        Vec3::new(x, y, self.z)
+        let (sin, cos) = sin_cos(map(u[0], |u| u * self.solid_angle + self.start));
+        // sin² of the angle that the lower plane stands at.
+        let tilt = 1.0 - self.lower * self.lower;
+        let x = zip(sin, cos, |sin, cos| {
+            // Along the slice x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
+            let slope = cos * self.lower - self.upper;
+            let sin = if slope < 0.0 { -sin } else { sin };
+            let root = (slope * slope - tilt * (sin * sin)).max(f32::MIN_POSITIVE).sqrt();
+            (-self.z * sin / root).max(self.x[0]).min(self.x[1])
+        });
+        // There, heights on the unit circle are uniform.
+        let y = zip(x, u[1], |x, u| {
+            let d2 = x * x + self.z * self.z;
+            let height = |y: f32| y / (d2 + y * y).sqrt();
+            let (h0, h1) = (height(self.y[0]), height(self.y[1]));
+            let h = h0 + u * (h1 - h0);
+            let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
+            (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1])
+        });
+        (x, y)
     }
 }

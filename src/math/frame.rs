@@ -31,11 +31,6 @@ impl Frame {
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         self.s * local.x + self.t * local.y + self.n * local.z
     }
-
-    /// The inverse of [`Frame::to_world`].
-    pub fn to_local(&self, world: Vec3) -> Vec3 {
-        Vec3::new(world.dot(self.s), world.dot(self.t), world.dot(self.n))
-    }
 }
 
 #[cfg(test)]

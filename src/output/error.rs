@@ -61,6 +61,9 @@ pub enum OutputError {
         /// What to do.
         way_out: &'static str,
     },
+    /// The work was told to stop.
+    #[error("cancelled")]
+    Cancelled(#[from] crate::control::Cancelled),
     /// The system refused.
     #[error("cannot write {}: {}; {}", path.display(), in_words(source), way_out(source))]
     File {

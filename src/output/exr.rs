@@ -1,7 +1,5 @@
 //! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP.
 
-use std::io::Cursor;
-
 use ::exr::block::UncompressedBlock;
 use ::exr::block::writer::ChunksWriter;
 use ::exr::error::UnitResult;
@@ -11,10 +9,16 @@ use ::exr::meta::attribute::{Chromaticities, Text};
 use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2};
 use rayon::prelude::*;
 
+use super::stoppable::Stoppable;
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_light, one_line};
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, OutputError> {
+pub(super) fn encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
     let size = (image.width as usize, image.height as usize);
     let pixel = |position: Vec2<usize>| {
         let color = image.pixels[position.y() * size.0 + position.x()];
@@ -26,13 +30,13 @@ pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<V
     file.attributes.chromaticities = Some(REC_709);
     let headers = file.layer_data.infer_headers(&file.attributes);
     let layers = file.layer_data.create_writer(&headers);
-    let mut bytes = Vec::new();
-    ::exr::block::write(Cursor::new(&mut bytes), headers, true, |meta, file| {
+    let mut bytes = Stoppable::new(token);
+    ::exr::block::write(&mut bytes, headers, true, |meta, file| {
         let block = |index| layers.extract_uncompressed_block(&meta.headers, index);
         compress(&meta, meta.collect_ordered_block_data(block), file)
     })
     .map_err(|error| OutputError::encoder(Format::Exr, &error))?;
-    Ok(bytes)
+    Ok(bytes.into_bytes())
 }
 
 /// The encoder's own way is a pool with a thread for every core. This one stays in the pool that the caller is in, or

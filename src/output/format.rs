@@ -79,11 +79,6 @@ impl Format {
         })
     }
 
-    /// Whether it holds linear radiance rather than a picture for eyes.
-    pub fn is_float(self) -> bool {
-        matches!(self, Self::Exr | Self::Hdr)
-    }
-
     /// Whether a file of this format can hold such a picture.
     ///
     /// # Errors

@@ -1,7 +1,8 @@
 //! Radiance HDR: G. Ward, "Real Pixels" (Graphics Gems II, 1991): three mantissas and a shared exponent, lines
 //! compressed by runs.
 
-use super::{EncodeOptions, SOFTWARE, as_light, one_line};
+use super::{EncodeOptions, OutputError, SOFTWARE, as_light, one_line};
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
@@ -12,7 +13,11 @@ const LONGEST_LITERAL: usize = 128;
 /// Shorter runs cost as much as literals.
 const SHORTEST_RUN: usize = 4;
 
-pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Vec<u8> {
+pub(super) fn encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
     let mut header = format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\n");
     for (name, value) in &options.metadata {
         header += &format!("# {}: {}\n", one_line(name), one_line(value));
@@ -20,9 +25,10 @@ pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Vec<u8> 
     header += &format!("FORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", image.height, image.width);
     let mut bytes = header.into_bytes();
     for line in image.pixels.chunks_exact(image.width as usize) {
+        token.check()?;
         write_line(line, &mut bytes);
     }
-    bytes
+    Ok(bytes)
 }
 
 fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {

@@ -3,18 +3,29 @@
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
+use super::stoppable::{self, Stoppable};
 use super::{EncodeOptions, Format, OutputError};
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
-use crate::film::tone::develop;
 
 /// Of 100: no loss that is seen at arm's length, at a quarter of the size of 100.
 const QUALITY: u8 = 92;
 
-pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, OutputError> {
-    let picture = develop(image, &options.tone);
-    let mut bytes = Vec::new();
+pub(super) fn encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
+    let mut picture = Vec::with_capacity(3 * image.pixels.len());
+    let take = |part: &[u8]| {
+        picture.extend_from_slice(part);
+        Ok(())
+    };
+    let developed = stoppable::developed(image, options, token, take);
+    developed.map_err(|error| OutputError::encoder(Format::Jpeg, &error))?;
+    let mut bytes = Stoppable::new(token);
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
-        .encode(picture.pixels.as_flattened(), image.width, image.height, ExtendedColorType::Rgb8)
+        .encode(&picture, image.width, image.height, ExtendedColorType::Rgb8)
         .map_err(|error| OutputError::encoder(Format::Jpeg, &error))?;
-    Ok(bytes)
+    Ok(bytes.into_bytes())
 }

@@ -11,6 +11,7 @@ mod jpeg;
 mod place;
 mod png;
 mod ppm;
+mod stoppable;
 mod temporary;
 pub mod write;
 
@@ -19,6 +20,7 @@ use std::path::Path;
 pub use error::OutputError;
 pub use format::{BitDepth, Format};
 
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::tone::ToneMapping;
 
@@ -40,23 +42,27 @@ pub struct EncodeOptions {
 /// The bytes of a file of this format. The same picture and options give the same bytes.
 ///
 /// # Errors
-/// A format that cannot hold a picture of this size or depth; an encoder that fails.
+/// A format that cannot hold a picture of this size or depth; an encoder that fails; [`OutputError::Cancelled`].
 pub fn encode(
     image: &RadianceImage,
     options: &EncodeOptions,
     format: Format,
+    token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
     format.check_picture(image.width, image.height, options.bit_depth)?;
     if image.pixels.len() != image.width as usize * image.height as usize {
         return Err(OutputError::encoder(format, &"the picture's size and its pixels do not agree"));
     }
-    match format {
-        Format::Png => png::encode(image, options),
-        Format::Exr => exr::encode(image, options),
-        Format::Hdr => Ok(hdr::encode(image, options)),
-        Format::Jpeg => jpeg::encode(image, options),
-        Format::Ppm => Ok(ppm::encode(image, options)),
-    }
+    let bytes = match format {
+        Format::Png => png::encode(image, options, token),
+        Format::Exr => exr::encode(image, options, token),
+        Format::Hdr => hdr::encode(image, options, token),
+        Format::Jpeg => jpeg::encode(image, options, token),
+        Format::Ppm => ppm::encode(image, options, token),
+    };
+    // An encoder that was stopped tells of its writer.
+    token.check()?;
+    bytes
 }
 
 /// Whether a picture can be written here, as far as can be told without writing: told before the work rather than

@@ -1,19 +1,31 @@
 //! PNG: 8 or 16 bit sRGB, with text chunks.
 
+use std::io::Write;
+
 use ::png::{ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 
-use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE};
+use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, stoppable};
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
-use crate::film::tone::{develop, develop16};
 
 /// Length of a keyword (PNG specification, 11.3.3.1).
 const KEYWORD_BYTES: usize = 79;
+/// Of the compressed data.
+const CHUNK_BYTES: usize = 1 << 18;
 
-pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, OutputError> {
-    try_encode(image, options).map_err(|error| OutputError::encoder(Format::Png, &error))
+pub(super) fn encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
+    try_encode(image, options, token).map_err(|error| OutputError::encoder(Format::Png, &error))
 }
 
-fn try_encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>, EncodingError> {
+fn try_encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, image.width, image.height);
     encoder.set_color(ColorType::Rgb);
@@ -27,18 +39,11 @@ fn try_encode(image: &RadianceImage, options: &EncodeOptions) -> Result<Vec<u8>,
         add_text(&mut encoder, name, value)?;
     }
     let mut writer = encoder.write_header()?;
-    match options.bit_depth {
-        BitDepth::Eight => writer.write_image_data(develop(image, &options.tone).pixels.as_flattened())?,
-        BitDepth::Sixteen => writer.write_image_data(&big_endian(image, options))?,
-    }
+    let mut data = writer.stream_writer_with_size(CHUNK_BYTES)?;
+    stoppable::developed(image, options, token, |part| data.write_all(part))?;
+    data.finish()?;
     writer.finish()?;
     Ok(bytes)
-}
-
-/// 16-bit components, the high byte first, as PNG and PPM hold them.
-pub(super) fn big_endian(image: &RadianceImage, options: &EncodeOptions) -> Vec<u8> {
-    let picture = develop16(image, &options.tone);
-    picture.pixels.as_flattened().iter().flat_map(|component| component.to_be_bytes()).collect()
 }
 
 /// tEXt holds Latin-1 and is read by everything; iTXt holds the rest.

@@ -1,11 +1,14 @@
 //! Binary PPM (P6): 8 or 16 bit sRGB.
 
-use super::png::big_endian;
-use super::{BitDepth, EncodeOptions, SOFTWARE, one_line};
+use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, one_line, stoppable};
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
-use crate::film::tone::develop;
 
-pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Vec<u8> {
+pub(super) fn encode(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
     let mut header = format!("P6\n# Software: {SOFTWARE}\n");
     for (name, value) in &options.metadata {
         header += &format!("# {}: {}\n", one_line(name), one_line(value));
@@ -16,9 +19,11 @@ pub(super) fn encode(image: &RadianceImage, options: &EncodeOptions) -> Vec<u8> 
     };
     header += &format!("{} {}\n{largest}\n", image.width, image.height);
     let mut bytes = header.into_bytes();
-    match options.bit_depth {
-        BitDepth::Eight => bytes.extend_from_slice(develop(image, &options.tone).pixels.as_flattened()),
-        BitDepth::Sixteen => bytes.extend(big_endian(image, options)),
-    }
-    bytes
+    let take = |part: &[u8]| {
+        bytes.extend_from_slice(part);
+        Ok(())
+    };
+    let written = stoppable::developed(image, options, token, take);
+    written.map_err(|error| OutputError::encoder(Format::Ppm, &error))?;
+    Ok(bytes)
 }

@@ -4,6 +4,10 @@ use super::*;
 use crate::film::tone::{Curve, develop, develop16};
 use crate::math::Vec3;
 
+fn encode(image: &RadianceImage, options: &EncodeOptions, format: Format) -> Result<Vec<u8>, OutputError> {
+    super::encode(image, options, format, &CancelToken::new())
+}
+
 /// Dark to bright, coloured, with flat parts.
 fn picture(width: u32, height: u32) -> RadianceImage {
     let pixel = |i: u32| {
@@ -250,4 +254,21 @@ fn what_a_format_cannot_hold_is_said() {
     assert!(encode(&torn, &EncodeOptions::default(), Format::Jpeg).is_err());
     assert!(BitDepth::try_from(12).is_err());
     assert_eq!(BitDepth::try_from(16).expect("known"), BitDepth::Sixteen);
+}
+
+#[test]
+fn what_is_cancelled_is_neither_encoded_nor_written() {
+    let token = CancelToken::new();
+    token.cancel();
+    for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm] {
+        let stopped = super::encode(&picture(30, 20), &options(BitDepth::Eight), format, &token);
+        assert!(matches!(stopped, Err(OutputError::Cancelled(_))), "{format}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.png");
+    std::fs::write(&path, "old").expect("written");
+    let stopped = write::atomic_until(&path, b"new", &token);
+    assert!(matches!(stopped, Err(OutputError::Cancelled(_))));
+    assert_eq!(std::fs::read(&path).expect("read"), b"old");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
 }

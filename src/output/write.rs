@@ -11,9 +11,10 @@ use std::sync::{Arc, Once};
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 
-use super::OutputError;
 use super::place::{self, Place, Target};
 use super::temporary::{self, Temporary};
+use super::{OutputError, stoppable};
+use crate::control::CancelToken;
 
 /// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At
 /// any moment, whatever ends the process, the file is the old one or the new one. Its permissions stay; a link
@@ -25,12 +26,20 @@ use super::temporary::{self, Temporary};
 /// Names the path, what the system said and the way out; the old file is untouched then, and no temporary file is
 /// left.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    atomic_until(path, bytes, &CancelToken::new())
+}
+
+/// [`atomic`] that can be stopped as long as the new file is not whole.
+///
+/// # Errors
+/// As [`atomic`], and [`OutputError::Cancelled`].
+pub fn atomic_until(path: &Path, bytes: &[u8], token: &CancelToken) -> Result<(), OutputError> {
     prepare_process();
-    match place::find(path)? {
-        Place::File(target) => replace(&target, bytes),
-        Place::InPlace(place) => in_place(&place, bytes),
-    }
-    .map_err(|error| OutputError::file(path, error))
+    let written = match place::find(path)? {
+        Place::File(target) => replace(&target, bytes, token),
+        Place::InPlace(place) => in_place(&place, bytes, token),
+    };
+    stoppable::or_cancelled(written, token, |error| OutputError::file(path, error))
 }
 
 /// Makes a file that would grow beyond `ulimit -f` an error instead of the end of the process (SIGXFSZ). [`atomic`]
@@ -44,13 +53,13 @@ pub fn prepare_process() {
     });
 }
 
-fn replace(target: &Target, bytes: &[u8]) -> io::Result<()> {
+fn replace(target: &Target, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     let directory = target.directory();
     temporary::remove_stale(directory);
     let mode = target.existing.as_ref().map_or(0o666, |existing| existing.mode() & 0o777);
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
-    let mut new = Temporary::create(directory, name, mode)?;
-    new.file.write_all(bytes)?;
+    let new = Temporary::create(directory, name, mode)?;
+    stoppable::write_all(&new.file, bytes, token)?;
     if let Some(existing) = &target.existing {
         keep_owner(&new.file, existing);
         new.file.set_permissions(fs::Permissions::from_mode(existing.mode() & 0o7777))?;
@@ -79,7 +88,7 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
 }
 
 /// Appends, so that a descriptor that is a file keeps what it has.
-fn in_place(path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     let mut options = OpenOptions::new();
     options.append(true);
     // A pipe that nobody reads would hold the process for ever: not waiting makes that an error.
@@ -96,6 +105,6 @@ fn in_place(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if is_pipe {
         fcntl(&file, FcntlArg::F_SETFL(OFlag::O_APPEND))?;
     }
-    file.write_all(bytes)?;
+    stoppable::write_all(&file, bytes, token)?;
     file.flush()
 }

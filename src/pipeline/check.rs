@@ -7,12 +7,9 @@ use std::sync::mpsc;
 use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
-use super::stages::parse::Parsed;
-use crate::assets::image::ImageEncoding;
 use crate::math::Vec3;
-use crate::scene::description::{Encoding, MaterialKind, Object, Shape};
+use crate::scene::description::{MaterialKind, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
-use crate::world::{NeededTexture, TextureSource};
 
 /// What a scene that is right consists of.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +34,7 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
     let (events, _) = mpsc::channel();
     let sink = Sink { generation: 0, events, previews: PreviewSlot::default() };
     let (parsed, meshes, textures, warnings) =
-        Engine::new(Means::default(), Arc::default()).read_all(path, &sink, add_declared)?;
+        Engine::new(Means::default(), Arc::default()).read_all(path, &sink)?;
     let scene = &parsed.loaded.scene;
     let triangles = |shape: &Shape| match shape {
         Shape::Mesh { file, .. } => meshes[*file].mesh.mesh.triangles.len() as u64,
@@ -59,25 +56,4 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
         lights: (scene.lights.len() + scene.objects.iter().filter(emits).count()) as u64,
         warnings,
     })
-}
-
-/// The textures of the scene file that no visible material names.
-fn add_declared(parsed: &Parsed, wanted: &mut Vec<NeededTexture>) {
-    for (index, texture) in parsed.loaded.scene.textures.iter().enumerate() {
-        if wanted.iter().any(|one| one.source.path == texture.file.value) {
-            continue;
-        }
-        let encoding = match texture.encoding {
-            Encoding::Auto => ImageEncoding::Color,
-            Encoding::Srgb => ImageEncoding::Srgb,
-            Encoding::Linear => ImageEncoding::Linear,
-        };
-        let source = TextureSource { path: texture.file.value.clone(), encoding };
-        wanted.push(NeededTexture {
-            source,
-            name: texture.name.clone(),
-            declared: Some(index),
-            mesh_file: None,
-        });
-    }
 }

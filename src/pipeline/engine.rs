@@ -19,7 +19,7 @@ use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
 use super::stages::preview::Screen;
 use super::stages::render::{Order, render};
-use super::stages::textures::{TextureCache, Textures, textures};
+use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::write::{Written, check_targets, write, write_if_wanted};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
 use super::table::Table;
@@ -143,9 +143,9 @@ impl Engine {
         }
         self.written.forget();
         let (written, contents) = (&mut self.written, &self.contents);
-        if let Err(message) = pool.install(|| write(canvas, plan, written, contents, sink)) {
-            sink.write_failed(message);
-        }
+        // A token that nobody cancels: this picture was asked for by hand.
+        let token = CancelToken::new();
+        say_if_failed(sink, pool.install(|| write(canvas, plan, written, contents, sink, &token)));
     }
 
     /// Show the picture as it is at another size, outside of a request.
@@ -172,7 +172,8 @@ impl Engine {
         })?;
         self.plan = Some(ready.plan.clone());
         let rays = table.run(Stage::Render, || self.render(request, &ready, sink, meanwhile))?;
-        let is_written = table.run(Stage::Write, || self.write(request, &ready.plan, sink))?;
+        let token = meanwhile.token;
+        let is_written = table.run(Stage::Write, || self.write(request, &ready.plan, sink, token))?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let outcome = Outcome {
             scene: &ready.parsed.loaded.path,
@@ -254,9 +255,7 @@ impl Engine {
             } else if orders.take_write() {
                 let mut written = written.borrow_mut();
                 written.forget();
-                if let Err(message) = write(canvas, plan, &mut written, contents, sink) {
-                    sink.write_failed(message);
-                }
+                say_if_failed(sink, write(canvas, plan, &mut written, contents, sink, &CancelToken::new()));
             }
         };
         let order = Order {
@@ -280,11 +279,17 @@ impl Engine {
     }
 
     /// Whether the picture is on disk then.
-    fn write(&mut self, request: &Request, plan: &Plan, sink: &Sink) -> Result<Staged<bool>, Stop> {
+    fn write(
+        &mut self,
+        request: &Request,
+        plan: &Plan,
+        sink: &Sink,
+        token: &CancelToken,
+    ) -> Result<Staged<bool>, Stop> {
         let pool = self.pool(plan.threads)?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let (written, contents) = (&mut self.written, &self.contents);
-        pool.install(|| write_if_wanted(request.write, canvas, plan, written, contents, sink))
+        pool.install(|| write_if_wanted(request.write, canvas, plan, written, contents, sink, token))
     }
 
     /// The pool of this many threads; kept while the number stays.
@@ -323,7 +328,6 @@ impl Engine {
         &mut self,
         path: &Path,
         sink: &Sink,
-        declared: impl Fn(&Parsed, &mut Vec<crate::world::NeededTexture>),
     ) -> Result<(Arc<Parsed>, Meshes, Textures, Vec<Diagnostic>), Failure> {
         let token = CancelToken::new();
         let mut findings = Findings::default();
@@ -335,7 +339,7 @@ impl Engine {
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
             let mut wanted = needed(loaded, &found);
-            declared(&parsed, &mut wanted);
+            add_declared(loaded, &mut wanted);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             Ok((parsed, found, texels))
         };
@@ -347,5 +351,11 @@ impl Engine {
             Err(Stop::Failed(failure)) => Err(failure),
             Err(Stop::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
+    }
+}
+
+fn say_if_failed(sink: &Sink, written: Result<Staged<()>, Stop>) {
+    if let Err(Stop::Failed(Failure::Work(message))) = written {
+        sink.write_failed(message);
     }
 }

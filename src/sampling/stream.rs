@@ -37,15 +37,18 @@ impl PixelSampler {
 
     /// Four numbers in [0, 1).
     pub fn get4(&self, purpose: Purpose) -> [f32; 4] {
-        self.get4_of(purpose, 0, 1)
+        let (round, place) = (self.sample / SEQUENCE_LENGTH, self.sample % SEQUENCE_LENGTH);
+        sobol_burley::sample_4d(place, 0, mix(self.seed ^ purpose.0) ^ mix(round))
     }
 
-    /// Four numbers for the `i`-th of `n` repetitions of one decision, well distributed over repetitions and samples together.
-    pub fn get4_of(&self, purpose: Purpose, i: u32, n: u32) -> [f32; 4] {
-        let index = u64::from(self.sample) * u64::from(n) + u64::from(i);
-        let (round, place) =
-            (index / u64::from(SEQUENCE_LENGTH), (index % u64::from(SEQUENCE_LENGTH)) as u32);
-        sobol_burley::sample_4d(place, 0, mix(self.seed ^ purpose.0) ^ mix(round as u32))
+    /// Two numbers in [0, 1) for each of `n` repetitions of one decision, well distributed over repetitions and samples
+    /// together.
+    pub fn get2_all(&self, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> + use<> {
+        let (seed, first) = (mix(self.seed ^ purpose.0), u64::from(self.sample) * u64::from(n));
+        (first..first + u64::from(n)).map(move |index| {
+            let round = (index >> 32) as u32;
+            scrambled(index as u32, seed ^ mix(round))
+        })
     }
 
     /// Two numbers in [0, 1).
@@ -53,6 +56,34 @@ impl PixelSampler {
         let [x, y, ..] = self.get4(purpose);
         Vec2::new(x, y)
     }
+}
+
+/// A point of the first two dimensions of Sobol's sequence, its order and both coordinates scrambled.
+fn scrambled(index: u32, seed: u32) -> [f32; 2] {
+    let place = owen(index.reverse_bits(), seed).reverse_bits();
+    let unit = |bits: u32| (bits.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
+    [unit(owen(place, mix(seed ^ 0x68bc_21eb))), unit(owen(pascal(place), mix(seed ^ 0x02e5_be93)))]
+}
+
+/// The second coordinate with its bits reversed: bit j is the sum of those bits k of the index for which C(k, j) is odd,
+/// which are the k that have every bit of j. That of the first coordinate is the index itself.
+fn pascal(mut bits: u32) -> u32 {
+    for (shift, lacking) in
+        [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)]
+    {
+        bits ^= (bits >> shift) & lacking;
+    }
+    bits
+}
+
+/// Owen scrambling of reversed bits by a hash in which each depends on lower ones only (Laine and Karras, *Stratified
+/// Sampling for Stochastic Transparency*, 2011; constants of Vegdahl, *Building a Better LK Hash*, 2021).
+fn owen(mut bits: u32, seed: u32) -> u32 {
+    bits ^= bits.wrapping_mul(0x3d20_adea);
+    bits = bits.wrapping_add(seed);
+    bits = bits.wrapping_mul((seed >> 16) | 1);
+    bits ^= bits.wrapping_mul(0x0552_6c56);
+    bits ^ bits.wrapping_mul(0x53a2_2864)
 }
 
 /// A bijective hash of 32 bits (Wellons, *Prospecting for Hash Functions*, 2018, "lowbias32").
@@ -70,19 +101,51 @@ mod tests {
 
     #[test]
     fn powers_of_two_are_stratified_and_pixels_differ() {
+        // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
-            let mut cells = [0_u32; 64];
-            for sample in 0..64 / n {
-                for i in 0..n {
-                    let [x, y, ..] =
-                        PixelSampler::new(3, 10, 20, sample).get4_of(Purpose::at_vertex(1, 2), i, n);
-                    cells[(x * 8.0) as usize * 8 + (y * 8.0) as usize] += 1;
+            let sampler = |sample| PixelSampler::new(3, 10, 20, sample);
+            let all = (0..64 / n).flat_map(|sample| sampler(sample).get2_all(Purpose::at_vertex(1, 2), n));
+            let points: Vec<[f32; 2]> = all.collect();
+            for columns in [1_usize, 2, 4, 8, 16, 32, 64] {
+                let mut cells = [0_u32; 64];
+                for [x, y] in &points {
+                    let (column, row) = (x * columns as f32, y * (64 / columns) as f32);
+                    cells[column as usize + columns * row as usize] += 1;
                 }
+                assert_eq!(cells, [1; 64], "{columns} columns");
             }
-            assert_eq!(cells, [1; 64]);
         }
         let first = |x| PixelSampler::new(3, x, 20, 0).get2(Purpose::CAMERA);
         assert_ne!(first(10), first(11));
+    }
+
+    #[test]
+    fn the_second_dimension_is_sobol_s() {
+        // Direction numbers v₀ = ½, vₖ = vₖ₋₁ ⊕ vₖ₋₁/2.
+        for index in (0..5000).chain([u32::MAX, 0x8000_0001]) {
+            let (mut sum, mut direction) = (0, 1_u32 << 31);
+            for bit in 0..32 {
+                sum ^= if index >> bit & 1 == 1 { direction } else { 0 };
+                direction ^= direction >> 1;
+            }
+            assert_eq!(pascal(index).reverse_bits(), sum, "{index}");
+        }
+    }
+
+    #[test]
+    fn scrambles_of_many_pixels_are_uniform() {
+        let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
+        for pixel in 0..n {
+            let sampler = PixelSampler::new(1, pixel % 200, pixel / 200, 7);
+            for [x, y] in sampler.get2_all(Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
+                sums = [sums[0] + x, sums[1] + y];
+                product += (x - 0.5) * (y - 0.5) * 12.0;
+            }
+        }
+        let count = f64::from(n);
+        // Five standard errors of 1/√(12n), and of 1/√n.
+        assert!(sums.iter().all(|sum| (sum / count - 0.5).abs() < 5.0 / (12.0 * count).sqrt()), "{sums:?}");
+        assert!((product / count).abs() < 5.0 / count.sqrt(), "{product}");
     }
 
     #[test]

@@ -324,6 +324,48 @@ pub enum Shape {
         /// Corner.
         c: DVec3,
     },
+    /// Flat and round.
+    Disk {
+        /// Centre.
+        center: DVec3,
+        /// Its front; not 0, any length.
+        normal: DVec3,
+        /// Radius > 0.
+        radius: f64,
+    },
+    /// A round bar, or a tube.
+    Cylinder {
+        /// An end of its axis.
+        a: DVec3,
+        /// The other end, elsewhere.
+        b: DVec3,
+        /// Radius > 0.
+        radius: f64,
+        /// Whether the ends are closed.
+        caps: bool,
+    },
+    /// Round, with a tip.
+    Cone {
+        /// Middle of its base.
+        base: DVec3,
+        /// Its tip, elsewhere.
+        tip: DVec3,
+        /// Radius > 0 of the base.
+        radius: f64,
+        /// Whether the base is closed.
+        cap: bool,
+    },
+    /// A ring of a round tube.
+    Torus {
+        /// Centre.
+        center: DVec3,
+        /// The axis that it goes around; not 0, any length.
+        axis: DVec3,
+        /// Radius of the circle in the middle of the tube, > `tube`.
+        radius: f64,
+        /// Radius of the tube, > 0.
+        tube: f64,
+    },
     /// An instance of a mesh file.
     Mesh {
         /// Index into [`Scene::mesh_files`].

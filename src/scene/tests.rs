@@ -98,6 +98,30 @@ fn things_keep_the_order_of_the_file_and_shapes_that_of_their_kinds() {
 }
 
 #[test]
+fn round_shapes_and_their_defaults() {
+    let scene = scene(
+        "[materials.m]\n\
+         [[torus]]\nmaterial='m'\n[[torus]]\nradius=2\naxis=[1,0,0]\nmaterial='m'\n\
+         [[cone]]\nmaterial='m'\n[[cone]]\nbase=[0,1,0]\ntip=[0,0,1]\ncap=false\nmaterial='m'\n\
+         [[cylinder]]\nmaterial='m'\n[[cylinder]]\nb=[0,0,2]\nradius=3\ncaps=false\nmaterial='m'\n\
+         [[disk]]\nmaterial='m'\n[[disk]]\ncenter=[1,2,3]\nnormal=[0,0,5]\nradius=4\nmaterial='m'\n",
+    );
+    let (zero, up) = (DVec3::ZERO, DVec3::Y);
+    let shapes: Vec<_> = scene.objects.into_iter().map(|object| object.shape).collect();
+    let expected = [
+        Shape::Disk { center: zero, normal: up, radius: 0.5 },
+        Shape::Disk { center: DVec3::new(1.0, 2.0, 3.0), normal: DVec3::Z * 5.0, radius: 4.0 },
+        Shape::Cylinder { a: zero, b: up, radius: 0.5, caps: true },
+        Shape::Cylinder { a: zero, b: DVec3::Z * 2.0, radius: 3.0, caps: false },
+        Shape::Cone { base: zero, tip: up, radius: 0.5, cap: true },
+        Shape::Cone { base: up, tip: DVec3::Z, radius: 0.5, cap: false },
+        Shape::Torus { center: zero, axis: up, radius: 0.5, tube: 0.125 },
+        Shape::Torus { center: zero, axis: DVec3::X, radius: 2.0, tube: 0.5 },
+    ];
+    assert_eq!(shapes, expected);
+}
+
+#[test]
 fn a_mesh_file_is_listed_once_however_it_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");

@@ -5,10 +5,14 @@ use std::sync::Arc;
 use super::shape::MeshInstance;
 use super::{Camera, Geometry, MeshTree, ObjectMaterial, Parts, Shape, World, emitters, lower};
 use crate::control::{CancelToken, Cancelled};
+use crate::geometry::cone::Cone;
 use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cylinder::Cylinder;
+use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::plane::Plane;
 use crate::geometry::sphere::Sphere;
+use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::lights::{Light, PointLight};
 use crate::materials::Material;
@@ -30,8 +34,8 @@ impl World {
         let geometry = match reuse.filter(|old| old.geometry.serves(&described, &parts.meshes)) {
             Some(old) => Arc::clone(&old.geometry),
             None => {
-                let shapes = described.iter().map(|shape| lower_shape(shape, &parts.meshes)).collect();
-                Arc::new(Geometry::build(shapes, described, token)?)
+                let shapes = described.iter().map(|shape| lower_shape(shape, &parts.meshes, token));
+                Arc::new(Geometry::build(shapes.collect::<Result<_, _>>()?, described, token)?)
             }
         };
         let (materials, object_materials) = lower_materials(scene, parts);
@@ -48,13 +52,25 @@ impl World {
     }
 }
 
-fn lower_shape(shape: &description::Shape, meshes: &[Arc<MeshTree>]) -> Shape {
-    match *shape {
+fn lower_shape(
+    shape: &description::Shape,
+    meshes: &[Arc<MeshTree>],
+    token: &CancelToken,
+) -> Result<Shape, Cancelled> {
+    Ok(match *shape {
         description::Shape::Sphere { center, radius } => Shape::Sphere(Sphere { center, radius }),
         description::Shape::Quad { corner, u, v } => Shape::Quad(Parallelogram::new(corner, u, v)),
         description::Shape::Plane { point, normal } => Shape::Plane(Plane::new(point, normal)),
         description::Shape::Box { center, size, rotate } => Shape::Box(Cuboid::new(center, size, rotate)),
         description::Shape::Triangle { a, b, c } => Shape::Triangle(Triangle { a, b, c }),
+        description::Shape::Disk { center, normal, radius } => Shape::Disk(Disk::new(center, normal, radius)),
+        description::Shape::Cylinder { a, b, radius, caps } => {
+            Shape::Cylinder(Cylinder::new(a, b, radius, caps))
+        }
+        description::Shape::Cone { base, tip, radius, cap } => Shape::Cone(Cone::new(base, tip, radius, cap)),
+        description::Shape::Torus { center, axis, radius, tube } => {
+            Shape::Torus(Torus::new(center, axis, radius, tube))
+        }
         description::Shape::Mesh { file, scale, rotate, translate, smooth } => {
             let instance = MeshInstance {
                 tree: Arc::clone(&meshes[file]),
@@ -62,11 +78,11 @@ fn lower_shape(shape: &description::Shape, meshes: &[Arc<MeshTree>]) -> Shape {
                 smooth,
             };
             if smooth {
-                instance.tree.normals();
+                instance.tree.prepare_normals(token)?;
             }
             Shape::Mesh(Box::new(instance))
         }
-    }
+    })
 }
 
 /// The scene's materials, then each mesh file's, then the one for triangles without any.

@@ -4,6 +4,7 @@ use super::{MeshTree, ObjectMaterial, Shape};
 use crate::geometry::cuboid::Cuboid;
 use crate::lights::emitter::Emitter;
 use crate::lights::rectangle::QuadEmitter;
+use crate::lights::round::{Round, RoundEmitter};
 use crate::lights::sphere::SphereEmitter;
 use crate::lights::triangles::TriangleEmitter;
 use crate::lights::{AreaLight, Light};
@@ -24,7 +25,15 @@ pub fn area_lights(
         ObjectMaterial::One(index) => of_one(index),
         ObjectMaterial::OfFile { .. } => None,
     };
+    let round = |shape, radiance| {
+        let emitter = RoundEmitter::new(shape);
+        emitter.map(|emitter| light(Emitter::Round(emitter), radiance)).into_iter().collect()
+    };
     match (shape, radiance) {
+        (Shape::Disk(disk), Some(radiance)) => round(Round::Disk(*disk), radiance),
+        (Shape::Cylinder(cylinder), Some(radiance)) => round(Round::Cylinder(*cylinder), radiance),
+        (Shape::Cone(cone), Some(radiance)) => round(Round::Cone(*cone), radiance),
+        (Shape::Torus(torus), Some(radiance)) => round(Round::Torus(*torus), radiance),
         (Shape::Sphere(sphere), Some(radiance)) => {
             vec![light(
                 Emitter::Sphere(SphereEmitter { center: sphere.center, radius: sphere.radius }),

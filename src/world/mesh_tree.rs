@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::accel::WideBvh;
 use crate::assets::LoadedMesh;
+use crate::assets::mesh::vertex_normals;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -38,13 +39,26 @@ impl MeshTree {
         self.tree.bounds()
     }
 
-    /// Vertex normals: the file's, or computed ones.
+    /// Vertex normals: the file's, or computed ones, at once if [`MeshTree::prepare_normals`] was called.
     pub fn normals(&self) -> &[Vec3] {
-        if self.loaded.mesh.normals.is_empty() {
-            self.computed_normals.get_or_init(|| crate::assets::mesh::vertex_normals(&self.loaded.mesh))
-        } else {
-            &self.loaded.mesh.normals
+        if !self.loaded.mesh.normals.is_empty() {
+            return &self.loaded.mesh.normals;
         }
+        // A token that nobody cancels.
+        let compute = || vertex_normals(&self.loaded.mesh, &CancelToken::new()).unwrap_or_default();
+        self.computed_normals.get_or_init(compute)
+    }
+
+    /// Compute the normals where the file has none.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn prepare_normals(&self, token: &CancelToken) -> Result<(), Cancelled> {
+        if self.loaded.mesh.normals.is_empty() && self.computed_normals.get().is_none() {
+            // Another thread may have been faster: then both have the same.
+            let _ = self.computed_normals.set(vertex_normals(&self.loaded.mesh, token)?);
+        }
+        Ok(())
     }
 
     /// Bytes held by the tree with its copy of the triangles.

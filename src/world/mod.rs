@@ -81,11 +81,6 @@ impl World {
         }
     }
 
-    /// Whether the camera has a lens of some size.
-    pub fn has_lens(&self) -> bool {
-        self.camera.aperture > 0.0
-    }
-
     /// Lights of any kind.
     pub fn light_count(&self) -> usize {
         self.lights.len()

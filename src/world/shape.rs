@@ -3,10 +3,14 @@
 use std::sync::Arc;
 
 use super::mesh_tree::MeshTree;
+use crate::geometry::cone::Cone;
 use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cylinder::Cylinder;
+use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::plane::Plane;
 use crate::geometry::sphere::Sphere;
+use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::Transform;
@@ -25,6 +29,14 @@ pub enum Shape {
     Box(Cuboid),
     /// A single triangle.
     Triangle(Triangle),
+    /// A disk.
+    Disk(Disk),
+    /// A cylinder.
+    Cylinder(Cylinder),
+    /// A cone.
+    Cone(Cone),
+    /// A torus.
+    Torus(Torus),
     /// An instance of a mesh.
     Mesh(Box<MeshInstance>),
 }
@@ -49,6 +61,10 @@ impl Shape {
             Self::Plane(plane) => plane.intersect(ray_f64),
             Self::Box(cuboid) => cuboid.intersect(ray_f64),
             Self::Triangle(triangle) => triangle.intersect(ray_f64),
+            Self::Disk(disk) => disk.intersect(ray_f64),
+            Self::Cylinder(cylinder) => cylinder.intersect(ray_f64),
+            Self::Cone(cone) => cone.intersect(ray_f64),
+            Self::Torus(torus) => torus.intersect(ray_f64),
             Self::Mesh(mesh) => mesh.tree.closest(&mesh.local_ray(ray)),
         }
     }
@@ -70,6 +86,10 @@ impl Shape {
             Self::Plane(plane) => plane.surface(&ray, hit),
             Self::Box(cuboid) => cuboid.surface(&ray, hit),
             Self::Triangle(triangle) => triangle.surface(hit),
+            Self::Disk(disk) => disk.surface(&ray, hit),
+            Self::Cylinder(cylinder) => cylinder.surface(&ray, hit),
+            Self::Cone(cone) => cone.surface(&ray, hit),
+            Self::Torus(torus) => torus.surface(&ray, hit),
             Self::Mesh(mesh) => mesh.surface(&ray, hit),
         }
     }
@@ -82,6 +102,10 @@ impl Shape {
             Self::Plane(_) => None,
             Self::Box(cuboid) => Some(cuboid.bounds()),
             Self::Triangle(triangle) => Some(triangle.bounds()),
+            Self::Disk(disk) => Some(disk.bounds()),
+            Self::Cylinder(cylinder) => Some(cylinder.bounds()),
+            Self::Cone(cone) => Some(cone.bounds()),
+            Self::Torus(torus) => Some(torus.bounds()),
             Self::Mesh(mesh) => Some(mesh.bounds()),
         }
     }

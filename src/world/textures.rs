@@ -1,11 +1,12 @@
 //! Which image files a scene looks up.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
-use crate::scene::description::{ColorSource, Encoding, Material, MaterialKind, Scene};
+use crate::scene::description::{ColorSource, Encoding, Material, MaterialKind, Scene, Shape};
 
 /// An image file, and how its numbers are read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -42,45 +43,49 @@ pub struct NeededTexture {
 /// them.
 pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
+    let mut known = HashSet::new();
     let mut add = |texture: NeededTexture| {
-        if !needed.iter().any(|known| known.source == texture.source) {
+        if known.insert(texture.source.clone()) {
             needed.push(texture);
         }
     };
-    for (index, material) in scene.materials.iter().enumerate() {
-        if scene.objects.iter().any(|object| object.material == Some(index)) {
-            for (texture, used) in material_textures(material) {
-                add(NeededTexture {
-                    source: declared_source(scene, texture, used),
-                    name: scene.textures[texture].name.clone(),
-                    declared: Some(texture),
-                    mesh_file: None,
-                });
-            }
+    let (used_materials, own_materials) = in_use(scene);
+    for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
+        for (texture, used) in material_textures(material) {
+            add(NeededTexture {
+                source: declared_source(scene, texture, used),
+                name: scene.textures[texture].name.clone(),
+                declared: Some(texture),
+                mesh_file: None,
+            });
         }
     }
-    for (file, mesh) in meshes.iter().enumerate() {
-        if uses_own_materials(scene, file) {
-            for (path, used) in mesh.materials.iter().flat_map(file_textures) {
-                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-                add(NeededTexture {
-                    source: file_source(path, used),
-                    name,
-                    declared: None,
-                    mesh_file: Some(file),
-                });
-            }
+    for (file, mesh) in meshes.iter().enumerate().filter(|(file, _)| own_materials[*file]) {
+        for (path, used) in mesh.materials.iter().flat_map(file_textures) {
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+            add(NeededTexture {
+                source: file_source(path, used),
+                name,
+                declared: None,
+                mesh_file: Some(file),
+            });
         }
     }
     needed
 }
 
-/// Whether some instance of a mesh file takes the file's own materials.
-pub fn uses_own_materials(scene: &Scene, file: usize) -> bool {
-    scene.objects.iter().any(|object| {
-        object.material.is_none()
-            && matches!(object.shape, crate::scene::description::Shape::Mesh { file: own, .. } if own == file)
-    })
+/// Which materials of the scene some object has, and which mesh files' own materials some instance takes.
+fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
+    let (mut materials, mut files) =
+        (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
+    for object in &scene.objects {
+        match (object.material, &object.shape) {
+            (Some(material), _) => materials[material] = true,
+            (None, Shape::Mesh { file, .. }) => files[*file] = true,
+            (None, _) => {}
+        }
+    }
+    (materials, files)
 }
 
 /// Where a texture of the scene file comes from when it is used for something.

@@ -137,6 +137,45 @@ const TABLES: &[(&str, &[Key])] = &[
         ],
     ),
     (
+        "[[disk]]",
+        &[
+            ("center", "[0, 0, 0]", Default),
+            ("normal", "[0, 1, 0]", Default),
+            ("radius", "0.5", Default),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
+        "[[cylinder]]",
+        &[
+            ("a", "[0, 0, 0]", Default),
+            ("b", "[0, 1, 0]", Default),
+            ("radius", "0.5", Default),
+            ("caps", "true", Default),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
+        "[[cone]]",
+        &[
+            ("base", "[0, 0, 0]", Default),
+            ("tip", "[0, 1, 0]", Default),
+            ("radius", "0.5", Default),
+            ("cap", "true", Default),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
+        "[[torus]]",
+        &[
+            ("center", "[0, 0, 0]", Default),
+            ("axis", "[0, 1, 0]", Default),
+            ("radius", "0.5", Default),
+            ("tube", "0.125", Default),
+            ("material", "\"wall\"", Required),
+        ],
+    ),
+    (
         "[[mesh]]",
         &[
             ("file", "\"../assets/knot.obj\"", Required),
@@ -239,7 +278,7 @@ fn a_table_of_required_keys_alone_is_enough() {
     let outcome = parse(example(|header, key| !is_kept(header, key)).into(), &path);
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
     let scene = outcome.scene.expect("a scene");
-    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (6, 1, 3));
+    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 1, 3));
     assert_eq!(scene.render.output, None);
 }
 

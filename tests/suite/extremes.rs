@@ -22,6 +22,10 @@ fn quad(corner: &str, u: &str, v: &str) -> String {
     format!("[[quad]]\ncorner = [{corner}]\nu = [{u}]\nv = [{v}]\nmaterial = \"m\"\n")
 }
 
+fn round(kind: &str, rest: &str) -> String {
+    format!("[[{kind}]]\n{rest}\nmaterial = \"m\"\n")
+}
+
 fn mesh(rest: &str) -> String {
     format!("[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\n{rest}\n")
 }
@@ -78,6 +82,17 @@ fn shapes_of_extreme_size_and_place() {
         "[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0.5, 1e-9, 0]\nmaterial = \"m\"\n".to_owned(),
         "[[box]]\ncenter = [0, 1, 0]\nsize = [1e-17, 1, 1e17]\nmaterial = \"m\"\n".to_owned(),
         "[[box]]\ncenter = [0, 1, 4]\nsize = [1, 1, 1]\nmaterial = \"m\"\n".to_owned(),
+        round("disk", "center = [0, 1, 0]\nnormal = [1e-17, 0, 1e-17]\nradius = 1e17"),
+        round("disk", "center = [0, 1, 0]\nnormal = [0, 0, 1e17]\nradius = 1e-17"),
+        round("cylinder", "a = [-1e17, 1, 0]\nb = [1e17, 1, 0]\nradius = 1e-3"),
+        round("cylinder", "a = [0, 1, 0]\nb = [1e-17, 1, 0]\nradius = 1e17"),
+        round("cylinder", "a = [0, 0.9, 0]\nb = [0, 1.1, 0]\nradius = 4\ncaps = false"),
+        round("cone", "base = [0, 0, 0]\ntip = [0, 1e17, 0]\nradius = 1"),
+        round("cone", "base = [0, 0, 0]\ntip = [0, 1e-17, 0]\nradius = 1e17\ncap = false"),
+        round("cone", "base = [0, 1, -9]\ntip = [0, 1, 4]\nradius = 3"),
+        round("torus", "center = [0, 1, 0]\nradius = 1e17\ntube = 1e-17"),
+        round("torus", "center = [0, 1, 0]\naxis = [0, 1e-17, 1e-17]\nradius = 1\ntube = 0.9999999999999999"),
+        round("torus", "center = [0, 1, 0]\nradius = 4\ntube = 0.5"),
         "[[plane]]\npoint = [0, 1e17, 0]\nnormal = [1e-17, 1e-17, 0]\nmaterial = \"m\"\n".to_owned(),
         "[[plane]]\npoint = [0, 1, 4]\nnormal = [0, 1, 0]\nmaterial = \"m\"\n".to_owned(),
     ] {
@@ -125,6 +140,10 @@ fn lights_at_the_limits() {
         quad("-1e17, 5, -1e17", "2e17, 0, 0", "0, 0, 2e17"),
         quad("0, 1, 0", "1e-17, 0, 0", "0, 1e-17, 0"),
         mesh("scale = 1e-12"),
+        round("disk", "center = [0, 5, 0]\nnormal = [0, -1, 0]\nradius = 1e17"),
+        round("cylinder", "a = [0, 1, 0]\nb = [0, 3, 0]\nradius = 1e-17"),
+        round("cone", "base = [0, 3, 0]\ntip = [0, 1.5, 0]\nradius = 1e17"),
+        round("torus", "center = [0, 1, 0]\nradius = 1\ntube = 1e-17"),
         (0..10_000).map(|i| sphere(&format!("{}, 3, {}", i % 100 - 50, -(i / 100)), "0.1")).collect(),
     ] {
         for radiance in ["1, 1, 1", "1e18, 1e18, 1e18", "1e-18, 1e-18, 1e-18"] {

@@ -2,38 +2,38 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use crate::assets::read::Watch;
+use super::apart::Reporter;
 
 /// Most bytes read at once: a decoder that asks for a whole image is to report and stop as well.
 const CHUNK: usize = 1 << 16;
 
-pub(super) struct Counting<'a, R> {
+pub(super) struct Counting<R> {
     inner: R,
     at: u64,
     /// Farthest byte read: decoders may go back.
     reached: u64,
     length: u64,
-    watch: Watch<'a>,
+    report: Reporter,
 }
 
-impl<'a, R> Counting<'a, R> {
-    pub(super) fn new(inner: R, length: u64, watch: Watch<'a>) -> Self {
-        Self { inner, at: 0, reached: 0, length, watch }
+impl<R> Counting<R> {
+    pub(super) fn new(inner: R, length: u64, report: Reporter) -> Self {
+        Self { inner, at: 0, reached: 0, length, report }
     }
 }
 
-impl<R: Read> Read for Counting<'_, R> {
+impl<R: Read> Read for Counting<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let most = buffer.len().min(CHUNK);
         let got = self.inner.read(&mut buffer[..most])?;
         self.at += got as u64;
         self.reached = self.reached.max(self.at.min(self.length));
-        self.watch.tick(self.reached as usize, self.length as usize).map_err(io::Error::other)?;
+        self.report.reached(self.reached)?;
         Ok(got)
     }
 }
 
-impl<R: Seek> Seek for Counting<'_, R> {
+impl<R: Seek> Seek for Counting<R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.at = self.inner.seek(to)?;
         Ok(self.at)

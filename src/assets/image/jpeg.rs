@@ -8,9 +8,8 @@ use crate::control::{CancelToken, unwatched};
 
 /// Whether the last scan ends: the marker of the end of the image follows that of the scan's start. Within a scan
 /// neither can occur (ITU-T T.81, B.1.1.5).
-pub(super) fn check_whole(path: &Path, limit: u64) -> Result<(), String> {
-    let token = CancelToken::new();
-    let bytes = read::bytes(path, limit, Watch { progress: &unwatched, token: &token });
+pub(super) fn check_whole(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
+    let bytes = read::bytes(path, limit, Watch { progress: &unwatched, token });
     let bytes = bytes.map_err(|error: AssetError| error.to_string())?;
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     match (last([0xff, 0xda]), last([0xff, 0xd9])) {

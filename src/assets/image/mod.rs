@@ -1,19 +1,22 @@
 //! Image files → texels, by `image`, within limits and with its panics contained.
 
+mod apart;
 mod convert;
 mod counting;
 mod jpeg;
 
+use std::fs::File;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::contain::contain;
 use super::read::{self, Watch};
 use super::{AssetError, read::in_words};
-use crate::control::{CancelToken, Progress};
+use crate::control::{CancelToken, Progress, unwatched};
 use crate::materials::texels::Texels;
+use apart::Reporter;
 use counting::Counting;
 
 /// Most bytes of an image file.
@@ -62,58 +65,98 @@ pub fn load(
     token: &CancelToken,
 ) -> Result<Texels, AssetError> {
     let watch = Watch { progress, token };
-    let (file, length) = read::open(path, FILE_LIMIT)?;
-    let wrong = |reason: String| AssetError::malformed(path, None, reason);
-    if length == 0 {
-        return Err(wrong("the file is empty".to_owned()));
-    }
-    watch.tick(0, length as usize)?;
-    let reader = BufReader::new(Counting::new(file, length, watch));
-    let texels = contain(|| Ok(convert::texels(decode(path, reader, length, limits)?, encoding)));
-    token.check()?;
+    let file = Source::open(path, limits, token)?;
+    let length = file.length as usize;
+    watch.tick(0, length)?;
     let texels =
-        texels.unwrap_or_else(|panic| Err(format!("the decoder gave up: {panic}"))).map_err(wrong)?;
-    watch.tick(length as usize, length as usize)?;
+        file.read_apart(watch, move |file, report| Ok(convert::texels(file.decode(report)?, encoding)))?;
+    watch.tick(length, length)?;
     Ok(texels)
 }
 
-fn decode(
-    path: &Path,
-    reader: BufReader<Counting<'_, std::fs::File>>,
-    length: u64,
-    limits: ImageLimits,
-) -> Result<DynamicImage, String> {
-    let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
-    if reader.format().is_none() {
-        // Only TGA has nothing to be told by.
-        let format = ImageFormat::from_path(path).ok().filter(|format| *format == ImageFormat::Tga);
-        reader.set_format(format.ok_or_else(unknown_format)?);
-    }
-    let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
-    if is_jpeg {
-        jpeg::check_whole(path, FILE_LIMIT)?;
-    }
-    let mut decoder_limits = Limits::default();
-    decoder_limits.max_image_width = Some(limits.side);
-    decoder_limits.max_image_height = Some(limits.side);
-    decoder_limits.max_alloc = Some(limits.memory_bytes);
-    reader.limits(decoder_limits);
-    let mut decoder = reader.into_decoder().map_err(|error| reason(&error))?;
-    let (width, height) = decoder.dimensions();
-    check_size(&decoder, limits)?;
-    if is_jpeg {
-        jpeg::check_plausible(width, height, length)?;
-    }
-    let orientation = decoder.orientation().map_err(|error| reason(&error))?;
-    let image = DynamicImage::from_decoder(decoder);
-    let mut image =
-        image.map_err(|error| format!("it claims {width} × {height} pixels: {}", reason(&error)))?;
-    image.apply_orientation(orientation);
-    Ok(image)
+/// Bytes that the texels of an image will take, by what its file says of its size.
+///
+/// # Errors
+/// As [`load`], as far as the start of the file shows them.
+pub fn texel_bytes(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<u64, AssetError> {
+    let watch = Watch { progress: &unwatched, token };
+    let file = Source::open(path, limits, token)?;
+    file.read_apart(watch, |file, report| Ok(file.decoder(report)?.1))
 }
 
-/// Refuse before anything of that size is allocated.
-fn check_size(decoder: &impl ImageDecoder, limits: ImageLimits) -> Result<(), String> {
+/// An open image file with what reading it goes by.
+struct Source {
+    path: PathBuf,
+    file: File,
+    length: u64,
+    limits: ImageLimits,
+    token: CancelToken,
+}
+
+impl Source {
+    fn open(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<Self, AssetError> {
+        let (file, length) = read::open(path, FILE_LIMIT)?;
+        if length == 0 {
+            return Err(AssetError::malformed(path, None, "the file is empty"));
+        }
+        Ok(Self { path: path.to_owned(), file, length, limits, token: token.clone() })
+    }
+
+    /// Let a foreign decoder at it.
+    fn read_apart<T: Send + 'static>(
+        self,
+        watch: Watch<'_>,
+        work: impl FnOnce(Self, Reporter) -> Result<T, String> + Send + 'static,
+    ) -> Result<T, AssetError> {
+        let (path, length) = (self.path.clone(), self.length);
+        let done = apart::run(watch, length, move |report| contain(|| work(self, report)))?;
+        watch.token.check()?;
+        let done = done.unwrap_or_else(|| Err("no thread could be started for it".to_owned()));
+        done.unwrap_or_else(|panic| Err(format!("the decoder gave up: {panic}")))
+            .map_err(|reason| AssetError::malformed(&path, None, reason))
+    }
+
+    fn decode(self, report: Reporter) -> Result<DynamicImage, String> {
+        let (mut decoder, _) = self.decoder(report)?;
+        let (width, height) = decoder.dimensions();
+        let orientation = decoder.orientation().map_err(|error| reason(&error))?;
+        let image = DynamicImage::from_decoder(decoder);
+        let mut image =
+            image.map_err(|error| format!("it claims {width} × {height} pixels: {}", reason(&error)))?;
+        image.apply_orientation(orientation);
+        Ok(image)
+    }
+
+    /// A decoder of an image within the limits, and the bytes that its texels will take.
+    fn decoder(self, report: Reporter) -> Result<(impl ImageDecoder, u64), String> {
+        let reader = BufReader::new(Counting::new(self.file, self.length, report));
+        let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
+        if reader.format().is_none() {
+            // Only TGA has nothing to be told by.
+            let format = ImageFormat::from_path(&self.path).ok().filter(|format| *format == ImageFormat::Tga);
+            reader.set_format(format.ok_or_else(unknown_format)?);
+        }
+        let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
+        if is_jpeg {
+            jpeg::check_whole(&self.path, FILE_LIMIT, &self.token)?;
+        }
+        let mut decoder_limits = Limits::default();
+        decoder_limits.max_image_width = Some(self.limits.side);
+        decoder_limits.max_image_height = Some(self.limits.side);
+        decoder_limits.max_alloc = Some(self.limits.memory_bytes);
+        reader.limits(decoder_limits);
+        let decoder = reader.into_decoder().map_err(|error| reason(&error))?;
+        let texel_bytes = check_size(&decoder, self.limits)?;
+        if is_jpeg {
+            let (width, height) = decoder.dimensions();
+            jpeg::check_plausible(width, height, self.length)?;
+        }
+        Ok((decoder, texel_bytes))
+    }
+}
+
+/// Refuse before anything of that size is allocated; gives the bytes of the texels.
+fn check_size(decoder: &impl ImageDecoder, limits: ImageLimits) -> Result<u64, String> {
     let (width, height) = decoder.dimensions();
     let size = format!("it has {width} × {height} pixels");
     if width == 0 || height == 0 {
@@ -130,7 +173,7 @@ fn check_size(decoder: &impl ImageDecoder, limits: ImageLimits) -> Result<(), St
     if needed > limits.memory_bytes {
         return Err(format!("{size}, which take {needed} bytes, more than {}", limits.memory_bytes));
     }
-    Ok(())
+    Ok(texels)
 }
 
 fn unknown_format() -> String {

@@ -4,7 +4,6 @@ use std::sync::Mutex;
 use ::image::{ExtendedColorType, save_buffer};
 
 use super::*;
-use crate::control::unwatched;
 use crate::materials::texels::TexelData;
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;

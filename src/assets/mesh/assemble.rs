@@ -8,6 +8,7 @@ use super::Source;
 use super::normals::fill_missing_normals;
 use super::polygon::triangulate;
 use crate::assets::{AssetError, Dropped, FileMaterial, LoadedMesh};
+use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -82,7 +83,7 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
     for uv in mesh.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
         *uv = Vec2::ZERO;
     }
-    complete_normals(&mut mesh);
+    complete_normals(&mut mesh, source.watch.token)?;
     Ok(LoadedMesh { mesh, materials, dropped, warnings, companions })
 }
 
@@ -221,22 +222,23 @@ fn retain_used<T>(values: &mut Vec<T>, new_index: &[u32]) {
     values.retain(|_| indices.next().is_some_and(|index| *index != u32::MAX));
 }
 
-fn complete_normals(mesh: &mut TriangleMesh) {
+fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
     for normal in &mut mesh.normals {
         *normal = normal.as_dvec3().try_normalize().map_or(Vec3::ZERO, |unit| unit.as_vec3());
     }
     if mesh.normals.iter().all(|normal| *normal == Vec3::ZERO) {
         mesh.normals = Vec::new();
     } else if mesh.normals.contains(&Vec3::ZERO) {
-        fill_missing_normals(mesh);
+        fill_missing_normals(mesh, token)?;
     }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::assets::read::Watch;
-    use crate::control::{CancelToken, unwatched};
+    use crate::control::unwatched;
     use std::path::Path;
 
     fn assembled(parsed: Parsed) -> Result<LoadedMesh, AssetError> {

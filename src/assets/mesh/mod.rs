@@ -6,6 +6,7 @@ mod mtl;
 mod normals;
 mod obj;
 mod off;
+mod places;
 mod ply;
 mod polygon;
 mod text;
@@ -16,7 +17,7 @@ use super::read::{self, Watch};
 use super::{AssetError, LoadedMesh};
 use crate::control::{CancelToken, Progress};
 
-pub use normals::{smooth_normals, vertex_normals};
+pub use normals::vertex_normals;
 
 /// Most bytes of a mesh file.
 const FILE_LIMIT: u64 = 4 << 30;

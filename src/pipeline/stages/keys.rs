@@ -90,6 +90,12 @@ fn shape(key: &mut Fingerprint, shape: &Shape, meshes: &[Key]) {
         Shape::Plane { point, normal } => numbers(2, &[*point, *normal], 0.0),
         Shape::Box { center, size, rotate } => numbers(3, &[*center, *size, *rotate], 0.0),
         Shape::Triangle { a, b, c } => numbers(4, &[*a, *b, *c], 0.0),
+        Shape::Disk { center, normal, radius } => numbers(6, &[*center, *normal], *radius),
+        Shape::Cylinder { a, b, radius, caps } => numbers(7 + usize::from(*caps), &[*a, *b], *radius),
+        Shape::Cone { base, tip, radius, cap } => numbers(9 + usize::from(*cap), &[*base, *tip], *radius),
+        Shape::Torus { center, axis, radius, tube } => {
+            numbers(11, &[*center, *axis, DVec3::splat(*tube)], *radius);
+        }
         Shape::Mesh { file, scale, rotate, translate, smooth } => {
             numbers(5, &[*scale, *rotate, *translate], f64::from(u8::from(*smooth)));
             key.key(&meshes[*file]);

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -11,16 +11,23 @@ use super::super::cache::Pool;
 use super::super::fingerprint::{Fingerprint, Key};
 use super::super::watch::content::{Content, FileRead};
 use super::meshes::canonical;
-use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
+use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
-use crate::assets::image::{ImageEncoding, ImageLimits, load};
-use crate::control::Cancelled;
+use crate::assets::image::{ImageEncoding, ImageLimits, load, texel_bytes};
+use crate::control::{Cancelled, Progress};
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
+use crate::scene::description::Encoding;
 use crate::world::{NeededTexture, TextureSource};
 
+/// Most bytes that the texels of a scene's images may take together.
+const MOST_BYTES: u64 = 2 << 30;
+
+/// A file and the reading of its numbers, however the scene spells it.
+type Name = (PathBuf, ImageEncoding);
+
 /// The cache of textures: one entry per file and reading of its numbers.
-pub(in crate::pipeline) type TextureCache = Pool<(PathBuf, ImageEncoding), Texels>;
+pub(in crate::pipeline) type TextureCache = Pool<Name, Texels>;
 
 /// The textures that were asked for, without those that failed.
 #[derive(Debug, Default)]
@@ -30,6 +37,14 @@ pub(in crate::pipeline) struct Textures {
     pub(in crate::pipeline) keys: Vec<Key>,
     /// Texels read from files by this request.
     pub(in crate::pipeline) texels_loaded: u64,
+}
+
+/// One image with all who ask for it.
+struct Image<'a> {
+    name: Name,
+    content: Content,
+    kept: Option<Arc<Texels>>,
+    asked_by: Vec<&'a NeededTexture>,
 }
 
 /// Load these. All files are tried; errors go to the findings.
@@ -47,60 +62,141 @@ pub(in crate::pipeline) fn textures(
     if needed.is_empty() {
         return Ok(Staged::skipped(textures, "no visible material names a texture"));
     }
-    let before: Vec<(Content, Option<Arc<Texels>>)> = needed
-        .iter()
-        .map(|one| {
-            let content = reading.contents.read(&one.source.path, reading.token)?;
-            Ok((content, cache.get(&name(&one.source), key(&one.source, content))))
-        })
-        .collect::<Result<_, Cancelled>>()?;
-    let assets: Vec<Asset<Texels>> = reading.pool.install(|| {
-        needed
-            .par_iter()
-            .zip(before)
-            .map(|(one, (content, kept))| load_one(one, content, kept, reading))
-            .collect()
-    });
+    let images = images(needed, cache, reading)?;
+    let assets = load_all(&images, MOST_BYTES, reading);
     let mut counts = Counts::default();
-    for (one, asset) in needed.iter().zip(assets) {
-        let file = asset.files[0].clone();
-        let key = key(&one.source, file.content);
-        findings.read(file);
-        match asset.result {
+    for (image, asset) in images.into_iter().zip(assets) {
+        let key = image.key();
+        for one in &image.asked_by {
+            findings.read(FileRead { path: one.source.path.clone(), content: image.content });
+        }
+        match asset {
             Ok((texels, was_kept)) => {
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
                 textures.texels_loaded += if was_kept { 0 } else { texels.len() as u64 };
-                cache.insert(name(&one.source), key, texels.clone());
                 textures.keys.push(key);
-                textures.texels.insert(one.source.clone(), texels);
+                for one in &image.asked_by {
+                    textures.texels.insert(one.source.clone(), texels.clone());
+                }
+                cache.insert(image.name, key, texels);
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => {
                 counts.failed += 1;
-                findings.asset_error(loaded, place(loaded, one), &error);
+                for one in &image.asked_by {
+                    findings.asset_error(loaded, place(loaded, one), &error);
+                }
             }
         }
     }
     Ok(loaded_and_kept(textures, counts))
 }
 
-fn load_one(
-    one: &NeededTexture,
-    content: Content,
-    kept: Option<Arc<Texels>>,
-    reading: &Reading<'_>,
-) -> Asset<Texels> {
-    let path = &one.source.path;
-    let files = vec![FileRead { path: path.clone(), content }];
-    if let Some(texels) = kept {
-        return Asset { files, result: Ok((texels, true)) };
+impl Image<'_> {
+    fn path(&self) -> &Path {
+        &self.asked_by[0].source.path
     }
+
+    fn key(&self) -> Key {
+        let (path, encoding) = &self.name;
+        Fingerprint::new("texture").path(path).index(*encoding as usize).content(self.content).finish()
+    }
+}
+
+/// Each file once for each reading of its numbers, in the order asked for, with what the cache has of it.
+fn images<'a>(
+    needed: &'a [NeededTexture],
+    cache: &mut TextureCache,
+    reading: &Reading<'_>,
+) -> Result<Vec<Image<'a>>, Cancelled> {
+    let mut images: Vec<Image<'a>> = Vec::new();
+    let mut known = HashMap::new();
+    for one in needed {
+        let name = (canonical(&one.source.path), one.source.encoding);
+        let index = *known.entry(name.clone()).or_insert(images.len());
+        if let Some(image) = images.get_mut(index) {
+            image.asked_by.push(one);
+            continue;
+        }
+        let content = reading.contents.read(&one.source.path, reading.token)?;
+        let mut image = Image { name, content, kept: None, asked_by: vec![one] };
+        image.kept = cache.get(&image.name, image.key());
+        images.push(image);
+    }
+    Ok(images)
+}
+
+/// The texels of each, and whether they were kept from before. What would take more than `most_bytes` together with those
+/// before it is not loaded.
+fn load_all(
+    images: &[Image<'_>],
+    most_bytes: u64,
+    reading: &Reading<'_>,
+) -> Vec<Result<(Arc<Texels>, bool), AssetError>> {
+    let size = |image: &Image<'_>| match &image.kept {
+        Some(texels) => texels.memory_bytes() as u64,
+        // One that cannot be read says so when it is loaded.
+        None => texel_bytes(image.path(), ImageLimits::default(), reading.token).unwrap_or(0),
+    };
+    let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
+    let over = over_budget(&sizes, most_bytes);
+    let load = |(image, over): (&Image<'_>, Option<String>)| match over {
+        Some(reason) => Err(AssetError::Malformed { path: image.path().to_owned(), line: None, reason }),
+        None => load_one(image, reading),
+    };
+    reading.pool.install(|| images.par_iter().zip(over).map(load).collect())
+}
+
+/// For each image of these sizes whether it goes over what all may take, in words.
+fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
+    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+    let mut before = 0;
+    let check = |&size: &u64| {
+        if before + size <= most_bytes {
+            before += size;
+            return None;
+        }
+        Some(format!(
+            "it takes {} MiB of memory, and the images before it {} MiB: more than the {} MiB that a scene's images may \
+             take together; make some of them smaller or leave some out",
+            mib(size),
+            mib(before),
+            mib(most_bytes)
+        ))
+    };
+    sizes.iter().map(check).collect()
+}
+
+fn load_one(image: &Image<'_>, reading: &Reading<'_>) -> Result<(Arc<Texels>, bool), AssetError> {
+    if let Some(texels) = &image.kept {
+        return Ok((texels.clone(), true));
+    }
+    let (one, limits) = (image.asked_by[0], ImageLimits::default());
     let encoding = one.source.encoding;
-    let result = reading
-        .sink
-        .asset(&one.name, |progress| load(path, encoding, ImageLimits::default(), progress, reading.token));
-    Asset { files, result: result.map(|texels| (Arc::new(texels), false)) }
+    let load = |progress: Progress<'_>| load(image.path(), encoding, limits, progress, reading.token);
+    Ok((Arc::new(reading.sink.asset(&one.name, load)?), false))
+}
+
+/// For `check`: also the textures of the scene file that no visible material names.
+pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
+    for (index, texture) in loaded.scene.textures.iter().enumerate() {
+        if wanted.iter().any(|one| one.source.path == texture.file.value) {
+            continue;
+        }
+        let encoding = match texture.encoding {
+            Encoding::Auto => ImageEncoding::Color,
+            Encoding::Srgb => ImageEncoding::Srgb,
+            Encoding::Linear => ImageEncoding::Linear,
+        };
+        let source = TextureSource { path: texture.file.value.clone(), encoding };
+        wanted.push(NeededTexture {
+            source,
+            name: texture.name.clone(),
+            declared: Some(index),
+            mesh_file: None,
+        });
+    }
 }
 
 /// Where the scene names it: its own table, or the mesh whose materials look it up.
@@ -111,10 +207,52 @@ fn place(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
     declared.or_else(mesh).unwrap_or(0..0)
 }
 
-fn name(source: &TextureSource) -> (PathBuf, ImageEncoding) {
-    (canonical(&source.path), source.encoding)
-}
+#[cfg(test)]
+mod tests {
+    use std::fs;
 
-fn key(source: &TextureSource, content: Content) -> Key {
-    Fingerprint::new("texture").path(&source.path).index(source.encoding as usize).content(content).finish()
+    use super::*;
+    use crate::pipeline::protocol::{Failure, Stage, Status};
+    use crate::pipeline::tests::{Bench, SCENE};
+
+    #[test]
+    fn the_images_of_a_scene_share_their_memory() {
+        let over = over_budget(&[600, 400, 0, 25, 1], 1001);
+        assert_eq!(over.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, false]);
+        // Three pictures of 16000 × 16000: 732.4 MiB each by their headers; there is nothing behind those.
+        let table = |name: &str| format!("[textures.{name}]\nfile = \"{name}.ppm\"\n");
+        let ball = |name: &str| {
+            format!(
+                "[materials.{name}]\ndiffuse = {{ texture = \"{name}\" }}\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n\
+                 material = \"{name}\"\n"
+            )
+        };
+        let names = ["one", "two", "three"];
+        let tables: String = names.iter().map(|name| table(name) + &ball(name)).collect();
+        let mut bench = Bench::new(&format!("{SCENE}{tables}"));
+        for name in names {
+            bench.write(&format!("{name}.ppm"), "P6 16000 16000 255\n");
+        }
+        let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
+        let over: Vec<_> = errors.iter().filter(|error| error.message.contains("together")).collect();
+        assert_eq!(over.len(), 1, "{errors:?}");
+        assert!(over[0].message.contains("three.ppm: it takes 733 MiB"), "{}", over[0].message);
+        assert!(over[0].message.contains("the images before it 1465 MiB"), "{}", over[0].message);
+        assert!(over[0].message.contains("make some of them smaller"), "{}", over[0].message);
+    }
+
+    #[test]
+    fn one_file_by_two_names_is_loaded_once_and_kept() {
+        let tables = "[textures.other]\nfile = \"./skin.ppm\"\n[materials.other]\ndiffuse = { texture = \"other\" }\n\
+                      [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"other\"\n";
+        let mut bench = Bench::new(&format!("{SCENE}{tables}"));
+        let report = bench.done().0;
+        assert_eq!(report.counters.texels_loaded, 1);
+        bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
+        let report = bench.done().0;
+        assert_eq!(report.stages[Stage::Textures as usize].status, Status::Reused);
+        // Both names are watched.
+        fs::write(bench.path("skin.ppm"), "P6\n1 1\n255\nxyz").expect("written");
+        assert_eq!(bench.done().0.stages[Stage::Textures as usize].status, Status::Done);
+    }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::fingerprint::{Fingerprint, Key};
 use super::super::plan::Plan;
-use super::super::protocol::Writing;
+use super::super::protocol::{Failure, Writing};
 use super::super::sink::Sink;
 use super::super::watch::content::{Content, Contents};
 use super::canvas::Canvas;
@@ -62,68 +62,78 @@ pub(in crate::pipeline) fn write_if_wanted(
     written: &mut Written,
     contents: &Contents,
     sink: &Sink,
+    token: &CancelToken,
 ) -> Result<Staged<bool>, Stop> {
     if writing == Writing::No {
         return Ok(Staged::skipped(false, "nothing is to be written"));
     }
-    match write(canvas, plan, written, contents, sink) {
+    match write(canvas, plan, written, contents, sink, token) {
         Ok(Staged { status, why, .. }) => Ok(Staged { value: true, status, why }),
-        Err(message) if writing == Writing::Try => {
+        Err(Stop::Failed(Failure::Work(message))) if writing == Writing::Try => {
             sink.write_failed(message.clone());
             Ok(Staged::skipped(false, message))
         }
-        Err(message) => Err(Stop::work(message)),
+        Err(stop) => Err(stop),
     }
 }
 
 /// Write the film as it is to every output that does not hold it already. All outputs are tried.
 ///
 /// # Errors
-/// What went wrong, a line each.
+/// What went wrong, a line each; cancelled.
 pub(in crate::pipeline) fn write(
     canvas: &Canvas,
     plan: &Plan,
     written: &mut Written,
     contents: &Contents,
     sink: &Sink,
-) -> Result<Staged<()>, String> {
+    token: &CancelToken,
+) -> Result<Staged<()>, Stop> {
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
         let key = key(canvas, plan, path);
         if let Some((known, content)) = written.0.get(path)
             && *known == key
-            && now(contents, path) == *content
+            && contents.read(path, token)? == *content
         {
             continue;
         }
         let image = radiance.get_or_insert_with(|| canvas.film.radiance());
-        match write_one(image, canvas, plan, path) {
+        token.check()?;
+        match write_one(image, canvas, plan, path, token) {
             Ok(bytes) => {
                 count += 1;
-                written.0.insert(path.clone(), (key, now(contents, path)));
                 sink.written(path, bytes);
+                written.0.insert(path.clone(), (key, contents.read(path, token)?));
             }
+            Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => errors.push(error.to_string()),
         }
     }
     written.0.retain(|path, _| plan.outputs.contains(path));
     match (errors.is_empty(), count) {
-        (false, _) => Err(errors.join("\n")),
+        (false, _) => Err(Stop::work(errors.join("\n"))),
         (true, 0) => Ok(Staged::reused((), "the picture is on disk")),
         (true, 1) => Ok(Staged::done((), "")),
         (true, _) => Ok(Staged::done((), format!("{count} files"))),
     }
 }
 
-fn write_one(image: &RadianceImage, canvas: &Canvas, plan: &Plan, path: &Path) -> Result<u64, OutputError> {
+fn write_one(
+    image: &RadianceImage,
+    canvas: &Canvas,
+    plan: &Plan,
+    path: &Path,
+    token: &CancelToken,
+) -> Result<u64, OutputError> {
     let options = EncodeOptions {
         tone: plan.tone,
         bit_depth: BitDepth::try_from(plan.bit_depth)?,
         metadata: metadata(canvas, plan),
     };
-    let bytes = output::encode(image, &options, Format::of(path)?)?;
-    output::write::atomic(path, &bytes)?;
+    let bytes = output::encode(image, &options, Format::of(path)?, token)?;
+    output::write::atomic_until(path, &bytes, token)?;
     Ok(bytes.len() as u64)
 }
 
@@ -153,9 +163,4 @@ fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
     key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
     key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());
     key.path(path).finish()
-}
-
-fn now(contents: &Contents, path: &Path) -> Content {
-    // A token that nobody cancels: what is being looked at was just written.
-    contents.read(path, &CancelToken::new()).unwrap_or(Content::Unusable)
 }

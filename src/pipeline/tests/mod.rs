@@ -65,7 +65,7 @@ pub(super) const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 pub(super) const KERNEL: Kernel = crate::integrators::render_tile;
 
-pub(super) struct Bench {
+pub(in crate::pipeline) struct Bench {
     pub(super) folder: tempfile::TempDir,
     pub(super) worker: Handle,
     pub(super) generation: u64,

@@ -12,21 +12,21 @@ use super::{assert_close, assert_mean, lambert, v};
 
 /// With one and with several shadow rays at equal cost; `irradiance` is E for radiance 1.
 #[track_caller]
-fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
+pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     for (samples, shadow_samples) in [(256, 1), (16, 16)] {
-        let values = lit.clone().shadows(Shadows::Soft, shadow_samples).values(samples, 64);
+        let values = lit.clone().shadows(Shadows::Soft, shadow_samples).values(samples, 256);
         assert_mean(&format!("{what}, {shadow_samples} shadow rays"), &values, 0.7 * irradiance / PI);
     }
 }
 
 /// The value with one ray to the middle.
 #[track_caller]
-fn assert_hard(what: &str, lit: &Build, irradiance: f64) {
+pub fn assert_hard(what: &str, lit: &Build, irradiance: f64) {
     let value = lit.clone().shadows(Shadows::Hard, 4).value();
     assert_close(&format!("{what}, hard"), value, 0.7 * irradiance / PI);
 }
 
-fn at_origin() -> Build {
+pub fn at_origin() -> Build {
     receiver(DVec3::ZERO, 0.7)
 }
 

@@ -8,7 +8,7 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{MaterialKind, Shape};
 use glimt::world::Geometry;
 
-use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, scene};
+use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, scene};
 use super::{assert_close, assert_mean, v};
 
 /// Horizontal and downward step of a ray at an angle to the vertical.
@@ -244,6 +244,57 @@ fn nested_glass() {
     // From within the slab one surface is left.
     let within = slab(0.0, glass(1.5)).seen(v(0.0, -0.5, 0.0), v(0.0, -1.0, 0.0));
     assert_close("from within", lit_from_below(within).depth(1).value(), 0.96 * 2.25);
+}
+
+/// Cubes as (centre, edge, material) in one mesh, faces outwards.
+fn boxes(parts: &[(DVec3, f64, u32)]) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    for &(center, edge, material) in parts {
+        let first = mesh.positions.len() as u32;
+        for corner in 0..8_u32 {
+            let side = |axis: u32| if corner >> axis & 1 == 1 { 0.5 } else { -0.5 };
+            mesh.positions.push((center + v(side(0), side(1), side(2)) * edge).as_vec3());
+        }
+        for axis in 0..3 {
+            let (u, w) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+            let far = first + (1 << axis);
+            mesh.triangles.extend([[first, first + w, first + u + w], [first, first + u + w, first + u]]);
+            mesh.triangles.extend([[far, far + u, far + u + w], [far, far + u + w, far + w]]);
+        }
+        mesh.materials.resize(mesh.triangles.len(), material);
+    }
+    mesh
+}
+
+#[test]
+fn every_part_of_a_mesh_is_of_its_own_glass() {
+    // Straight through a slab, T = (1 − R)² with R = ((n − 1)/(n + 1))²; the first triangles are of something else.
+    let passed = |n: f64| (1.0 - ((n - 1.0) / (n + 1.0)).powi(2)).powi(2);
+    let look = |build: &Build, x: f64| {
+        let through = build.clone().seen(v(x, 3.0, 0.1), v(x, 0.0, 0.1));
+        lit_from_below(through).depth(2).value()
+    };
+    let mesh = boxes(&[(v(-2.0, 0.0, 0.0), 1.0, 0), (v(0.0, 0.0, 0.0), 1.0, 1), (v(2.0, 0.0, 0.0), 1.0, 2)]);
+    let opaque_first = [file_material(2, 1.0), file_material(9, 1.5), file_material(9, 2.0)];
+    let other_first = [file_material(9, 1.4), file_material(9, 1.5), file_material(9, 2.0)];
+    let opaque_first = scene().own_mesh(mesh.clone(), opaque_first.to_vec());
+    let other_first = scene().own_mesh(mesh, other_first.to_vec());
+    assert_eq!(look(&opaque_first, -1.9), 0.0);
+    assert_close("n = 1.4", look(&other_first, -1.9), passed(1.4));
+    for build in [opaque_first, other_first] {
+        assert_close("n = 1.5", look(&build, 0.1), passed(1.5));
+        assert_close("n = 2", look(&build, 2.1), passed(2.0));
+    }
+}
+
+#[test]
+fn parts_of_a_mesh_may_be_nested() {
+    // Four surfaces along the axis: air to 1.5 and back .04 each, 1.5 to 2 and back 1/49 each, in one object.
+    let mesh = boxes(&[(v(0.0, 0.0, 0.0), 1.0, 0), (v(0.0, 0.0, 0.0), 0.5, 1)]);
+    let nested = scene().own_mesh(mesh, vec![file_material(9, 1.5), file_material(9, 2.0)]);
+    let straight = lit_from_below(nested.seen(v(0.05, 3.0, 0.1), v(0.05, 0.0, 0.1))).depth(4);
+    let exact = (0.96 * (1.0 - 1.0 / 49.0_f64)).powi(2);
+    assert_mean("nested", &straight.values(64, 64), exact);
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn aimed(geometry: &Geometry, random: &mut Random, at: DVec3, far: f64) -> Optio
 }
 
 /// A ray from a surface into the half-space of `side`, often close to its border.
-fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
+pub fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
     let across = random.direction();
     let n = side.as_dvec3();
     let flat = across - n * n.dot(across);
@@ -31,7 +31,7 @@ fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
 }
 
 /// Rays that leave a convex shape outwards and hit it again, of all that were tried.
-fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
+pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
     let world = build.world();
     let (mut hits, mut tried) = (0, 0);
     for _ in 0..tries {
@@ -45,7 +45,7 @@ fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries
 }
 
 /// Places within 10⁶ in every direction, the first such that the shape passes near the origin.
-fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
+pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
     let mut places = vec![v(0.0, -size, 0.0), random.direction() * size, DVec3::ZERO];
     for far in [1.0, 1e2, 1e4, 1e6] {
         if far < size * 1e6 {
@@ -71,6 +71,13 @@ fn no_convex_shape_hits_itself() {
                 ("turned box", scene().cuboid(center, DVec3::splat(size * 1.2), angles, matte(0.5))),
                 ("quad", scene().quad(center, triangle[0] - center, triangle[1] - center, matte(0.5))),
                 ("triangle", scene().triangle(triangle, matte(0.5))),
+                (
+                    "disk",
+                    scene().shape(
+                        Shape::Disk { center, normal: triangle[0] - center, radius: size },
+                        matte(0.5),
+                    ),
+                ),
                 ("mesh", scene().mesh(octahedron, AS_IT_IS, matte(0.5))),
                 ("instance", scene().mesh(unit, [v(size, size * 0.7, -size), angles, center], matte(0.5))),
             ];
@@ -81,6 +88,22 @@ fn no_convex_shape_hits_itself() {
             }
         }
     }
+}
+
+/// A cylinder about the middle whose half axis is across or along `middle`, so that it passes through the origin.
+fn bar(middle: DVec3, towards: DVec3, radius: f64) -> Shape {
+    let flat = towards - middle * (middle.dot(towards) / middle.length_squared());
+    let half = if flat.length() > 1e-6 * towards.length() { flat } else { middle };
+    Shape::Cylinder { a: middle - half, b: middle + half, radius, caps: true }
+}
+
+/// A cone whose side passes through the origin: its tip is up a tangent, its base beyond.
+fn cone_through_origin(normal: DVec3, towards: DVec3, radius: f64) -> Shape {
+    let down = normal.cross(towards).normalize();
+    let tip = down * -radius;
+    // 45° between side and axis, which is on the inner side of the normal.
+    let base = tip + (down - normal) * (1.5 * radius);
+    Shape::Cone { base, tip, radius: (base - tip).length(), cap: true }
 }
 
 #[test]
@@ -99,6 +122,10 @@ fn shapes_through_the_origin_do_not_hit_themselves_there() {
             ("box", scene().cuboid(v(0.0, 0.0, -1e4), DVec3::splat(2e4), DVec3::ZERO, matte(0.5))),
             ("box", scene().cuboid(-u, DVec3::splat(2e4), v(0.0, u.z.atan2(u.x), 0.0), matte(0.5))),
             ("sphere", scene().sphere(n * radius, radius, matte(0.5))),
+            ("disk", scene().shape(Shape::Disk { center: n.cross(u), normal: n, radius: 1e5 }, matte(0.5))),
+            ("cylinder", scene().shape(bar(n * radius, u, radius), matte(0.5))),
+            ("cylinder's cap", scene().shape(bar(n * radius, n * radius, radius), matte(0.5))),
+            ("cone", scene().shape(cone_through_origin(n, u, radius), matte(0.5))),
             ("plane", scene().shape(plane, matte(0.5))),
         ] {
             for _ in 0..10 {
@@ -184,6 +211,37 @@ fn of_everything(k: i32) -> Build {
         .cuboid(v(1.5, -0.5, -5.5) * s, v(0.8, 1.0, 0.7) * s, v(0.0, 30.0, 5.0), matte(0.4))
         .triangle([v(-2.0, -1.0, -7.0) * s, v(2.0, -1.0, -7.0) * s, v(0.1, 2.0, -7.5) * s], matte(0.8))
         .mesh(ball, [DVec3::ONE, v(10.0, 0.0, 0.0), v(1.0, 0.6, -5.0) * s], matte(0.7))
+        .shape(
+            Shape::Disk { center: v(-2.2, 0.2, -6.5) * s, normal: v(1.0, 0.3, 2.0), radius: 0.5 * s },
+            matte(0.6),
+        )
+        .shape(
+            Shape::Cylinder {
+                a: v(-0.4, -1.0, -6.0) * s,
+                b: v(-0.2, 0.4, -6.1) * s,
+                radius: 0.3 * s,
+                caps: true,
+            },
+            phong(0.5, 0.3, 20.0, 0.0),
+        )
+        .shape(
+            Shape::Cone {
+                base: v(0.9, -1.0, -3.6) * s,
+                tip: v(1.0, 0.1, -3.7) * s,
+                radius: 0.3 * s,
+                cap: false,
+            },
+            glass(1.3),
+        )
+        .shape(
+            Shape::Torus {
+                center: v(-0.9, 1.1, -5.0) * s,
+                axis: v(0.2, 0.5, 1.0),
+                radius: 0.5 * s,
+                tube: 0.2 * s,
+            },
+            phong(0.5, 0.2, 30.0, 0.5),
+        )
         .quad(v(-0.5, 3.0, -5.0) * s, DVec3::X * s, DVec3::Z * s, emitter(4.0))
         .quad(v(-2.5, 1.0, -6.0) * s, v(0.5, 0.1, 0.0) * s, v(0.3, 0.5, 0.4) * s, emitter(4.0))
         .sphere(v(2.0, 2.0, -4.0) * s, 0.3 * s, emitter(6.0))

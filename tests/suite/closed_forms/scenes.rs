@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glimt::assets::LoadedMesh;
+use glimt::assets::{FileMaterial, LoadedMesh};
 use glimt::control::CancelToken;
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
@@ -141,6 +141,16 @@ impl Build {
         self.shape(Shape::Mesh { file, scale, rotate, translate, smooth: false }, kind)
     }
 
+    /// An instance of a mesh file with materials of its own, without smoothing.
+    pub fn own_mesh(self, mesh: TriangleMesh, materials: Vec<FileMaterial>) -> Self {
+        let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
+        let file = build.parts.meshes.len() - 1;
+        let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
+        let tree = MeshTree::build(Arc::new(loaded), &CancelToken::new()).expect("nobody cancels");
+        build.parts.meshes[file] = Arc::new(tree);
+        build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)
+    }
+
     /// A texture by rows from the top; its number.
     pub fn texture(&mut self, rows: &[&[Vec3]], filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> usize {
         let number = self.texels.len();
@@ -242,6 +252,22 @@ pub fn mirror(reflectance: f32) -> MaterialKind {
 
 pub fn glass(ior: f32) -> MaterialKind {
     MaterialKind::Glass { ior, tint: Vec3::ONE }
+}
+
+/// A material of a mesh file by its illumination model: 2 is matte grey, 9 glass.
+pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
+    FileMaterial {
+        name: String::new(),
+        diffuse: Vec3::splat(0.5),
+        specular: Vec3::ZERO,
+        shininess: 1.0,
+        emission: Vec3::ZERO,
+        ior,
+        illumination_model: Some(illumination_model),
+        diffuse_texture: None,
+        specular_texture: None,
+        normal_texture: None,
+    }
 }
 
 /// A receiver of reflectance ρ around a point, facing up, seen from close by: nothing comes between.

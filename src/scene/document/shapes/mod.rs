@@ -1,16 +1,21 @@
 //! Shapes: a file for each kind of table.
 
 mod boxes;
+mod cone;
+mod cylinder;
+mod disk;
 mod mesh;
 mod plane;
 mod quad;
 mod sphere;
+mod torus;
 mod triangle;
 
 use std::path::PathBuf;
 
 use super::super::description::{Located, Object, Shape};
 use super::context::Issue;
+use super::limits::Limits;
 use super::materials::Materials;
 use super::table::Table;
 use crate::math::DVec3;
@@ -20,21 +25,17 @@ use mesh::MeshFiles;
 type Reader = fn(&Table<'_>, &mut MeshFiles) -> Option<Shape>;
 
 /// The kinds in the order in which the description lists them.
-const KINDS: [(&str, Reader); 6] = [
+const KINDS: [(&str, Reader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
     ("plane", |table, _| plane::read(table)),
     ("box", |table, _| boxes::read(table)),
     ("triangle", |table, _| triangle::read(table)),
+    ("disk", |table, _| disk::read(table)),
+    ("cylinder", |table, _| cylinder::read(table)),
+    ("cone", |table, _| cone::read(table)),
+    ("torus", |table, _| torus::read(table)),
     ("mesh", mesh::read),
-];
-
-/// Kinds that other versions have, and what comes near.
-const UNAVAILABLE: [(&str, &str); 4] = [
-    ("disk", "[[disk]] is not available in this version"),
-    ("cylinder", "[[cylinder]] is not available in this version"),
-    ("cone", "[[cone]] is not available in this version"),
-    ("torus", "[[torus]] is not available in this version"),
 ];
 
 /// Every shape of the file, and the mesh files they name; no shapes if one of them is wrong.
@@ -45,9 +46,6 @@ pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Objec
         for table in root.tables(kind) {
             objects.push(object(kind, &table, reader, materials, &mut files));
         }
-    }
-    for (kind, message) in UNAVAILABLE {
-        root.unavailable(kind, message, Some("a [[mesh]] of that form can stand in for it"));
     }
     (objects.into_iter().collect(), files.into_list())
 }
@@ -77,6 +75,44 @@ fn object(
         return None;
     }
     Some(Object { shape: shape?, material, span: table.span.clone() })
+}
+
+/// A direction of any length but 0, upwards by default; `what` is wrong without it.
+fn direction(table: &Table<'_>, name: &'static str, what: &str) -> Option<DVec3> {
+    let key = table.optional(name);
+    let direction = key.vector_or(Limits::Any, DVec3::Y)?;
+    if direction.try_normalize().is_none() {
+        let issue = Issue::error(key.span()?, format!("the {what} has no direction"))
+            .label(format!("`{name}` is of length 0"))
+            .help("any other length will do, such as [0, 1, 0] for upwards");
+        table.context.report(issue);
+        return None;
+    }
+    Some(direction)
+}
+
+/// The ends of an axis, by default from the origin one unit upwards.
+fn axis_ends(table: &Table<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
+    let keys = names.map(|name| table.optional(name));
+    let (first, second) =
+        (keys[0].vector_or(Limits::Any, DVec3::ZERO), keys[1].vector_or(Limits::Any, DVec3::Y));
+    let (first, second) = (first?, second?);
+    if Limits::Length.violation((second - first).length()).is_some() {
+        let span = keys[1].span().or_else(|| keys[0].span())?;
+        let [from, to] = names;
+        let issue = Issue::error(span, format!("the {what} has no length"))
+            .label(format!("`{from}` and `{to}` are the same point"))
+            .help(format!("without them, `{from}` is [0, 0, 0] and `{to}` [0, 1, 0]"));
+        table.context.report(issue);
+        return None;
+    }
+    Some([first, second])
+}
+
+/// A length by its key or else a default.
+fn length(table: &Table<'_>, name: &'static str, default: f64) -> Option<f64> {
+    let key = table.optional(name);
+    if key.is_given() { key.number(Limits::Length) } else { Some(default) }
 }
 
 /// Whether two edges span an area: neither is 0, and the sine of the angle between them is not lost to rounding.

@@ -1,0 +1,135 @@
+//! Decoders know no token. They work on a thread of their own, which nobody waits for once the token is cancelled.
+
+use std::io;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
+use std::sync::{Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use crate::assets::read::Watch;
+use crate::control::{CancelToken, Cancelled};
+
+/// Between two polls of the token.
+const POLL: Duration = Duration::from_millis(2);
+
+/// Reports that may wait to be heard.
+const WAITING: usize = 16;
+
+/// Work that nobody waits for any more and that has not ended.
+static LEFT: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
+
+/// Tells how far the work is.
+#[derive(Clone)]
+pub(super) struct Reporter(SyncSender<u64>);
+
+impl Reporter {
+    /// So far. An error where nobody waits: the work may end.
+    pub(super) fn reached(&self, done: u64) -> io::Result<()> {
+        self.0.send(done).map_err(|_| io::Error::other(Cancelled))
+    }
+}
+
+/// Do `work` elsewhere and report what it reports, out of `total`. None where there is no thread to be had or the work
+/// panicked.
+///
+/// Work that was left behind holds memory: new work begins when all of that has ended.
+pub(super) fn run<T: Send + 'static>(
+    watch: Watch<'_>,
+    total: u64,
+    work: impl FnOnce(Reporter) -> T + Send + 'static,
+) -> Result<Option<T>, Cancelled> {
+    wait_for_left(watch.token)?;
+    let (report, reports) = mpsc::sync_channel(WAITING);
+    let (send, result) = mpsc::channel();
+    let run = move || {
+        let _ = send.send(work(Reporter(report)));
+    };
+    let Ok(thread) = thread::Builder::new().name("glimt-image".to_owned()).spawn(run) else {
+        return Ok(None);
+    };
+    let waited = wait(&reports, &result, watch, total);
+    if waited.is_err() {
+        left().push(thread);
+    }
+    waited
+}
+
+fn wait<T>(
+    reports: &Receiver<u64>,
+    result: &Receiver<T>,
+    watch: Watch<'_>,
+    total: u64,
+) -> Result<Option<T>, Cancelled> {
+    loop {
+        match reports.recv_timeout(POLL) {
+            Ok(done) => watch.tick(done as usize, total as usize)?,
+            Err(RecvTimeoutError::Timeout) => watch.token.check()?,
+            // All has been read.
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    loop {
+        match result.recv_timeout(POLL) {
+            Ok(value) => return Ok(Some(value)),
+            Err(RecvTimeoutError::Timeout) => watch.token.check()?,
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+        }
+    }
+}
+
+fn wait_for_left(token: &CancelToken) -> Result<(), Cancelled> {
+    loop {
+        token.check()?;
+        let mut threads = left();
+        threads.retain(|thread| !thread.is_finished());
+        if threads.is_empty() {
+            return Ok(());
+        }
+        drop(threads);
+        thread::sleep(POLL);
+    }
+}
+
+fn left() -> std::sync::MutexGuard<'static, Vec<JoinHandle<()>>> {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::unwatched;
+
+    #[test]
+    fn a_cancel_does_not_wait_for_the_work_and_new_work_does() {
+        let token = CancelToken::new();
+        let (release, released) = mpsc::channel::<()>();
+        let (said, ended) = mpsc::channel();
+        let cancel = token.clone();
+        let stuck = move |report: Reporter| {
+            cancel.cancel();
+            // Released only after the call has returned; 20 s are for a wrong program, so that it fails.
+            let in_time = released.recv_timeout(Duration::from_secs(20)).is_ok();
+            let _ = said.send((in_time, report.reached(1).is_err()));
+        };
+        let watch = Watch { progress: &unwatched, token: &token };
+        assert_eq!(run(watch, 1, stuck).err(), Some(Cancelled));
+        release.send(()).expect("the work goes on");
+        let fresh = CancelToken::new();
+        let next = move |_| ended.try_recv();
+        let ended = run(Watch { progress: &unwatched, token: &fresh }, 1, next).expect("nobody cancels");
+        assert_eq!(ended, Some(Ok((true, true))));
+    }
+
+    #[test]
+    fn reports_come_in_order_and_a_panic_is_no_result() {
+        let token = CancelToken::new();
+        let seen = Mutex::new(Vec::new());
+        let note = |done, total| seen.lock().expect("no panic").push((done, total));
+        let watch = Watch { progress: &note, token: &token };
+        let work = |report: Reporter| (1..=3).map(|i| report.reached(i).is_ok()).collect::<Vec<_>>();
+        assert_eq!(run(watch, 3, work), Ok(Some(vec![true; 3])));
+        assert_eq!(*seen.lock().expect("no panic"), [(1, 3), (2, 3), (3, 3)]);
+        let breaks = |_| crate::assets::contain::contain(|| panic!("broken"));
+        assert_eq!(run::<Result<(), String>>(watch, 3, breaks), Ok(Some(Err("broken".to_owned()))));
+    }
+}

@@ -1,0 +1,113 @@
+//! Which vertices are at one place.
+
+use rayon::prelude::*;
+
+use crate::control::{CancelToken, Cancelled};
+use crate::math::Vec3;
+
+/// Buckets are sorted a few thousand vertices at a time: on all threads, with polls of the token between.
+const BUCKET: usize = 1 << 12;
+
+/// Vertices between two polls of the token.
+const BATCH: usize = 1 << 16;
+
+/// A hash and the vertex that it is of.
+type Entry = (u32, u32);
+
+/// The places of more than one vertex, each as its vertices in ascending order. Any order of places may come, but always
+/// the same.
+pub(super) fn shared(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
+    let bits = positions.len().div_ceil(BUCKET).next_power_of_two().ilog2();
+    let mut hashes = vec![0; positions.len()];
+    for (hashes, positions) in hashes.chunks_mut(BATCH).zip(positions.chunks(BATCH)) {
+        token.check()?;
+        hashes.par_iter_mut().zip(positions).for_each(|(hash, position)| *hash = hash_of(*position));
+    }
+    let (entries, ends) = scatter(&hashes, bits, token)?;
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    let buckets: Vec<_> = starts.zip(&ends).map(|(start, end)| &entries[start..*end]).collect();
+    let found: Result<Vec<_>, Cancelled> =
+        buckets.par_iter().map(|bucket| in_bucket(bucket, positions, token)).collect();
+    Ok(found?.into_iter().flatten().collect())
+}
+
+/// The bits of a place. Adding 0 makes −0 and 0 one.
+fn place(position: Vec3) -> [u32; 3] {
+    (position + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
+/// By multiplication with odd constants (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4); the upper bits
+/// are the good ones.
+fn hash_of(position: Vec3) -> u32 {
+    let [x, y, z] = place(position).map(u64::from);
+    let mixed = (x | y << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+    ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
+}
+
+/// Vertices behind their hashes, by the upper bits of those, and where each bucket ends.
+fn scatter(hashes: &[u32], bits: u32, token: &CancelToken) -> Result<(Vec<Entry>, Vec<usize>), Cancelled> {
+    let bucket = |hash: u32| (u64::from(hash) >> (32 - bits)) as usize;
+    let mut ends = vec![0; 1 << bits];
+    for hashes in hashes.chunks(BATCH) {
+        token.check()?;
+        hashes.iter().for_each(|&hash| ends[bucket(hash)] += 1);
+    }
+    let mut next = 0;
+    for end in &mut ends {
+        next += std::mem::replace(end, next);
+    }
+    let mut entries = vec![(0, 0); hashes.len()];
+    for (vertex, &hash) in (0_u32..).zip(hashes) {
+        if (vertex as usize).is_multiple_of(BATCH) {
+            token.check()?;
+        }
+        let end = &mut ends[bucket(hash)];
+        entries[*end] = (hash, vertex);
+        *end += 1;
+    }
+    Ok((entries, ends))
+}
+
+/// The shared places of one bucket: equal hashes first, equal places among those.
+fn in_bucket(bucket: &[Entry], positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
+    token.check()?;
+    let mut entries = bucket.to_vec();
+    entries.sort_unstable();
+    let mut found = Vec::new();
+    for same_hash in entries.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1) {
+        let mut order: Vec<_> =
+            same_hash.iter().map(|&(_, vertex)| (place(positions[vertex as usize]), vertex)).collect();
+        order.sort_unstable();
+        let groups = order.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1);
+        found.extend(groups.map(|group| group.iter().map(|(_, vertex)| *vertex).collect()));
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shared_place_is_found_with_all_its_vertices() {
+        // Places repeat after 5000; −0 is 0.
+        let at = |i: u32| Vec3::new((i % 5000) as f32, 0.25, if i < 5000 { 0.0 } else { -0.0 });
+        let positions: Vec<_> = (0..20_000).map(at).chain([Vec3::splat(9.0), Vec3::splat(8.0)]).collect();
+        let mut found = shared(&positions, &CancelToken::new()).expect("nobody cancels");
+        found.sort_unstable();
+        let expected: Vec<Vec<u32>> =
+            (0..5000).map(|i| (0..4).map(|turn| i + 5000 * turn).collect()).collect();
+        assert_eq!(found, expected);
+        assert_eq!(shared(&[], &CancelToken::new()), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn hashes_of_a_grid_spread_over_the_buckets() {
+        let mut counts = [0; 64];
+        for i in 0..64_000_u32 {
+            let position = Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32) * 0.5;
+            counts[hash_of(position) as usize >> 26] += 1;
+        }
+        assert!(counts.iter().all(|count| (500..2000).contains(count)), "{counts:?}");
+    }
+}

@@ -1,0 +1,160 @@
+//! What shapes around an axis have in common: their frame, lines brought near them, and the parts that a line meets.
+
+use super::surface::flat_axes;
+use super::{Aabb, RayF64, ShapeHit};
+use crate::math::{DMat3, DVec2, DVec3};
+
+/// An origin and orthonormal axes, of which the third is a shape's axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxialFrame {
+    /// The origin in world coordinates.
+    pub origin: DVec3,
+    /// From the frame's coordinates to the world's.
+    axes: DMat3,
+}
+
+impl AxialFrame {
+    /// From an origin and an axis of any length but 0.
+    pub fn new(origin: DVec3, axis: DVec3) -> Self {
+        let n = axis.normalize();
+        let (u, v) = flat_axes(n);
+        Self { origin, axes: DMat3::from_cols(u, v, n) }
+    }
+
+    /// The axis, a unit vector.
+    pub fn axis(&self) -> DVec3 {
+        self.axes.z_axis
+    }
+
+    /// A point to the world.
+    pub fn point(&self, local: DVec3) -> DVec3 {
+        self.origin + self.axes * local
+    }
+
+    /// A direction to the world.
+    pub fn vector(&self, local: DVec3) -> DVec3 {
+        self.axes * local
+    }
+
+    /// A point from the world.
+    pub fn local(&self, point: DVec3) -> DVec3 {
+        self.axes.transpose() * (point - self.origin)
+    }
+
+    /// A ray's line from its point nearest to the origin.
+    pub fn line(&self, ray: &RayF64) -> Line {
+        let origin = self.local(ray.origin);
+        let direction = self.axes.transpose() * ray.direction;
+        let start = -origin.dot(direction) / direction.length_squared();
+        Line { foot: origin + direction * start, direction, start }
+    }
+
+    /// The box around a circle about the axis at a height.
+    pub fn circle_bounds(&self, height: f64, radius: f64) -> Aabb {
+        self.ball_bounds(height, radius, 0.0)
+    }
+
+    /// The box around all balls of one radius with their centres on a circle about the axis at a height; room for the
+    /// rounding of the sums included.
+    pub fn ball_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
+        let center = self.point(DVec3::new(0.0, 0.0, height));
+        let across = |i: usize| DVec2::new(self.axes.x_axis[i], self.axes.y_axis[i]).length() * radius + ball;
+        let extent = DVec3::new(across(0), across(1), across(2));
+        let rounding = self.origin.abs() + extent + DVec3::splat(height.abs());
+        let extent = extent + rounding * (4.0 * f64::EPSILON);
+        Aabb::around_f64([center - extent, center + extent])
+    }
+}
+
+/// A line in a frame's coordinates. It starts at its point nearest to the origin, so that no number is larger than the
+/// shape and rays from afar keep their digits there.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// The point nearest to the origin.
+    pub foot: DVec3,
+    /// The ray's direction.
+    pub direction: DVec3,
+    /// The ray's t at the foot.
+    pub start: f64,
+}
+
+/// A stretch of a line, counted from its foot; each end with the part of the shape that it is on.
+#[derive(Clone, Copy, Debug)]
+pub struct Stretch {
+    /// Its beginning.
+    pub enter: (f64, u32),
+    /// Its end.
+    pub leave: (f64, u32),
+}
+
+impl Stretch {
+    /// The whole line.
+    pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
+
+    /// Between two distances on the side, which is part 0.
+    pub fn of_side(enter: f64, leave: f64) -> Self {
+        Self { enter: (enter, 0), leave: (leave, 0) }
+    }
+
+    /// Between two heights, each with its part.
+    pub fn between(line: &Line, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
+        let (z, dz) = (line.foot.z, line.direction.z);
+        if dz == 0.0 {
+            return (low.0..=high.0).contains(&z).then_some(Self::WHOLE);
+        }
+        let at = |(height, part): (f64, u32)| ((height - z) / dz, part);
+        let (enter, leave) = if dz > 0.0 { (at(low), at(high)) } else { (at(high), at(low)) };
+        Some(Self { enter, leave })
+    }
+
+    fn holds(&self, along: f64) -> bool {
+        self.enter.0 <= along && along <= self.leave.0
+    }
+}
+
+/// The first t of the ray, with its part, on a side between its ends: of the solid if it is closed, of the bare side
+/// if not.
+pub fn meet(ray: &RayF64, line: &Line, side: Stretch, ends: Stretch, closed: bool) -> Option<(f64, u32)> {
+    let accepted = |(along, part): (f64, u32)| {
+        let t = line.start + along;
+        ray.accept(t).map(|_| (t, part))
+    };
+    if !closed {
+        let bare = [side.enter, side.leave].into_iter().filter(|end| ends.holds(end.0));
+        return bare.into_iter().find_map(accepted);
+    }
+    let enter = if side.enter.0 > ends.enter.0 { side.enter } else { ends.enter };
+    let leave = if side.leave.0 < ends.leave.0 { side.leave } else { ends.leave };
+    if !(enter.0 <= leave.0) {
+        return None;
+    }
+    [enter, leave].into_iter().find_map(accepted)
+}
+
+/// A meeting as a hit.
+pub fn hit((t, primitive): (f64, u32)) -> ShapeHit {
+    ShapeHit { primitive, ..ShapeHit::at(t as f32) }
+}
+
+/// The t of a hit with all its digits, from finding it again; as rounded where that is another one.
+pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
+    match again {
+        Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
+        _ => f64::from(hit.t),
+    }
+}
+
+/// Unit vector towards a point in the plane; x at the middle.
+pub fn radial(p: DVec2) -> DVec2 {
+    p.try_normalize().unwrap_or(DVec2::X)
+}
+
+/// ½ + angle/2π of a direction in the plane, in [0, 1].
+pub fn turn(p: DVec2) -> f64 {
+    0.5 + p.y.atan2(p.x) / std::f64::consts::TAU
+}
+
+/// The direction of [`turn`] = `u`.
+pub fn at_turn(u: f64) -> DVec2 {
+    DVec2::from_angle((u - 0.5) * std::f64::consts::TAU)
+}

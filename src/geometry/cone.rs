@@ -1,0 +1,227 @@
+//! Cones, in double precision.
+
+use std::f64::consts::{PI, TAU};
+
+use super::axial::{self, AxialFrame, Line, Stretch, at_turn, exact_t, radial, turn};
+use super::disk::{BORDER, Disk};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use crate::math::{DVec2, DVec3, Vec2};
+
+/// A cone with a round base, or its bare side; the front is outside. Parts: 0 the side, 1 the cap at the base.
+///
+/// Texture coordinates of the side: u once around, v from 0 at the base to 1 at the tip, so that on a cone that stands
+/// on its base pictures stand and are not mirrored; of the cap as for a [`Disk`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    /// Its origin is the tip, its axis goes to the base.
+    frame: AxialFrame,
+    height: f64,
+    radius: f64,
+    /// Length of the side from the tip to the base's border.
+    slant: f64,
+    capped: bool,
+}
+
+impl Cone {
+    /// From the middle of its base, a tip elsewhere, and the base's radius > 0.
+    pub fn new(base: DVec3, tip: DVec3, radius: f64, capped: bool) -> Self {
+        let height = (base - tip).length();
+        let slant = height.hypot(radius);
+        Self { frame: AxialFrame::new(tip, base - tip), height, radius, slant, capped }
+    }
+
+    /// The nearest hit, from outside or inside.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        self.nearest(ray).map(axial::hit)
+    }
+
+    fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
+        let line = self.frame.line(ray);
+        let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
+        let ends = Stretch::between(&line, (0.0, 0), (base, 1))?;
+        axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped)
+    }
+
+    /// Where the line is inside the side, extended beyond the base and, by its image, beyond the tip: |p| ≤ k|z|. The
+    /// quadratic A·s² − 2B·s + C is that of the foot of the tip on the line, which is why B is one product; B² − AC
+    /// is a difference of squares of the line's moment about the tip, exact to the last digits also for lines that
+    /// graze the side next to the tip.
+    fn side_stretch(&self, line: &Line) -> Option<Stretch> {
+        let k = self.radius / self.height;
+        let (p, d) = (line.foot, line.direction);
+        let factors = |x: DVec3| {
+            let (across, along) = (x.truncate().length(), k * x.z.abs());
+            (across - along) * (across + along)
+        };
+        let (a, b, c) = (factors(d), (1.0 + k * k) * p.z * d.z, factors(p));
+        let moment = p.cross(d);
+        let discriminant = factors(DVec3::new(k * moment.x, k * moment.y, moment.z / k));
+        let crosses_both = a <= 0.0;
+        if discriminant.is_nan() || discriminant < 0.0 && !crosses_both {
+            return None;
+        }
+        let q = b + discriminant.max(0.0).sqrt().copysign(b);
+        // A line as steep as the side meets it once; its other root is where slightly steeper ones have it.
+        let a = if a == 0.0 { -0.0 } else { a };
+        let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
+        Some(match (crosses_both, d.z > 0.0) {
+            (false, _) => Stretch::of_side(s0.min(s1), s0.max(s1)),
+            (true, true) => Stretch::of_side(s0.max(s1), f64::INFINITY),
+            (true, false) => Stretch::of_side(f64::NEG_INFINITY, s0.min(s1)),
+        })
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let point = ray.at(exact_t(hit, self.nearest(ray)));
+        if hit.primitive > 0 {
+            return self.base().surface_near(point, self.reach());
+        }
+        let local = self.frame.local(point);
+        let out = radial(local.truncate());
+        let down = DVec2::new(self.radius, self.height) / self.slant;
+        let along = DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant);
+        let around = out.perp() * (-TAU * down.x * along);
+        SurfacePoint::exact(
+            self.frame.point((out * (down.x * along)).extend(down.y * along)),
+            self.frame.vector((out * down.y).extend(-down.x)),
+            Vec2::new(turn(mirrored(out)) as f32, (1.0 - along / self.slant) as f32),
+            self.frame.vector(around.extend(0.0)),
+            self.frame.vector((out * -self.radius).extend(-self.height)),
+            self.reach(),
+        )
+    }
+
+    fn reach(&self) -> f64 {
+        self.frame.origin.abs().max_element() + self.height + self.radius
+    }
+
+    /// Point and unit normal of the side.
+    pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+        let out = mirrored(at_turn(u));
+        let point = (out * self.radius).extend(self.height) * (1.0 - v);
+        let normal = (out * self.height).extend(-self.radius) / self.slant;
+        (self.frame.point(point), self.frame.vector(normal))
+    }
+
+    /// The cap, facing outwards.
+    pub fn base(&self) -> Disk {
+        Disk::new(self.frame.point(DVec3::Z * self.height), self.frame.axis(), self.radius)
+    }
+
+    /// Areas of the parts.
+    pub fn areas(&self) -> [f64; 2] {
+        let cap = if self.capped { PI * self.radius * self.radius } else { 0.0 };
+        [PI * self.radius * self.slant, cap]
+    }
+
+    /// Centre of area.
+    pub fn center(&self) -> DVec3 {
+        let [side, cap] = self.areas();
+        self.frame.point(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
+    }
+
+    /// Unit vector from the tip to the base.
+    pub fn axis(&self) -> DVec3 {
+        self.frame.axis()
+    }
+
+    /// Cosine and sine of the side's slope: of its normals, what is across the axis, and what is towards the tip.
+    pub fn slope(&self) -> (f64, f64) {
+        (self.height / self.slant, self.radius / self.slant)
+    }
+
+    /// Whether a point is inside.
+    pub fn contains(&self, point: DVec3) -> bool {
+        let p = self.frame.local(point);
+        p.z < self.height && p.truncate().length() < self.radius / self.height * p.z
+    }
+
+    /// The box around it.
+    pub fn bounds(&self) -> Aabb {
+        self.frame.circle_bounds(0.0, 0.0).union(self.frame.circle_bounds(self.height, self.radius))
+    }
+}
+
+/// Angles are counted about the axis from base to tip, against the frame's.
+fn mirrored(p: DVec2) -> DVec2 {
+    DVec2::new(p.x, -p.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::math::Vec3;
+
+    /// On the ground, its tip at y = 2, its base of radius 1.
+    fn hat(capped: bool) -> Cone {
+        Cone::new(DVec3::ZERO, DVec3::Y * 2.0, 1.0, capped)
+    }
+
+    fn met(cone: &Cone, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
+        let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
+        let hit = cone.intersect(&ray)?;
+        Some((hit.t, hit.primitive, cone.surface(&ray, &hit).normal))
+    }
+
+    #[test]
+    fn side_and_base_from_outside_and_inside() {
+        let right = Vec3::new(2.0, 1.0, 0.0).normalize();
+        let closed = hat(true);
+        assert_eq!(met(&closed, [9.0, 1.0, 0.0], Vec3::NEG_X), Some((8.5, 0, right)));
+        assert_eq!(met(&closed, [0.0, 1.0, 0.0], Vec3::X), Some((0.5, 0, right)));
+        assert_eq!(met(&closed, [0.5, -3.0, 0.0], Vec3::Y), Some((3.0, 1, Vec3::NEG_Y)));
+        assert_eq!(met(&closed, [0.5, 0.5, 0.0], Vec3::NEG_Y), Some((0.5, 1, Vec3::NEG_Y)));
+        assert_eq!(met(&closed, [0.5, 5.0, 0.0], Vec3::NEG_Y), Some((4.0, 0, right)));
+        // The image of the side beyond the tip is no part of it.
+        assert_eq!(met(&closed, [-9.0, 3.0, 0.0], Vec3::X), None);
+        assert_eq!(met(&closed, [0.5, 2.5, 0.0], Vec3::Y), None);
+    }
+
+    #[test]
+    fn lines_as_steep_as_the_side_meet_it_once() {
+        // Along (−1, 2): parallel to the left side, through the right one and the base.
+        let slope = Vec3::new(-1.0, -2.0, 0.0);
+        let right = Vec3::new(2.0, 1.0, 0.0).normalize();
+        for capped in [true, false] {
+            let into = met(&hat(capped), [2.5, 5.0, 0.0], slope);
+            assert_eq!(into, Some((2.0, 0, right)), "{capped}");
+        }
+        assert_eq!(met(&hat(false), [-0.5, -1.0, 0.0], -slope), Some((1.0, 0, right)));
+        assert_eq!(met(&hat(false), [-1.5, 1.0, 0.0], slope), None);
+        assert_eq!(met(&hat(true), [-1.5, 1.0, 0.0], slope), None);
+    }
+
+    #[test]
+    fn the_tip_is_as_sharp_as_it_is() {
+        // Rays past the tip at a millionth of its radius there decide right, near the tip as anywhere.
+        for below in [1e-3_f64, 1e-6, 1e-9] {
+            let radius = below / 2.0;
+            for (factor, is_hit) in [(1.0 - 1e-5, true), (1.0 + 1e-5, false)] {
+                let origin = DVec3::new(radius * factor, 2.0 - below, -5.0);
+                let ray = RayF64 { origin, direction: DVec3::Z, t_max: f64::INFINITY };
+                assert_eq!(hat(true).intersect(&ray).is_some(), is_hit, "{below} {factor}");
+            }
+        }
+    }
+
+    #[test]
+    fn texture_coordinates_rise_from_base_to_tip() {
+        let ray = Ray::new(Vec3::new(9.0, 0.5, 0.0), Vec3::NEG_X).to_f64();
+        let hit = hat(true).intersect(&ray).expect("aimed at it");
+        let surface = hat(true).surface(&ray, &hit);
+        assert_eq!(surface.uv, Vec2::new(0.5, 0.25));
+        assert!((surface.dpdv - Vec3::new(-1.0, 2.0, 0.0)).length() < 1e-6);
+        let (point, normal) = hat(true).side(0.5, 0.25);
+        assert!((point - DVec3::new(0.75, 0.5, 0.0)).length() < 1e-14);
+        assert!((normal.as_vec3() - surface.normal).length() < 1e-6);
+    }
+
+    #[test]
+    fn bounds_are_tight() {
+        let slanting = Cone::new(DVec3::ZERO, DVec3::new(3.0, 4.0, 0.0), 1.0, true).bounds();
+        assert!((slanting.min - Vec3::new(-0.8, -0.6, -1.0)).abs().max_element() < 1e-6);
+        assert!((slanting.max - Vec3::new(3.0, 4.0, 1.0)).abs().max_element() < 1e-6);
+    }
+}

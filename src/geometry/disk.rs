@@ -1,0 +1,124 @@
+//! Disks, in double precision.
+
+use std::f64::consts::PI;
+
+use super::axial::{AxialFrame, exact_t, hit};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use crate::math::{DVec2, DVec3};
+
+/// Room given to a border in units of the size, so that two pieces which share it leave no gap; far below what an `f32`
+/// ray can tell apart.
+pub const BORDER: f64 = 1e-14;
+
+/// A flat round piece. Its texture coordinates are those of the square around it: (½, ½) in the middle, a picture
+/// stands upright where the disk stands, and away from −z where it lies and faces up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disk {
+    frame: AxialFrame,
+    radius: f64,
+}
+
+impl Disk {
+    /// From its centre, a normal of any length but 0, which is the front, and a radius > 0.
+    pub fn new(center: DVec3, normal: DVec3, radius: f64) -> Self {
+        Self { frame: AxialFrame::new(center, normal), radius }
+    }
+
+    /// The one root of the plane, inside the border; none for rays in the plane.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        self.nearest(ray).map(hit)
+    }
+
+    fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
+        let line = self.frame.line(ray);
+        let along = -line.foot.z / line.direction.z;
+        let across = (line.foot + line.direction * along).truncate().length();
+        let t = line.start + along;
+        (across <= self.radius * (1.0 + BORDER) && ray.accept(t).is_some()).then_some((t, 0))
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let t = exact_t(hit, self.nearest(ray));
+        self.surface_near(ray.at(t), self.frame.origin.abs().max_element() + self.radius)
+    }
+
+    /// The surface nearest to a point, computed from lengths up to `reach`.
+    pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
+        let p = self.frame.local(point).truncate().clamp_length_max(self.radius);
+        let uv = DVec2::splat(0.5) + p / (2.0 * self.radius);
+        let edge = 2.0 * self.radius;
+        SurfacePoint::exact(
+            self.frame.point(p.extend(0.0)),
+            self.normal(),
+            uv.as_vec2(),
+            self.frame.vector(DVec3::X * edge),
+            self.frame.vector(DVec3::Y * edge),
+            reach,
+        )
+    }
+
+    /// The point of the disk that a point of the unit disk becomes.
+    pub fn point(&self, of_unit_disk: DVec2) -> DVec3 {
+        self.frame.point((of_unit_disk * self.radius).extend(0.0))
+    }
+
+    /// Centre.
+    pub fn center(&self) -> DVec3 {
+        self.frame.origin
+    }
+
+    /// Unit normal of the front.
+    pub fn normal(&self) -> DVec3 {
+        self.frame.axis()
+    }
+
+    /// Area.
+    pub fn area(&self) -> f64 {
+        PI * self.radius * self.radius
+    }
+
+    /// The box around it.
+    pub fn bounds(&self) -> Aabb {
+        self.frame.circle_bounds(0.0, self.radius)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::math::{Vec2, Vec3};
+
+    #[test]
+    fn hit_inside_the_border_only_and_from_both_sides() {
+        let disk = Disk::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 0.0, 4.0), 0.5);
+        for (x, is_hit) in [(0.0, true), (0.5, true), (-0.5, true), (0.500_001, false)] {
+            for z in [-2.0_f32, 2.0] {
+                let ray = Ray::new(Vec3::new(1.0 + x, 2.0, 3.0 + z), Vec3::new(0.0, 0.0, -z)).to_f64();
+                assert_eq!(disk.intersect(&ray).map(|hit| hit.t), is_hit.then_some(1.0), "{x} {z}");
+            }
+        }
+        let coplanar = Ray::new(Vec3::new(-4.0, 2.0, 3.0), Vec3::X).to_f64();
+        assert_eq!(disk.intersect(&coplanar), None);
+    }
+
+    #[test]
+    fn a_picture_on_it_stands() {
+        let disk = Disk::new(DVec3::ZERO, DVec3::Z, 2.0);
+        let ray = Ray::new(Vec3::new(1.0, -0.5, 5.0), Vec3::NEG_Z).to_f64();
+        let hit = disk.intersect(&ray).expect("the disk is ahead");
+        let surface = disk.surface(&ray, &hit);
+        assert_eq!((surface.uv, surface.normal), (Vec2::new(0.75, 0.375), Vec3::Z));
+        assert_eq!((surface.dpdu, surface.dpdv), (Vec3::X * 4.0, Vec3::Y * 4.0));
+    }
+
+    #[test]
+    fn bounds_are_tight() {
+        let disk = Disk::new(DVec3::new(5.0, 0.0, 0.0), DVec3::new(1.0, 1.0, 0.0), 1.0);
+        let (bounds, half) = (disk.bounds(), 0.5_f32.sqrt());
+        assert!((bounds.min - Vec3::new(5.0 - half, -half, -1.0)).abs().max_element() < 2e-6);
+        assert!((bounds.max - Vec3::new(5.0 + half, half, 1.0)).abs().max_element() < 2e-6);
+        assert!(bounds.max.z > 1.0 && bounds.min.y < -half);
+    }
+}

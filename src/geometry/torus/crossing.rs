@@ -1,0 +1,227 @@
+//! Where a line first crosses a torus.
+//!
+//! Not by the coefficients of the quartic, whose roots lose half of their digits where it grazes and more where the
+//! tube is slim. With q(s) the line's distance from the axis and the circle's radius as unit,
+//!
+//! ```text
+//! g(s) = (q − 1)² + z² − tube² = |p|² + 1 − tube² − 2q
+//! ```
+//!
+//! has the sign of the distance from the surface and is computed from that distance. Its second derivative is
+//! 2(1 − w/q³), where w is a constant of the line: there are at most two points of inflection, known in closed form,
+//! and on each piece between them g is convex or concave. On such a piece Newton's method from the right end goes to
+//! the nearest root without ever passing it, and tells where there is none.
+
+use crate::math::DVec3;
+
+/// More than halving takes from the whole line to its last digit.
+const MOST_STEPS: u32 = 200;
+
+/// Half the width of the neighbourhood of the axis in which slopes change their sign.
+const KINK: f64 = 1e-9;
+
+/// A line near a torus about z whose circle has radius 1.
+pub(super) struct UnitLine {
+    /// The line's point nearest to the centre.
+    pub(super) foot: DVec3,
+    /// Unit direction.
+    pub(super) direction: DVec3,
+    /// Radius of the tube.
+    pub(super) tube: f64,
+}
+
+/// g and its derivative at a place of the line.
+#[derive(Clone, Copy)]
+struct Sample {
+    s: f64,
+    value: f64,
+    slope: f64,
+}
+
+impl UnitLine {
+    /// The stretch of the line in the ball and between the planes around the torus, both with some room in units of the
+    /// tube.
+    pub(super) fn surroundings(&self, room: f64) -> Option<(f64, f64)> {
+        let height = self.tube * (1.0 + room);
+        let ball = 1.0 + height;
+        let half = ((ball - self.foot.length()) * (ball + self.foot.length())).sqrt();
+        let (z, dz) = (self.foot.z, self.direction.z);
+        let (mut enter, mut leave) = (-half, half);
+        if dz != 0.0 {
+            let (low, high) = ((-height - z) / dz, (height - z) / dz);
+            enter = enter.max(low.min(high));
+            leave = leave.min(low.max(high));
+        } else if !(z.abs() <= height) {
+            return None;
+        }
+        (half > 0.0 && enter < leave).then_some((enter, leave))
+    }
+
+    /// The first place from `from` to `to` at which the line goes in or out.
+    pub(super) fn first_crossing(&self, from: f64, to: f64) -> Option<f64> {
+        if !(from < to) {
+            return None;
+        }
+        let within = |s: f64| s.max(from).min(to);
+        let inflections = self.inflections().map_or([to; 2], |cuts| cuts.map(within));
+        let mut low = self.at(from);
+        let is_inside = low.value < 0.0 || low.value == 0.0 && low.slope < 0.0;
+        for (end, is_convex) in [(inflections[0], true), (inflections[1], false), (to, true)] {
+            if end > low.s {
+                let high = self.at(end);
+                let crossing = self.crossing_of_piece(low, high, is_inside, is_convex);
+                if crossing.is_some() {
+                    return crossing;
+                }
+                low = high;
+            }
+        }
+        None
+    }
+
+    fn at(&self, s: f64) -> Sample {
+        let p = self.foot + self.direction * s;
+        let ring = p.truncate().length();
+        let (across, z) = (ring - 1.0, p.z);
+        let distance = (across * across + z * z).sqrt();
+        let outwards = if ring > 0.0 { p.truncate().dot(self.direction.truncate()) / ring } else { 0.0 };
+        Sample {
+            s,
+            value: (distance - self.tube) * (distance + self.tube),
+            slope: 2.0 * (across * outwards + z * self.direction.z),
+        }
+    }
+
+    /// The ends of the piece on which g is concave, where q³ < w. A line through the axis has a kink there, which the
+    /// piece is kept wide enough to hold: nothing is crossed so near to the axis.
+    fn inflections(&self) -> Option<[f64; 2]> {
+        let (p, d) = (self.foot.truncate(), self.direction.truncate());
+        let a = d.length_squared();
+        let w = p.perp_dot(d).powi(2);
+        let ring = w.cbrt();
+        let half = ((ring * ring - w / a) / a).sqrt();
+        let middle = -p.dot(d) / a;
+        (half >= 0.0).then(|| [middle - half.max(KINK), middle + half.max(KINK)])
+    }
+
+    /// The first crossing on a piece that starts on a known side.
+    fn crossing_of_piece(&self, low: Sample, high: Sample, is_inside: bool, is_convex: bool) -> Option<f64> {
+        if (high.value <= 0.0) != is_inside {
+            let start = if is_inside == is_convex { high } else { low };
+            return Some(self.between(low.s, high.s, start, is_inside));
+        }
+        // Both ends are on one side: a convex piece may dip in between, a concave one may rise out.
+        (is_inside != is_convex).then(|| self.dip(low, high, if is_inside { -1.0 } else { 1.0 })).flatten()
+    }
+
+    /// The only crossing between two places, by Newton's method where it stays between them.
+    fn between(&self, mut low: f64, mut high: f64, start: Sample, is_inside: bool) -> f64 {
+        let mut x = start;
+        for _ in 0..MOST_STEPS {
+            let newton = x.s - x.value / x.slope;
+            if newton == x.s {
+                break;
+            }
+            let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
+            if !(low < next && next < high) {
+                break;
+            }
+            x = self.at(next);
+            if (x.value <= 0.0) == is_inside { low = next } else { high = next }
+        }
+        x.s
+    }
+
+    /// The first root from `low` on of a piece on which sign·g is convex and, at both ends, positive. The root of a
+    /// tangent is never beyond that of a convex function: where the tangents lead to the rise beyond the least
+    /// value there is none.
+    fn dip(&self, low: Sample, high: Sample, sign: f64) -> Option<f64> {
+        if !(high.slope * sign > 0.0) {
+            return None;
+        }
+        let mut x = low;
+        for _ in 0..MOST_STEPS {
+            if !(x.slope * sign < 0.0) {
+                return None;
+            }
+            let next = x.s - x.value / x.slope;
+            if !(next > x.s) {
+                break;
+            }
+            if !(next < high.s) {
+                return None;
+            }
+            let before = x;
+            x = self.at(next);
+            if x.value * sign <= 0.0 {
+                // Rounding went too far.
+                return Some(self.between(before.s, x.s, before, sign < 0.0));
+            }
+        }
+        Some(x.s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A small generator for lines.
+    fn random(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((*state >> 11) as f64) / (1_u64 << 53) as f64 * 2.0 - 1.0
+    }
+
+    /// Lines that come near the circle, some along the axis or through it.
+    fn lines(tube: f64) -> impl Iterator<Item = UnitLine> {
+        let mut state = 3;
+        (0..30_000).map(move |i| {
+            let mut next = || random(&mut state);
+            let (sin, cos) = (next() * 4.0).sin_cos();
+            let near = DVec3::new(cos, sin, 0.0) + DVec3::new(next(), next(), next()) * (1.2 * tube);
+            let direction = match i % 4 {
+                0 => DVec3::Z,
+                1 => near - DVec3::Z * next(),
+                _ => DVec3::new(next(), next(), next()),
+            };
+            let direction = direction.normalize();
+            UnitLine { foot: near - direction * near.dot(direction), direction, tube }
+        })
+    }
+
+    #[test]
+    fn crossings_have_all_their_digits_however_slim_the_tube() {
+        for tube in [1e-6, 1e-3, 0.3, 0.99] {
+            let mut found = 0;
+            for line in lines(tube) {
+                let Some((from, to)) = line.surroundings(0.01) else { continue };
+                let Some(s) = line.first_crossing(from, to) else { continue };
+                found += 1;
+                let p = line.foot + line.direction * s;
+                let off = ((p.truncate().length() - 1.0).hypot(p.z) - tube).abs();
+                assert!(off < 2e-15, "{off} at tube {tube}");
+            }
+            assert!(found > 10_000, "{found}");
+        }
+    }
+
+    #[test]
+    fn between_inflections_the_slope_rises_and_falls_as_told() {
+        for line in lines(0.4) {
+            let Some([first, second]) = line.inflections() else { continue };
+            let slope = |s: f64| line.at(s).slope;
+            for (low, high, is_convex) in
+                [(first - 1.0, first, true), (first, second, false), (second, second + 1.0, true)]
+            {
+                let steps = (0..=8).map(|i| slope(low + (high - low) * (0.01 + 0.98 * f64::from(i) / 8.0)));
+                let steps: Vec<f64> = steps.collect();
+                let room = 1e-9;
+                let right = steps.windows(2).all(|pair| {
+                    let rise = pair[1] - pair[0];
+                    if is_convex { rise > -room } else { rise < room }
+                });
+                assert!(right, "{steps:?} convex {is_convex} from {low} to {high}");
+            }
+        }
+    }
+}

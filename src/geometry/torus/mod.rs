@@ -1,0 +1,186 @@
+//! Tori, in double precision.
+
+mod crossing;
+
+use std::f64::consts::{PI, TAU};
+
+use super::axial::{self, AxialFrame, at_turn, exact_t, radial, turn};
+use super::surface::{self, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit};
+use crate::math::{DVec2, DVec3, Vec2, Vec3};
+use crossing::UnitLine;
+
+/// Room around a torus in units of its tube, so that a line comes to it from outside for certain.
+const ROOM: f64 = 0.01;
+
+/// All points at one distance, the radius of the tube, from a circle about an axis; the front is outside.
+///
+/// Texture coordinates: u once around the axis, v once around the tube, ½ on the outermost circle and rising there
+/// along the axis, so that pictures are not mirrored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Torus {
+    frame: AxialFrame,
+    radius: f64,
+    tube: f64,
+}
+
+impl Torus {
+    /// From its centre, an axis of any length but 0, the radius of the circle and that of the tube, 0 < tube < radius.
+    pub fn new(center: DVec3, axis: DVec3, radius: f64, tube: f64) -> Self {
+        Self { frame: AxialFrame::new(center, axis), radius, tube }
+    }
+
+    /// The nearest hit, from outside or inside.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        self.nearest(ray).map(axial::hit)
+    }
+
+    fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
+        let line = self.frame.line(ray);
+        let length = line.direction.length();
+        // Distances from here on are in units of the radius.
+        let unit = self.radius / length;
+        let unit_line = UnitLine {
+            foot: line.foot / self.radius,
+            direction: line.direction / length,
+            tube: self.tube / self.radius,
+        };
+        let (enter, leave) = unit_line.surroundings(ROOM)?;
+        let from = enter.max(-line.start / unit);
+        if !(line.start + from * unit <= ray.t_max) {
+            return None;
+        }
+        let t = line.start + unit_line.first_crossing(from, leave)? * unit;
+        ray.accept(t).map(|_| (t, 0))
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let local = self.frame.local(ray.at(exact_t(hit, self.nearest(ray))));
+        let out = radial(local.truncate());
+        self.surface_at(out, radial(DVec2::new(local.truncate().length() - self.radius, local.z)))
+    }
+
+    /// The surface in a direction from the axis, and a direction from the circle in the plane of both.
+    fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
+        let (across, up) = (from_circle.x, from_circle.y);
+        let ring = self.radius + self.tube * across;
+        SurfacePoint::exact(
+            self.frame.point((out * ring).extend(self.tube * up)),
+            self.frame.vector((out * across).extend(up)),
+            Vec2::new(turn(out) as f32, turn(from_circle) as f32),
+            self.frame.vector((out.perp() * (TAU * ring)).extend(0.0)),
+            self.frame.vector((out * -up).extend(across) * (TAU * self.tube)),
+            self.reach(),
+        )
+    }
+
+    /// Point and unit normal at texture coordinates.
+    pub fn place(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+        let (out, from_circle) = (at_turn(u), at_turn(v));
+        let normal = (out * from_circle.x).extend(from_circle.y);
+        (self.frame.point((out * self.radius).extend(0.0) + normal * self.tube), self.frame.vector(normal))
+    }
+
+    /// Bound on the error of a point of the surface.
+    pub fn error(&self, point: Vec3) -> Vec3 {
+        surface::error(point, self.reach())
+    }
+
+    fn reach(&self) -> f64 {
+        self.frame.origin.abs().max_element() + self.radius + self.tube
+    }
+
+    /// Distance from the surface, negative inside.
+    pub fn signed_distance(&self, point: DVec3) -> f64 {
+        let p = self.frame.local(point);
+        DVec2::new(p.truncate().length() - self.radius, p.z).length() - self.tube
+    }
+
+    /// Centre.
+    pub fn center(&self) -> DVec3 {
+        self.frame.origin
+    }
+
+    /// Radius of the tube over that of the circle.
+    pub fn slimness(&self) -> f64 {
+        self.tube / self.radius
+    }
+
+    /// Area.
+    pub fn area(&self) -> f64 {
+        4.0 * PI * PI * self.radius * self.tube
+    }
+
+    /// The box around it.
+    pub fn bounds(&self) -> Aabb {
+        self.frame.ball_bounds(0.0, self.radius, self.tube)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+
+    /// About y, from 1.5 to 2.5.
+    fn ring() -> Torus {
+        Torus::new(DVec3::ZERO, DVec3::Y * 7.0, 2.0, 0.5)
+    }
+
+    fn met(origin: [f32; 3], direction: Vec3) -> Option<(f32, Vec3)> {
+        let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
+        let hit = ring().intersect(&ray)?;
+        Some((hit.t, ring().surface(&ray, &hit).normal))
+    }
+
+    #[test]
+    fn the_four_roots_of_a_line_through_the_middle() {
+        for (x, expected) in [
+            (-9.0, Some((6.5, Vec3::NEG_X))),
+            (-2.0, Some((0.5, Vec3::X))),
+            (0.0, Some((1.5, Vec3::NEG_X))),
+            (2.25, Some((0.25, Vec3::X))),
+            (2.75, None),
+        ] {
+            assert_eq!(met([x, 0.0, 0.0], Vec3::X), expected, "from {x}");
+        }
+    }
+
+    #[test]
+    fn lines_along_the_axis() {
+        assert_eq!(met([0.0, 9.0, 0.0], Vec3::NEG_Y), None);
+        assert_eq!(met([1.499, 9.0, 0.0], Vec3::NEG_Y), None);
+        assert_eq!(met([2.0, 9.0, 0.0], Vec3::NEG_Y), Some((8.5, Vec3::Y)));
+        assert_eq!(met([2.0, 0.25, 0.0], Vec3::NEG_Y), Some((0.75, Vec3::NEG_Y)));
+        assert_eq!(met([2.501, 9.0, 0.0], Vec3::NEG_Y), None);
+    }
+
+    #[test]
+    fn starts_on_the_surface_are_no_hits() {
+        assert_eq!(met([2.5, 0.0, 0.0], Vec3::X), None);
+        assert_eq!(met([2.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(1.0));
+        assert_eq!(met([1.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(3.0));
+    }
+
+    #[test]
+    fn texture_coordinates_are_in_the_middle_outside() {
+        let ray = Ray::new(Vec3::new(9.0, 0.0, 0.0), Vec3::NEG_X).to_f64();
+        let hit = ring().intersect(&ray).expect("aimed at it");
+        let surface = ring().surface(&ray, &hit);
+        let pi = std::f32::consts::PI;
+        assert_eq!(surface.uv, Vec2::splat(0.5));
+        assert!((surface.dpdu - Vec3::NEG_Z * (5.0 * pi)).length() < 1e-5);
+        assert!((surface.dpdv - Vec3::Y * pi).length() < 1e-5);
+        let (point, normal) = ring().place(0.5, 0.75);
+        assert!((point - DVec3::new(2.0, 0.5, 0.0)).length() < 1e-14 && (normal - DVec3::Y).length() < 1e-14);
+    }
+
+    #[test]
+    fn bounds_are_tight() {
+        let slanting = Torus::new(DVec3::ZERO, DVec3::new(3.0, 4.0, 0.0), 2.0, 0.5).bounds();
+        for corner in [-slanting.min, slanting.max] {
+            assert!((corner - Vec3::new(2.1, 1.7, 2.5)).abs().max_element() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Developing and encoding in parts small enough to be stopped between.
+
+use std::io::{self, Cursor, Seek, SeekFrom, Write};
+
+use super::{BitDepth, EncodeOptions, OutputError};
+use crate::control::CancelToken;
+use crate::film::RadianceImage;
+use crate::film::tone::{develop, develop16};
+
+/// Pixels developed between two polls of the token: a few milliseconds, and enough for all threads.
+const PIXELS: usize = 1 << 18;
+
+/// Bytes compressed or written between two polls of the token.
+pub(super) const BYTES: usize = 1 << 15;
+
+/// The components of the developed picture, from the top: a byte each, or two with the high one first, as PNG and PPM hold
+/// them. `take` gets them in order, at most [`BYTES`] at a time.
+pub(super) fn developed(
+    image: &RadianceImage,
+    options: &EncodeOptions,
+    token: &CancelToken,
+    mut take: impl FnMut(&[u8]) -> io::Result<()>,
+) -> io::Result<()> {
+    for pixels in image.pixels.chunks(PIXELS) {
+        token.check().map_err(io::Error::other)?;
+        let part = RadianceImage { width: pixels.len() as u32, height: 1, pixels: pixels.to_vec() };
+        let bytes = match options.bit_depth {
+            BitDepth::Eight => develop(&part, &options.tone).pixels.into_flattened(),
+            BitDepth::Sixteen => {
+                let components = develop16(&part, &options.tone).pixels.into_flattened();
+                components.iter().flat_map(|component| component.to_be_bytes()).collect()
+            }
+        };
+        for bytes in bytes.chunks(BYTES) {
+            token.check().map_err(io::Error::other)?;
+            take(bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Bytes in memory that take no more once the work is cancelled, so that encoders which know no token end too.
+pub(super) struct Stoppable<'a> {
+    bytes: Cursor<Vec<u8>>,
+    token: &'a CancelToken,
+}
+
+impl<'a> Stoppable<'a> {
+    pub(super) fn new(token: &'a CancelToken) -> Self {
+        Self { bytes: Cursor::new(Vec::new()), token }
+    }
+
+    pub(super) fn into_bytes(self) -> Vec<u8> {
+        self.bytes.into_inner()
+    }
+}
+
+impl Write for Stoppable<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.token.check().map_err(io::Error::other)?;
+        self.bytes.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Stoppable<'_> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.bytes.seek(to)
+    }
+}
+
+/// Write all, or stop between two parts.
+pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
+    for part in bytes.chunks(1 << 20) {
+        token.check().map_err(io::Error::other)?;
+        to.write_all(part)?;
+    }
+    Ok(())
+}
+
+/// What became of writing: an error of a writer that was stopped is no error of the file.
+pub(super) fn or_cancelled<T>(
+    result: io::Result<T>,
+    token: &CancelToken,
+    error: impl FnOnce(io::Error) -> OutputError,
+) -> Result<T, OutputError> {
+    result.or_else(|failed| {
+        token.check()?;
+        Err(error(failed))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_make_the_whole_and_a_cancel_ends_them() {
+        let count = PIXELS + 70_000;
+        let pixels = (0..count).map(|i| crate::math::Vec3::splat((i % 256) as f32 / 255.0)).collect();
+        let image = RadianceImage { width: count as u32, height: 1, pixels };
+        let options = EncodeOptions { bit_depth: BitDepth::Sixteen, ..Default::default() };
+        let token = CancelToken::new();
+        let mut whole = Vec::new();
+        let take = |bytes: &[u8]| {
+            assert!(bytes.len() <= BYTES);
+            whole.extend_from_slice(bytes);
+            Ok(())
+        };
+        developed(&image, &options, &token, take).expect("nobody cancels");
+        let expected = develop16(&image, &options.tone).pixels.into_flattened();
+        assert!(whole.as_chunks().0.iter().map(|two| u16::from_be_bytes(*two)).eq(expected));
+        let mut parts = 0;
+        let stop = |_: &[u8]| {
+            parts += 1;
+            token.cancel();
+            Ok(())
+        };
+        assert!(developed(&image, &options, &token, stop).is_err());
+        assert_eq!(parts, 1);
+    }
+
+    #[test]
+    fn bytes_that_are_cancelled_take_no_more() {
+        let token = CancelToken::new();
+        let mut bytes = Stoppable::new(&token);
+        bytes.write_all(b"abc").expect("not cancelled yet");
+        token.cancel();
+        assert!(bytes.write_all(b"def").is_err());
+        assert_eq!(bytes.into_bytes(), b"abc");
+    }
+}

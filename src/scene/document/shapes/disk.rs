@@ -1,0 +1,14 @@
+//! `[[disk]]`.
+
+use super::super::super::description::Shape;
+use super::super::limits::Limits;
+use super::super::table::Table;
+use super::{direction, length};
+use crate::math::DVec3;
+
+pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
+    let center = table.optional("center").vector(Limits::Any).unwrap_or(DVec3::ZERO);
+    let normal = direction(table, "normal", "disk");
+    let radius = length(table, "radius", 0.5);
+    Some(Shape::Disk { center, normal: normal?, radius: radius? })
+}

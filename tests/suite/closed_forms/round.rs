@@ -1,0 +1,349 @@
+//! Disks, cylinders, cones and tori against their distance functions, which are at most as steep as the distance.
+
+use glimt::geometry::Ray;
+use glimt::geometry::ray::offset_origin;
+use glimt::lights::Source;
+use glimt::math::{DVec2, DVec3};
+use glimt::scene::description::Shape;
+use glimt::world::Geometry;
+
+use super::robust::{leaving, places, self_hits};
+use super::scenes::{matte, scene};
+use super::{Random, v};
+
+pub fn geometry(shape: &Shape) -> std::sync::Arc<Geometry> {
+    scene().shape(shape.clone(), matte(0.5)).world().geometry
+}
+
+/// Height along an axis of any length, and distance from it.
+fn axial(p: DVec3, origin: DVec3, axis: DVec3) -> DVec2 {
+    let (n, p) = (axis.normalize(), p - origin);
+    DVec2::new(p.dot(n), p.cross(n).length())
+}
+
+/// Nowhere steeper than the distance, negative inside the closed shape, 0 on its surface.
+fn distance(shape: &Shape, p: DVec3) -> f64 {
+    match *shape {
+        Shape::Cylinder { a, b, radius, .. } => {
+            let q = axial(p, (a + b) * 0.5, b - a);
+            (q.y - radius).max(q.x.abs() - (b - a).length() * 0.5)
+        }
+        Shape::Cone { base, tip, radius, .. } => {
+            let (q, height) = (axial(p, tip, base - tip), (base - tip).length());
+            let slant = height.hypot(radius);
+            ((q.y * height - q.x * radius) / slant).max(q.x - height)
+        }
+        Shape::Torus { center, axis, radius, tube } => {
+            let q = axial(p, center, axis);
+            (q.y - radius).hypot(q.x) - tube
+        }
+        _ => unreachable!("no closed shape"),
+    }
+}
+
+/// Greatest length in it.
+fn reach(shape: &Shape) -> f64 {
+    match *shape {
+        Shape::Disk { center, radius, .. } => center.length() + radius,
+        Shape::Cylinder { a, b, radius, .. } => a.length() + b.length() + radius,
+        Shape::Cone { base, tip, radius, .. } => base.length() + tip.length() + radius,
+        Shape::Torus { center, radius, tube, .. } => center.length() + radius + tube,
+        _ => unreachable!("no round shape"),
+    }
+}
+
+/// Of the smallest of its parts.
+fn size(shape: &Shape) -> f64 {
+    match *shape {
+        Shape::Cylinder { a, b, radius, .. } => radius.min((b - a).length()),
+        Shape::Cone { base, tip, radius, .. } => radius.min((base - tip).length()),
+        Shape::Torus { radius, tube, .. } => tube.min(radius - tube),
+        _ => unreachable!("no closed shape"),
+    }
+}
+
+/// Whether the line crosses the surface by more than `allowed` between two distances, by halves: around the middle of a
+/// stretch nothing is nearer than its distance tells. Stretches of 10⁻⁵ of the shape's size are looked at in
+/// the middle only, as otherwise a line in the surface would take for ever.
+fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64) -> bool {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let length = ray.direction.as_dvec3().length();
+    let here = sign * distance(shape, ray.origin.as_dvec3() + ray.direction.as_dvec3() * middle);
+    if here < -allowed {
+        return true;
+    }
+    if here > half * length || half * length < 1e-5 * size(shape) + allowed {
+        return false;
+    }
+    crosses(shape, ray, from, middle, sign, allowed) || crosses(shape, ray, middle, to, sign, allowed)
+}
+
+/// The hit is on the surface, and nothing was crossed before it, or at all where there is none. Gives whether there is.
+#[track_caller]
+fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
+    let far = reach(shape) + ray.origin.as_dvec3().length();
+    let allowed = 64.0 * f64::EPSILON * far;
+    let length = ray.direction.as_dvec3().length();
+    let hit = geometry.closest(ray);
+    assert_eq!(geometry.occluded(ray, Source::Nothing), hit.is_some(), "{shape:?} {ray:?}");
+    let Some(hit) = hit else {
+        assert!(!crosses(shape, ray, 0.0, 2.0 * far / length, sign, allowed), "missed {shape:?} {ray:?}");
+        return false;
+    };
+    let t = f64::from(hit.shape.t);
+    let rounding = t * length * f64::from(f32::EPSILON);
+    let off = distance(shape, ray.origin.as_dvec3() + ray.direction.as_dvec3() * t);
+    assert!(off.abs() <= rounding + allowed, "{off} beside {shape:?} {ray:?} {hit:?}");
+    let before = t * (1.0 - f64::from(f32::EPSILON));
+    assert!(!crosses(shape, ray, 0.0, before, sign, allowed), "passed {shape:?} {ray:?} {hit:?}");
+    let surface = geometry.surface(ray, &hit);
+    let off = distance(shape, surface.point.as_dvec3());
+    let error = f64::from(surface.error.length());
+    assert!(off.abs() <= error, "{off} over {error} {shape:?} {ray:?}");
+    assert!((surface.normal.length() - 1.0).abs() < 1e-6);
+    // The front is outwards, where there is room to tell.
+    let out = surface.point.as_dvec3() + surface.normal.as_dvec3() * (4.0 * error);
+    let tells = error < 0.05 * size(shape);
+    assert!(!tells || distance(shape, out) > 0.0, "{shape:?} {ray:?} {surface:?}");
+    true
+}
+
+pub fn torus(random: &mut Random, center: DVec3, size: f64, slimness: f64) -> Shape {
+    Shape::Torus { center, axis: random.direction() * 3.0, radius: size, tube: size * slimness }
+}
+
+pub fn cylinder(random: &mut Random, center: DVec3, size: f64, caps: bool) -> Shape {
+    let half = random.direction() * (size * random.unit().max(0.01));
+    Shape::Cylinder { a: center - half, b: center + half, radius: size * random.unit().max(0.01), caps }
+}
+
+pub fn cone(random: &mut Random, center: DVec3, size: f64, cap: bool) -> Shape {
+    let half = random.direction() * (size * random.unit().max(0.01));
+    Shape::Cone { base: center - half, tip: center + half, radius: size * random.unit().max(0.01), cap }
+}
+
+/// A line near a point of the surface and nearly in its tangent plane, off by a random power of ten.
+fn grazing(random: &mut Random, point: DVec3, normal: DVec3, size: f64) -> Ray {
+    let tangent = random.direction().cross(normal).normalize();
+    let off = normal * (size * random.signed().signum() * 10.0_f64.powf(-9.0 * random.unit()));
+    let start = point + off - tangent * (size * 4.0 * random.unit());
+    Ray::new(start.as_vec3(), tangent.as_vec3())
+}
+
+pub fn random_in(random: &mut Random, center: DVec3, size: f64) -> DVec3 {
+    center + v(random.signed(), random.signed(), random.signed()) * size
+}
+
+#[test]
+fn tori_are_hit_where_their_distance_is_nothing() {
+    let mut random = Random(5);
+    let (mut rays, mut hits) = (0, 0);
+    for slimness in [1e-3, 0.03, 0.2, 0.5, 0.8, 0.97, 0.9999] {
+        for center in [DVec3::ZERO, v(3.0, -2.0, 1.0), v(1e3, 2e3, -5e2)] {
+            let shape = torus(&mut random, center, 1.3, slimness);
+            let Shape::Torus { axis, radius, tube, .. } = shape else { unreachable!() };
+            let n = axis.normalize();
+            let geometry = geometry(&shape);
+            for i in 0..6000 {
+                let out = n.cross(random.direction()).normalize();
+                let around = std::f64::consts::TAU * random.unit();
+                let normal = out * around.cos() + n * around.sin();
+                let on = center + out * radius + normal * tube;
+                let aim = |from: DVec3, to: DVec3| Ray::new(from.as_vec3(), (to - from).as_vec3());
+                let ray = match i % 6 {
+                    0 => aim(random_in(&mut random, center, 9.0), on),
+                    // From the hole, and from inside the tube.
+                    1 => aim(center + n * (0.3 * random.signed()), random_in(&mut random, center, 3.0)),
+                    2 => aim(center + out * radius, random_in(&mut random, center, 3.0)),
+                    3 => grazing(&mut random, on, normal, 1.3),
+                    // Along the axis, at and near the circles of its tops and its borders.
+                    4 => {
+                        let across = [0.0, radius, radius - tube, radius + tube][i / 6 % 4];
+                        let off = if i % 4 < 2 { 0.0 } else { 10.0_f64.powf(-8.0 * random.unit()) };
+                        Ray::new((center + out * (across + off) - n * 5.0).as_vec3(), n.as_vec3())
+                    }
+                    // In the plane of the circle, and there through the axis.
+                    _ if i % 12 < 6 => aim(center + out * 6.0, center),
+                    _ => aim(
+                        center + n.cross(random.direction()) * 6.0,
+                        center + out * (radius * random.unit()),
+                    ),
+                };
+                let start = distance(&shape, ray.origin.as_dvec3());
+                if start.abs() > 1e-12 * reach(&shape) {
+                    rays += 1;
+                    hits += u32::from(check(&shape, &geometry, &ray, start.signum()));
+                }
+            }
+        }
+    }
+    assert!(rays > 120_000 && hits > rays / 3, "{hits} of {rays}");
+}
+
+#[test]
+fn what_leaves_a_torus_next_meets_it_where_the_distance_says() {
+    // From the side that a ray starts on, out of the hole too, and to the other side of the tube.
+    let mut random = Random(29);
+    for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
+        for center in places(&mut random, size) {
+            for slimness in [0.05, 0.5, 0.9] {
+                let shape = torus(&mut random, center, size, slimness);
+                let geometry = geometry(&shape);
+                let mut met = 0;
+                for _ in 0..600 {
+                    let from = random_in(&mut random, center, 3.0 * size).as_vec3();
+                    let to = random_in(&mut random, center, size);
+                    let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3());
+                    let Some(hit) = geometry.closest(&ray) else { continue };
+                    met += 1;
+                    let surface = geometry.surface(&ray, &hit);
+                    for side in [1.0_f32, -1.0] {
+                        let ray = leaving(&mut random, &surface, surface.normal * side);
+                        assert!(f64::from(side) * distance(&shape, ray.origin.as_dvec3()) > 0.0);
+                        let again = check(&shape, &geometry, &ray, f64::from(side));
+                        assert!(again || side > 0.0, "out of the tube without a hit: {shape:?} {ray:?}");
+                    }
+                }
+                assert!(met > 50, "{met} {shape:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn cylinders_and_cones_are_hit_where_their_distance_is_nothing() {
+    let mut random = Random(13);
+    let (mut rays, mut hits) = (0, 0);
+    for i in 0..400 {
+        let far = 10.0_f64.powf(3.0 * random.unit());
+        let center = random_in(&mut random, DVec3::ZERO, far);
+        let shape = if i % 2 == 0 {
+            cylinder(&mut random, center, 1.0, true)
+        } else {
+            cone(&mut random, center, 1.0, true)
+        };
+        let (Shape::Cylinder { a: low, b: high, radius, .. }
+        | Shape::Cone { base: low, tip: high, radius, .. }) = shape
+        else {
+            unreachable!()
+        };
+        let axis = (high - low).normalize();
+        let geometry = geometry(&shape);
+        for j in 0..300 {
+            let out = axis.cross(random.direction()).normalize();
+            let inside = low.lerp(high, random.unit());
+            let aim = |from: DVec3, to: DVec3| Ray::new(from.as_vec3(), (to - from).as_vec3());
+            let ray = match j % 6 {
+                0 => aim(random_in(&mut random, center, 9.0), inside + out * (radius * random.unit())),
+                1 => aim(inside, random_in(&mut random, center, 3.0)),
+                // To the rim, and to the tip.
+                2 => aim(random_in(&mut random, center, 5.0), low + out * radius),
+                3 => aim(random_in(&mut random, center, 5.0), high),
+                // Along the axis and along the side.
+                4 => Ray::new(
+                    (low - axis * 5.0 + out * (2.0 * radius * random.unit())).as_vec3(),
+                    axis.as_vec3(),
+                ),
+                _ => {
+                    let edge = if i % 2 == 0 { high + out * radius } else { high };
+                    let slope = (edge - (low + out * radius)).normalize();
+                    let off = random.direction() * 10.0_f64.powf(-3.0 * random.unit());
+                    Ray::new((edge + off - slope * 6.0).as_vec3(), slope.as_vec3())
+                }
+            };
+            let start = distance(&shape, ray.origin.as_dvec3());
+            if start.abs() > 1e-12 * reach(&shape) {
+                rays += 1;
+                hits += u32::from(check(&shape, &geometry, &ray, start.signum()));
+            }
+        }
+    }
+    assert!(rays > 100_000 && hits > rays / 3, "{hits} of {rays}");
+}
+
+#[test]
+fn without_caps_the_next_hit_of_the_side_remains() {
+    let mut random = Random(37);
+    let mut through = 0;
+    for i in 0..200 {
+        let center = random_in(&mut random, DVec3::ZERO, 3.0);
+        let closed = if i % 2 == 0 {
+            cylinder(&mut random, center, 1.0, true)
+        } else {
+            cone(&mut random, center, 1.0, true)
+        };
+        let open = match closed.clone() {
+            Shape::Cylinder { a, b, radius, .. } => Shape::Cylinder { a, b, radius, caps: false },
+            Shape::Cone { base, tip, radius, .. } => Shape::Cone { base, tip, radius, cap: false },
+            _ => unreachable!(),
+        };
+        let (closed, open) = (geometry(&closed), geometry(&open));
+        for _ in 0..200 {
+            let from = random_in(&mut random, center, 3.0).as_vec3();
+            let ray = Ray::new(from, (random_in(&mut random, center, 0.7) - from.as_dvec3()).as_vec3());
+            let bare = open.closest(&ray).map(|hit| hit.shape);
+            assert_eq!(open.occluded(&ray, Source::Nothing), bare.is_some());
+            match closed.closest(&ray).map(|hit| hit.shape) {
+                Some(hit) if hit.primitive > 0 => {
+                    let cap = closed.surface(&ray, &closed.closest(&ray).expect("as before"));
+                    let origin = offset_origin(cap.point, cap.error, cap.normal, ray.direction);
+                    let inner = closed.closest(&Ray::new(origin, ray.direction)).map(|hit| hit.shape);
+                    let inner = inner.filter(|hit| hit.primitive == 0).map(|inner| inner.t + hit.t);
+                    assert_eq!(inner.is_some(), bare.is_some(), "{ray:?}");
+                    through += u32::from(inner.is_some());
+                    if let (Some(inner), Some(bare)) = (inner, bare) {
+                        assert!((inner - bare.t).abs() < 1e-4, "{inner} {bare:?} {ray:?}");
+                    }
+                }
+                hit => assert_eq!(hit, bare, "{ray:?}"),
+            }
+        }
+    }
+    assert!(through > 1000, "{through}");
+}
+
+#[test]
+fn convex_round_shapes_do_not_hit_themselves() {
+    // A convex body lies on one side of the tangent plane, its side without the caps too.
+    let mut random = Random(19);
+    for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
+        for center in places(&mut random, size) {
+            for closed in [true, false] {
+                for shape in
+                    [cylinder(&mut random, center, size, closed), cone(&mut random, center, size, closed)]
+                {
+                    let build = scene().shape(shape.clone(), matte(0.5));
+                    let (hits, _) = self_hits(&build, &mut random, center, size, 2000);
+                    assert_eq!(hits, 0, "{shape:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_enters_a_closed_round_shape_meets_it_from_inside() {
+    let mut random = Random(43);
+    for size in [1e-8, 1.0, 1e8] {
+        for center in places(&mut random, size) {
+            for shape in [cylinder(&mut random, center, size, true), cone(&mut random, center, size, true)] {
+                let geometry = geometry(&shape);
+                for _ in 0..500 {
+                    let from = random_in(&mut random, center, 3.0 * size).as_vec3();
+                    let to = random_in(&mut random, center, 0.5 * size);
+                    let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3());
+                    let Some(hit) = geometry.closest(&ray) else { continue };
+                    let surface = geometry.surface(&ray, &hit);
+                    let inner = leaving(&mut random, &surface, -surface.normal);
+                    // Next to an edge the error of the point may be through the other side.
+                    if distance(&shape, inner.origin.as_dvec3()) < 0.0 {
+                        let back = geometry.closest(&inner);
+                        let back = back.unwrap_or_else(|| panic!("a leak of {shape:?} {inner:?}"));
+                        let normal = geometry.surface(&inner, &back).normal;
+                        assert!(normal.dot(inner.direction) > 0.0, "{shape:?} {inner:?}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Disks, cylinders, cones and tori that emit.
+
+use std::f64::consts::{PI, TAU};
+
+use glimt::geometry::Ray;
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{Shadows, Shape};
+
+use super::direct::{assert_hard, assert_irradiance, at_origin};
+use super::scenes::{Build, emitter, matte, scene};
+use super::{assert_close, v};
+
+/// E at the origin, facing up, of what emits L = 1: π times the part of a cosine-weighted hemisphere that meets a front.
+fn by_directions(shape: &Shape) -> f64 {
+    const RINGS: u32 = 1500;
+    let geometry = scene().shape(shape.clone(), matte(0.5)).world().geometry;
+    let mut fronts = 0_u32;
+    for i in 0..RINGS {
+        for j in 0..RINGS {
+            // The golden ratio's multiples shift each ring against its neighbours.
+            let sin2 = (f64::from(i) + 0.5) / f64::from(RINGS);
+            let phi =
+                TAU * ((f64::from(j) + 0.5) / f64::from(RINGS) + 0.618_033_988_75 * f64::from(i)).fract();
+            let sin = sin2.sqrt();
+            let direction = v(sin * phi.cos(), (1.0 - sin2).sqrt(), sin * phi.sin()).as_vec3();
+            let ray = Ray::new(Vec3::ZERO, direction);
+            if let Some(hit) = geometry.closest(&ray) {
+                fronts += u32::from(geometry.surface(&ray, &hit).normal.dot(direction) < 0.0);
+            }
+        }
+    }
+    PI * f64::from(fronts) / f64::from(RINGS * RINGS)
+}
+
+fn lit(shape: &Shape) -> Build {
+    at_origin().shape(shape.clone(), emitter(1.0))
+}
+
+fn disk(center: DVec3, normal: DVec3, radius: f64) -> Shape {
+    Shape::Disk { center, normal, radius }
+}
+
+#[test]
+fn a_disk_on_its_axis() {
+    // E = πL·R²/(R² + h²).
+    for (radius, height) in [(1.0, 1.0), (0.5, 3.0), (2.0, 0.7), (1e-3, 10.0)] {
+        let exact = PI * radius * radius / (radius * radius + height * height);
+        let shape = disk(v(0.0, height, 0.0), v(0.0, -2.0, 0.0), radius);
+        assert_irradiance(&format!("disk of {radius} at {height}"), &lit(&shape), exact);
+        assert_hard("disk", &lit(&shape), PI * radius * radius / (height * height));
+        let turned = lit(&disk(v(0.0, height, 0.0), DVec3::Y, radius));
+        assert_eq!((turned.value(), turned.shadows(Shadows::Hard, 1).value()), (0.0, 0.0));
+    }
+}
+
+#[test]
+fn a_parallel_disk_beside() {
+    // F = ½·(1 − (Z − 2R²)/√(Z² − 4R²)), Z = 1 + H² + R² in units of the distance beside (Howell, *A Catalog of
+    // Radiation Heat Transfer Configuration Factors*, B-13).
+    let (radius, height, beside): (f64, f64, f64) = (0.8, 1.2, 0.9);
+    let (h, r) = (height / beside, radius / beside);
+    let z = 1.0 + h * h + r * r;
+    let exact = PI * 0.5 * (1.0 - (z - 2.0 * r * r) / (z * z - 4.0 * r * r).sqrt());
+    let shape = disk(v(beside, height, 0.0), DVec3::NEG_Y, radius);
+    assert_irradiance("parallel disk", &lit(&shape), exact);
+    assert_close("the reference", (by_directions(&shape) / exact - 1.0).abs().max(1e-3), 1e-3);
+}
+
+/// The same irradiance by area and by directions.
+#[track_caller]
+fn assert_same(shape: &Shape) {
+    let exact = by_directions(shape);
+    if exact == 0.0 {
+        assert_eq!(lit(shape).value(), 0.0, "{shape:?} shows its inside only");
+        return;
+    }
+    assert!(exact > 0.01, "{shape:?} is too dim to tell: {exact}");
+    for (samples, shadow_samples) in [(1024, 1), (64, 16)] {
+        let values = lit(shape).shadows(Shadows::Soft, shadow_samples).values(samples, 64);
+        let (mean, error) = super::mean_and_error(&values);
+        let (mean, error) = (mean * PI / 0.7, error * PI / 0.7);
+        assert!(error < 0.01 * exact, "{shape:?}: noise {error}");
+        assert!(
+            (mean - exact).abs() < 3.0 * error + 1e-3 * exact,
+            "{shape:?}: {mean} ± {error} is not {exact}"
+        );
+    }
+}
+
+#[test]
+fn cylinders_by_area_and_by_directions() {
+    for caps in [true, false] {
+        for (a, b, radius) in [
+            (v(-1.0, 1.0, 0.2), v(1.2, 1.4, -0.1), 0.4),
+            (v(0.2, 0.9, 0.1), v(0.5, 3.0, 0.4), 0.6),
+            // Partly below the horizon.
+            (v(1.0, -0.5, 0.0), v(1.1, 1.0, 0.3), 0.5),
+        ] {
+            assert_same(&Shape::Cylinder { a, b, radius, caps });
+        }
+    }
+}
+
+#[test]
+fn cones_by_area_and_by_directions() {
+    for cap in [true, false] {
+        for (base, tip, radius) in [
+            (v(0.3, 2.0, 0.1), v(-0.1, 0.6, 0.2), 0.7),
+            (v(1.0, 0.4, 0.0), v(0.4, 1.8, 0.3), 0.5),
+            (v(0.5, 1.0, 0.2), v(0.6, 1.1, 0.4), 0.8),
+        ] {
+            assert_same(&Shape::Cone { base, tip, radius, cap });
+        }
+    }
+    let shape = Shape::Cone { base: v(0.1, 1.2, 0.0), tip: v(0.3, 2.4, 0.3), radius: 0.8, cap: true };
+    assert_same(&shape);
+}
+
+#[test]
+fn tori_by_area_and_by_directions() {
+    // Seen through the hole, from beside, and edge on, where a torus hides parts of itself.
+    for (center, axis, radius, tube) in [
+        (v(0.0, 1.2, 0.0), DVec3::Y, 0.8, 0.3),
+        (v(0.7, 1.0, 0.4), v(1.0, 0.3, 0.2), 0.6, 0.35),
+        (v(0.2, 1.0, 0.1), v(0.3, 0.1, 1.0), 0.6, 0.1),
+        (v(0.1, 0.9, 0.0), v(0.1, 1.0, 0.0), 0.5, 0.48),
+    ] {
+        assert_same(&Shape::Torus { center, axis, radius, tube });
+    }
+}
+
+#[test]
+fn far_away_the_middle_gives_what_the_shape_shows() {
+    // E = L·A·cos θ/d² of the shadow that the body casts along the line of sight: 2Rh for a cylinder across it, πR² for
+    // one along it; a cone from beside shows the triangle R·h, from behind its tip the base.
+    let far = |center: DVec3, shape: Shape, shown: f64| {
+        let exact = shown * center.normalize().y / center.length_squared();
+        assert_hard(&format!("{shape:?}"), &lit(&shape), exact);
+        let soft = lit(&shape).shadows(Shadows::Soft, 64).values(256, 16);
+        let (mean, error) = super::mean_and_error(&soft);
+        assert!((mean * PI / 0.7 / exact - 1.0).abs() < 3.0 * error / mean + 1e-3, "{shape:?}");
+    };
+    let up = v(0.0, 1e4, 0.0);
+    let bar = |half: DVec3| Shape::Cylinder { a: up - half, b: up + half, radius: 0.5, caps: true };
+    far(up, bar(DVec3::X * 2.0), 2.0 * 0.5 * 4.0);
+    far(up, bar(DVec3::Y * 2.0), PI * 0.25);
+    let open =
+        Shape::Cylinder { a: up - v(0.5, 1.0, 0.0), b: up + v(0.5, 1.0, 0.0), radius: 0.5, caps: false };
+    far(up, open, 2.0 * 0.5 * 1.0);
+    let cone = |axis: DVec3| {
+        // Its centre of area is on the line of sight.
+        let (side, cap) = (0.5 * axis.length().hypot(0.5), 0.25);
+        let from_base = axis * (side / 3.0 / (side + cap));
+        Shape::Cone { base: up - from_base, tip: up - from_base + axis, radius: 0.5, cap: true }
+    };
+    far(up, cone(DVec3::X * 3.0), 0.5 * 3.0);
+    far(up, cone(DVec3::Y * 3.0), PI * 0.25);
+    far(up, cone(DVec3::NEG_Y * 3.0), PI * 0.25);
+}
