@@ -3,7 +3,7 @@
 //! Names, numbers and layouts are those of the headers `rtcore_common.h`, `rtcore_ray.h`, `rtcore_buffer.h` and
 //! `rtcore_scene.h` of Embree 4.
 
-#![allow(unsafe_code)]
+#![allow(unsafe_code, clippy::panic)]
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::path::Path;
@@ -270,7 +270,7 @@ impl Scene<'_> {
             }
             // SAFETY: the scene is committed, packet and mask are laid out and aligned as the interface asks.
             unsafe {
-                (self.embree.queries.intersect16)(valid.0.as_ptr(), self.scene, &mut packet, &arguments)
+                (self.embree.queries.intersect16)(valid.0.as_ptr(), self.scene, &mut packet, &arguments);
             };
             hits += packet.geometry.iter().filter(|&&geometry| geometry != NONE).count();
         }

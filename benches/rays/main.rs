@@ -208,11 +208,15 @@ fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
     } else {
         line("primary", "Mrays/s", rates(&rays.primary, [&mut closest])[0], None);
     }
+    line("diffuse", "Mrays/s", rates(&rays.diffuse, [&mut closest])[0], None);
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
+/// Traces rays and counts what is hit.
+type Way<'a> = &'a mut dyn FnMut(&[Ray]) -> usize;
+
 /// Millions of rays a second of each way to trace them; every chunk counts by the fastest of its runs.
-fn rates<const N: usize>(rays: &[Ray], mut ways: [&mut dyn FnMut(&[Ray]) -> usize; N]) -> [f64; N] {
+fn rates<const N: usize>(rays: &[Ray], mut ways: [Way<'_>; N]) -> [f64; N] {
     let mut total = [0.0; N];
     for chunk in rays.chunks(CHUNK) {
         let mut best = [f64::INFINITY; N];

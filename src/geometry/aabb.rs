@@ -62,6 +62,9 @@ impl Aabb {
 /// Factor on distances that makes up for the rounding of [`SlabRay::enter`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
+/// The same as a factor on the inverse of a direction, which is rounded once more.
+pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
+
 /// A ray made ready for many boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {

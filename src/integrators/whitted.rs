@@ -12,7 +12,7 @@ use crate::materials::mirror::reflect;
 use crate::materials::{Material, Mirror, Phong};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
-use crate::world::Hit;
+use crate::world::{Hit, PACKET};
 
 /// Follow the camera rays in the queue to the end and add what they see to their samples.
 pub fn trace(
@@ -44,9 +44,14 @@ pub fn trace(
 /// The nearest hit of every ray in the queue.
 pub fn closest_hits(tracer: &Tracer<'_>, queues: &mut Queues) -> Result<(), Cancelled> {
     queues.hits.clear();
-    for rays in queues.rays.chunks(POLL_INTERVAL) {
+    queues.hits.resize(queues.rays.len(), None);
+    for (paths, hits) in queues.rays.chunks(POLL_INTERVAL).zip(queues.hits.chunks_mut(POLL_INTERVAL)) {
         tracer.token.check()?;
-        queues.hits.extend(rays.iter().map(|path| tracer.world.geometry.closest(&path.ray)));
+        for (paths, hits) in paths.chunks(PACKET).zip(hits.chunks_mut(PACKET)) {
+            let mut rays = [paths[0].ray; PACKET];
+            rays.iter_mut().zip(paths).for_each(|(ray, path)| *ray = path.ray);
+            tracer.world.geometry.closest_packet(&rays[..paths.len()], hits);
+        }
     }
     Ok(())
 }
@@ -60,16 +65,27 @@ fn trace_shadows(
 ) -> Result<(), Cancelled> {
     for some in shadows.chunks(POLL_INTERVAL) {
         tracer.token.check()?;
-        for shadow in some {
-            let visible = tracer.settings.shadows == Shadows::Off
-                || !tracer.world.geometry.occluded(&shadow.ray, shadow.source);
-            if visible {
-                radiance[shadow.slot as usize] += shadow.contribution;
+        for some in some.chunks(PACKET) {
+            let occluded = if tracer.settings.shadows == Shadows::Off { 0 } else { occluded(tracer, some) };
+            for (lane, shadow) in some.iter().enumerate() {
+                if occluded & 1 << lane == 0 {
+                    radiance[shadow.slot as usize] += shadow.contribution;
+                }
             }
         }
     }
     counters.shadow_rays += shadows.len() as u64;
     Ok(())
+}
+
+/// A bit for each of at most [`PACKET`] shadow rays that something is in the way of.
+fn occluded(tracer: &Tracer<'_>, shadows: &[ShadowRay]) -> u32 {
+    let mut rays = [shadows[0].ray; PACKET];
+    let mut sources = [shadows[0].source; PACKET];
+    for (lane, shadow) in shadows.iter().enumerate() {
+        (rays[lane], sources[lane]) = (shadow.ray, shadow.source);
+    }
+    tracer.world.geometry.occluded_packet(&rays[..shadows.len()], &sources[..shadows.len()])
 }
 
 /// One round of all rays of a batch.

@@ -221,7 +221,7 @@ mod tests {
             let alone: Vec<_> = rays.iter().map(|ray| geometry.closest(ray)).collect();
             assert_eq!(found, alone, "{rays:?}");
             let source = |lane: usize| match alone[lane] {
-                Some(hit) if lane % 3 == 0 => Source::Object(hit.object),
+                Some(hit) if lane.is_multiple_of(3) => Source::Object(hit.object),
                 Some(hit) if lane % 3 == 1 => Source::Primitive(hit.object, hit.shape.primitive),
                 _ => Source::Object(u32::MAX),
             };

@@ -285,7 +285,7 @@ mod tests {
                 let start =
                     origin + if i % 3 == 0 { Vec3::new(next(), next(), next()) * 0.1 } else { Vec3::ZERO };
                 let ray = Ray::new(start, target - start);
-                if k % 5 == 0 { Ray { t_max: 1.0, ..ray } } else { ray }
+                if k.is_multiple_of(5) { Ray { t_max: 1.0, ..ray } } else { ray }
             };
             packets.push((0..1 + i % PACKET).map(ray).collect());
         }

@@ -2,11 +2,10 @@
 //! (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005), what is left is tested for sixteen rays
 //! side by side.
 
-use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-
 use super::super::WideBvh;
 use super::super::node::{Child, Node, PACK, TrianglePack};
 use super::lanes::{F8, F16, Lanes, Pair};
+use super::single::prefetch;
 use super::stack::Stack;
 use super::triangle;
 use crate::accel::PACKET as SIZE;
@@ -153,9 +152,7 @@ impl<V: Lanes> Packet<V> {
         }
         let scale = own.inverse[axes[2] % 3];
         own.shear = [direction[axes[0] % 3] * scale, direction[axes[1] % 3] * scale, scale];
-        for axis in 0..3 {
-            own.sheared_origin[axis] = own.origin[axes[axis] % 3];
-        }
+        own.sheared_origin = [own.origin[axes[0] % 3], own.origin[axes[1] % 3], own.origin[axes[2] % 3]];
         Some(own)
     }
 
@@ -422,19 +419,6 @@ fn push_ordered<V: Lanes>(
             back += 1;
         }
         pushed += 1;
-    }
-}
-
-/// Ask for a child's memory before it is needed.
-#[inline(always)]
-fn prefetch(tree: &WideBvh, code: u32) {
-    let (start, lines): (*const i8, usize) = match Child::decode(code) {
-        Child::Inner(index) => (tree.nodes.as_ptr().wrapping_add(index as usize).cast(), 4),
-        Child::Leaf { first, .. } => (tree.packs.as_ptr().wrapping_add(first as usize).cast(), 3),
-    };
-    for line in 0..lines {
-        // SAFETY: a hint; no address is wrong.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) };
     }
 }
 

@@ -8,40 +8,43 @@ use super::lanes::{F4, F8, Lanes};
 use super::portable::nearer;
 use super::stack::Stack;
 use super::triangle::{self, Hits};
-use crate::geometry::aabb::SLAB_PAD;
+use crate::geometry::aabb::{FAR_PAD, SLAB_PAD};
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 
 /// A ray in all lanes, with the rows of a node that are near and far along each axis.
 struct BoxRay {
     origin: [F8; 3],
-    inverse: [F8; 3],
+    to_near: [F8; 3],
+    /// The same, padded: a far plane is never met too early.
+    to_far: [F8; 3],
     near: [usize; 3],
 }
 
 impl BoxRay {
-    #[target_feature(enable = "avx2")]
-    #[inline]
-    fn new(ray: &Ray) -> Self {
-        let inverse = ray.direction.recip();
-        // SAFETY: this function has the instructions.
-        let all = |x: [f32; 3]| x.map(|x| unsafe { F8::splat(x) });
-        let near = [0, 1, 2].map(|axis| 2 * axis + usize::from(inverse[axis] < 0.0));
-        Self { origin: all(ray.origin.to_array()), inverse: all(inverse.to_array()), near }
+    #[inline(always)]
+    fn new(ray: &Ray, like: F8) -> Self {
+        let (inverse, padded) = (ray.direction.recip(), ray.direction.recip() * FAR_PAD);
+        let near = |axis: usize| 2 * axis + usize::from(inverse[axis] < 0.0);
+        Self {
+            origin: [like.like(ray.origin.x), like.like(ray.origin.y), like.like(ray.origin.z)],
+            to_near: [like.like(inverse.x), like.like(inverse.y), like.like(inverse.z)],
+            to_far: [like.like(padded.x), like.like(padded.y), like.like(padded.z)],
+            near: [near(0), near(1), near(2)],
+        }
     }
 
-    /// Where the ray enters the eight boxes, and a bit for each that it meets before `far`. A distance that is NaN leaves the
+    /// Where the ray enters the eight boxes, and a bit for each that it meets before `end`. A distance that is NaN leaves the
     /// interval as it is, which is what `SlabRay::enter` does.
-    #[target_feature(enable = "avx2")]
-    #[inline]
+    #[inline(always)]
     fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
-        let pad = end.like(SLAB_PAD);
         let (mut near, mut far) = (end.like(0.0), end);
         for axis in 0..3 {
-            let row = |row: usize| end.gather(&node.rows[row]);
-            let distance = |plane: F8| (plane - self.origin[axis]) * self.inverse[axis];
-            near = distance(row(self.near[axis])).max(near);
-            far = (distance(row(self.near[axis] ^ 1)) * pad).min(far);
+            let row = self.near[axis] % 6;
+            let near_plane = end.gather(&node.rows[row]) - self.origin[axis];
+            let far_plane = end.gather(&node.rows[row ^ 1]) - self.origin[axis];
+            near = (near_plane * self.to_near[axis]).max(near);
+            far = (far_plane * self.to_far[axis]).min(far);
         }
         (near, F8::bits(near.le(far)))
     }
@@ -56,42 +59,46 @@ struct TriangleRay {
 }
 
 impl TriangleRay {
-    #[target_feature(enable = "avx2")]
-    #[inline]
-    fn new(ray: &Ray) -> Self {
+    #[inline(always)]
+    fn new(ray: &Ray, like: F4) -> Self {
         let scalar = ShearedRay::new(ray.origin, ray.direction);
-        let axes = scalar.axes();
-        // SAFETY: this function has the instructions.
-        let all = |x: [f32; 3]| x.map(|x| unsafe { F4::splat(x) });
+        let ([x, y, z], shear) = (scalar.axes(), scalar.shear());
         Self {
-            origin: all(axes.map(|axis| ray.origin[axis])),
-            shear: all(scalar.shear().to_array()),
-            axes,
+            origin: [like.like(ray.origin[x]), like.like(ray.origin[y]), like.like(ray.origin[z])],
+            shear: [like.like(shear.x), like.like(shear.y), like.like(shear.z)],
+            axes: [x, y, z],
             scalar,
         }
     }
 
-    #[target_feature(enable = "avx2")]
-    #[inline]
+    #[inline(always)]
     fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
-        let corner = |corner: usize| {
-            let row = |i: usize| {
-                self.origin[i].gather(&pack.rows[(3 * corner + self.axes[i]) % 9]) - self.origin[i]
-            };
-            let z = row(2);
-            [row(0) - self.shear[0] * z, row(1) - self.shear[1] * z, z]
-        };
-        triangle::hits(&[corner(0), corner(1), corner(2)], self.shear[2], self.shear[2].like(t_max))
+        let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
+        triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max))
+    }
+
+    /// The corners of which `row` is the first.
+    #[inline(always)]
+    fn corner(&self, pack: &TrianglePack, row: usize) -> [F4; 3] {
+        let z = self.row(pack, row, 2);
+        [self.row(pack, row, 0) - self.shear[0] * z, self.row(pack, row, 1) - self.shear[1] * z, z]
+    }
+
+    #[inline(always)]
+    fn row(&self, pack: &TrianglePack, row: usize, axis: usize) -> F4 {
+        self.origin[axis].gather(&pack.rows[row + self.axes[axis] % 3]) - self.origin[axis]
     }
 }
 
 /// See [`WideBvh::closest`].
 #[target_feature(enable = "avx2")]
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
-    let (boxes, triangles) = (BoxRay::new(ray), TriangleRay::new(ray));
+    // SAFETY: this function has the instructions.
+    let (like8, like4) = unsafe { (F8::splat(0.0), F4::splat(0.0)) };
+    let (boxes, triangles) = (BoxRay::new(ray, like8), TriangleRay::new(ray, like4));
     let mut best: Option<ShapeHit> = None;
     let mut t_max = ray.t_max;
-    let mut end = boxes.origin[0].like(t_max * SLAB_PAD);
+    let mut end = like8.like(t_max * SLAB_PAD);
     let mut stack: Stack<(f32, u32)> = Stack::new();
     let mut code = 0;
     loop {
@@ -196,24 +203,26 @@ fn push_ordered(
     Some(nearest.1)
 }
 
-/// Ask for a child's memory before it is needed.
-#[target_feature(enable = "avx2")]
-#[inline]
-fn prefetch(tree: &WideBvh, code: u32) {
-    let (start, lines): (*const i8, usize) = match Child::decode(code) {
-        Child::Inner(index) => (tree.nodes.as_ptr().wrapping_add(index as usize).cast(), 4),
-        Child::Leaf { first, .. } => (tree.packs.as_ptr().wrapping_add(first as usize).cast(), 3),
+/// Ask for the beginning of a child's memory before it is needed; asking for all of it is slower.
+#[inline(always)]
+pub(super) fn prefetch(tree: &WideBvh, code: u32) {
+    let start: *const i8 = match Child::decode(code) {
+        Child::Inner(index) => tree.nodes.as_ptr().wrapping_add(index as usize).cast(),
+        Child::Leaf { first, .. } => tree.packs.as_ptr().wrapping_add(first as usize).cast(),
     };
-    for line in 0..lines {
-        _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line));
+    for line in 0..2 {
+        // SAFETY: a hint; no address is wrong.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) };
     }
 }
 
 /// See [`WideBvh::any`].
 #[target_feature(enable = "avx2")]
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
-    let (boxes, triangles) = (BoxRay::new(ray), TriangleRay::new(ray));
-    let end = boxes.origin[0].like(ray.t_max * SLAB_PAD);
+    // SAFETY: this function has the instructions.
+    let (like8, like4) = unsafe { (F8::splat(0.0), F4::splat(0.0)) };
+    let (boxes, triangles) = (BoxRay::new(ray, like8), TriangleRay::new(ray, like4));
+    let end = like8.like(ray.t_max * SLAB_PAD);
     let mut stack: Stack<u32> = Stack::new();
     stack.push(0);
     while let Some(code) = stack.pop() {
