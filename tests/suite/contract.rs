@@ -399,5 +399,5 @@ fn every_line_of_the_starter_may_be_uncommented() {
     assert!(text.lines().filter(|line| line.starts_with('#')).count() < 12, "{text}");
     let outcome = parse(text.into(), &folder.path().join("scene.toml"));
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
-    assert_eq!(outcome.scene.expect("a scene").objects.len(), 7);
+    assert_eq!(outcome.scene.expect("a scene").objects.len(), 11);
 }
