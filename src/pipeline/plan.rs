@@ -148,6 +148,7 @@ fn effective(scene: &Scene, settings: &RenderSettings, threads: usize, outputs: 
         dof: settings.dof,
         accel: match scene.render.accel {
             Accel::Bvh => "bvh",
+            Accel::KdTree => "kdtree",
         },
         view: settings.view.name(),
         seed: settings.seed,

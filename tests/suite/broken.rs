@@ -244,7 +244,6 @@ const BROKEN: &[(&str, &[Said])] = &[
         "unavailable",
         &[
             (3, 14, r#"integrator "path" is not available in this version; use "whitted""#),
-            (4, 9, r#"accel "kdtree" is not available in this version; use "bvh""#),
             (5, 9, "`error` > 0 is not available in this version"),
             (13, 10, r#"filter "mipmap" is not available in this version; use one of "nearest", "bilinear""#),
             (23, 3, "[[disk]] is not available in this version"),

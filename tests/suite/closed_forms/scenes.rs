@@ -133,7 +133,7 @@ impl Build {
     /// An instance without smoothing: (scale, rotate, translate).
     pub fn mesh(mut self, mesh: TriangleMesh, placed: [DVec3; 3], kind: MaterialKind) -> Self {
         let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
-        let tree = MeshTree::build(Arc::new(loaded), &CancelToken::new()).expect("nobody cancels");
+        let tree = MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
         self.parts.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
         let [scale, rotate, translate] = placed;

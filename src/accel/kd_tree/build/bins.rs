@@ -9,7 +9,7 @@ use super::cost::{Plane, Search};
 use crate::math::Vec4;
 
 /// Bins along an axis.
-const BINS: usize = 64;
+const BINS: usize = 32;
 
 /// More references are counted in parallel.
 const PARALLEL_SIZE: usize = 1 << 16;
@@ -60,20 +60,18 @@ pub fn cheapest(references: &[Reference], cell: &Bounds, around: &Bounds) -> Opt
         Histogram::of(references, around.min, per_length)
     };
     let mut search = Search::new(cell, references.len());
+    let count = references.len();
     for axis in 0..3 {
-        let count = references.len();
-        search.offer(axis, around.min[axis], 0, count, 0);
-        search.offer(axis, around.max[axis], count, 0, 0);
-        if per_length[axis] == 0.0 {
-            continue;
-        }
-        let (mut left, mut right) = (0, count);
-        for bin in 1..BINS {
-            left += histogram.starts[axis][bin - 1] as usize;
-            right -= histogram.ends[axis][bin - 1] as usize;
-            let at = around.min[axis] + extent[axis] * (bin as f32 / BINS as f32);
-            search.offer(axis, at, left, right, 0);
-        }
+        search.along(axis, |across| {
+            across.offer(around.min[axis], 0, count, 0);
+            across.offer(around.max[axis], count, 0, 0);
+            let (mut left, mut right) = (0, count);
+            for bin in 1..if per_length[axis] > 0.0 { BINS } else { 1 } {
+                left += histogram.starts[axis][bin - 1] as usize;
+                right -= histogram.ends[axis][bin - 1] as usize;
+                across.offer(around.min[axis] + extent[axis] * (bin as f32 / BINS as f32), left, right, 0);
+            }
+        });
     }
     // What lies in the plane must not go where space is to be empty.
     search.cheapest().map(|plane| Plane { planar_right: plane.at <= around.min[plane.axis], ..plane })

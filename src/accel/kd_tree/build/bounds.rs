@@ -95,29 +95,34 @@ pub struct Polygon {
 }
 
 impl Polygon {
+    const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
+
     /// What is inside a box, its faces included.
     pub fn clipped(corners: [Vec3; 3], bounds: &Aabb) -> Self {
         let (least, greatest) =
             (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
-        let mut polygon = Self { points: [DVec3::ZERO; 9], count: 3 };
-        for (point, corner) in polygon.points.iter_mut().zip(corners) {
-            *point = corner.as_dvec3();
+        let (mut whole, mut other) = (Self::NOTHING, Self::NOTHING);
+        let (mut from, mut to) = (&mut whole, &mut other);
+        for corner in corners {
+            from.push(corner.as_dvec3());
         }
         for axis in 0..3 {
             if least[axis] < bounds.min[axis] {
-                polygon = polygon.cut(axis, f64::from(bounds.min[axis]), 1.0);
+                from.cut(axis, f64::from(bounds.min[axis]), 1.0, to);
+                std::mem::swap(&mut from, &mut to);
             }
             if greatest[axis] > bounds.max[axis] {
-                polygon = polygon.cut(axis, f64::from(bounds.max[axis]), -1.0);
+                from.cut(axis, f64::from(bounds.max[axis]), -1.0, to);
+                std::mem::swap(&mut from, &mut to);
             }
         }
-        polygon
+        *from
     }
 
     /// Keep what is above the plane, or below where `side` is −1.
-    fn cut(&self, axis: usize, at: f64, side: f64) -> Self {
-        let mut kept = Self { points: [DVec3::ZERO; 9], count: 0 };
-        let Some(mut before) = self.points().last().copied() else { return kept };
+    fn cut(&self, axis: usize, at: f64, side: f64, kept: &mut Self) {
+        kept.count = 0;
+        let Some(mut before) = self.points().last().copied() else { return };
         let mut before_height = (before[axis] - at) * side;
         for &point in self.points() {
             let height = (point[axis] - at) * side;
@@ -131,7 +136,6 @@ impl Polygon {
             }
             (before, before_height) = (point, height);
         }
-        kept
     }
 
     /// Nine points are the most that six planes leave of a triangle, but for rounding, whose surplus adds no extent.

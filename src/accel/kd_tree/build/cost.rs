@@ -5,10 +5,13 @@ use super::bounds::Bounds;
 use crate::math::Vec3;
 
 /// What one step of traversal costs, in tests of a triangle.
-const TRAVERSAL_COST: f32 = 0.5;
+const TRAVERSAL_COST: f32 = 1.0;
 
 /// Factor on the cost of a split that cuts empty space off.
 const EMPTY_FACTOR: f32 = 0.8;
+
+/// Instead of an axis.
+const LEAF: usize = 3;
 
 /// A plane and what comes of it.
 #[derive(Clone, Copy, Debug)]
@@ -35,43 +38,64 @@ impl<'a> Search<'a> {
         let extent = (cell.max - cell.min).truncate();
         let extent = extent.max(Vec3::splat(extent.max_element() * 1e-4)).to_array();
         let [x, y, z] = extent;
-        let leaf = Plane { axis: 3, at: 0.0, planar_right: false, cost: count as f32 };
-        Self { cell, extent, inverse_area: 1.0 / (x * y + y * z + z * x), best: leaf }
+        let best = Plane { axis: LEAF, at: 0.0, planar_right: false, cost: count as f32 };
+        Self { cell, extent, inverse_area: 1.0 / (x * y + y * z + z * x), best }
     }
 
     /// The cheapest; none where a leaf is.
     pub fn cheapest(self) -> Option<Plane> {
-        Some(self.best).filter(|plane| plane.axis < 3)
+        Some(self.best).filter(|plane| plane.axis != LEAF)
     }
 
-    /// Whether a plane is inside the cell.
+    /// Offer planes across an axis by a closure that is given where to.
     #[inline(always)]
-    pub fn is_inside(&self, axis: usize, at: f32) -> bool {
-        at > self.cell.min[axis] && at < self.cell.max[axis]
+    pub fn along(&mut self, axis: usize, offer: impl FnOnce(&mut Across)) {
+        let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
+        let mut across = Across {
+            axis,
+            min: self.cell.min[axis],
+            max: self.cell.max[axis],
+            face: u * v * self.inverse_area,
+            per_length: (u + v) * self.inverse_area,
+            best: self.best,
+        };
+        offer(&mut across);
+        self.best = across.best;
     }
+}
 
+/// Takes planes across one axis.
+pub struct Across {
+    axis: usize,
+    min: f32,
+    max: f32,
+    /// Area of the plane in the cell, and what each unit of length along the axis adds; relative to the cell's.
+    face: f32,
+    per_length: f32,
+    best: Plane,
+}
+
+impl Across {
     /// A plane with so many triangles below, above and in it.
     #[inline(always)]
-    pub fn offer(&mut self, axis: usize, at: f32, left: usize, right: usize, planar: usize) {
-        if !self.is_inside(axis, at) {
+    pub fn offer(&mut self, at: f32, left: usize, right: usize, planar: usize) {
+        if !(at > self.min && at < self.max) {
             return;
         }
-        self.offer_side(axis, at, (left + planar, right), false);
+        self.offer_side(at, left + planar, right, false);
         if planar > 0 {
-            self.offer_side(axis, at, (left, right + planar), true);
+            self.offer_side(at, left, right + planar, true);
         }
     }
 
     #[inline(always)]
-    fn offer_side(&mut self, axis: usize, at: f32, (left, right): (usize, usize), planar_right: bool) {
-        let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
-        let area = |length: f32| u * v + length * (u + v);
-        let below = area(at - self.cell.min[axis]) * left as f32;
-        let above = area(self.cell.max[axis] - at) * right as f32;
+    fn offer_side(&mut self, at: f32, left: usize, right: usize, planar_right: bool) {
+        let below = (self.face + (at - self.min) * self.per_length) * left as f32;
+        let above = (self.face + (self.max - at) * self.per_length) * right as f32;
         let factor = if left == 0 || right == 0 { EMPTY_FACTOR } else { 1.0 };
-        let cost = factor * (TRAVERSAL_COST + (below + above) * self.inverse_area);
+        let cost = factor * (TRAVERSAL_COST + below + above);
         if cost < self.best.cost {
-            self.best = Plane { axis, at, planar_right, cost };
+            self.best = Plane { axis: self.axis, at, planar_right, cost };
         }
     }
 }
