@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use embree::{Embree, Quality, Scene};
-use glimt::accel::{KdTree, WideBvh};
 use glimt::accel::wide_bvh::{Instructions, PACKET};
+use glimt::accel::{KdTree, WideBvh};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;

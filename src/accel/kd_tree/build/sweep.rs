@@ -28,8 +28,7 @@ fn sweep(references: &[Reference], axis: usize, search: &mut Search<'_>) {
     sort(starts);
     sort(ends);
     let planar_at = |at: f32| {
-        let is_planar =
-            |own: &&Reference| own.bounds.min[axis] == at && own.bounds.max[axis] == at;
+        let is_planar = |own: &&Reference| own.bounds.min[axis] == at && own.bounds.max[axis] == at;
         if has_planar { references.iter().filter(is_planar).count() } else { 0 }
     };
     search.along(axis, |across| {
