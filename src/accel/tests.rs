@@ -88,7 +88,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
         2 => to[0] * 0.3 + to[1] * 0.3 + to[2] * 0.4,
         _ => center + anywhere(0.5 * size),
     };
-    let zero = if kind % 2 == 0 { 0.0 } else { -0.0 };
+    let zero = if kind.is_multiple_of(2) { 0.0 } else { -0.0 };
     let mut direction = target - origin;
     match kind / 28 % 4 {
         0 => direction[kind % 3] = zero,
@@ -103,7 +103,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
         }
         _ => {}
     }
-    let t_max = if kind % 11 == 0 { 1.0 } else { f32::INFINITY };
+    let t_max = if kind.is_multiple_of(11) { 1.0 } else { f32::INFINITY };
     Ray { t_max, ..Ray::new(origin, direction) }
 }
 
@@ -119,7 +119,7 @@ fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<St
             aimed(mesh, &planes.bounds(), kind, &mut next)
         };
         let expected = brute(mesh, &ray);
-        let except = expected.map(|hit| hit.primitive).filter(|_| kind % 2 == 0);
+        let except = expected.map(|hit| hit.primitive).filter(|_| kind.is_multiple_of(2));
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let is_hit = |(corners, id): (&[Vec3; 3], u32)| {
             Some(id) != except && sheared.intersect(corners, ray.t_max).is_some()
