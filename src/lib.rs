@@ -11,7 +11,7 @@
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
-//! | [`accel`] | trees over boxes and ids, a closure tests the shape; over triangles, by vector instructions |
+//! | [`accel`] | trees over boxes and ids, a closure tests the shape; over triangles, of boxes by vector instructions and of planes |
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | phong, mirror, glass; texture lookup, normal maps, Fresnel |
 //! | [`lights`] | point and area lights |

@@ -22,7 +22,7 @@ use std::time::Instant;
 
 use embree::{Embree, Quality, Scene};
 use glimt::accel::wide_bvh::Instructions;
-use glimt::accel::{PACKET, WideBvh};
+use glimt::accel::{KdTree, PACKET, WideBvh};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -129,6 +129,9 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
         return;
     }
     let rays = meshes::rays(&tree, mesh);
+    if asked.instructions.is_none() {
+        kd_tree(mesh, &rays);
+    }
     for instructions in Instructions::ALL {
         if instructions.available() != instructions
             || asked.instructions.is_some_and(|only| only != instructions)
@@ -147,6 +150,28 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
             }
         }
     }
+}
+
+/// The same of the tree of planes.
+fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
+    let count = mesh.triangles.len() as u32;
+    let build = || KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
+    let mut best = f64::INFINITY;
+    let mut tree = None;
+    for _ in 0..3 {
+        drop(tree.take());
+        best = best.min(seconds(|| tree = Some(build())));
+    }
+    let Some(tree) = tree else { return };
+    let (nodes, triangles) = tree.expected_visits();
+    println!("  kd-tree, single rays; a random line visits {nodes:.2} nodes and {triangles:.2} triangles");
+    line("build", "s", best, None);
+    line("memory", "MB", tree.memory_bytes() as f64 / 1e6, None);
+    let mut closest = |rays: &[Ray]| rays.iter().filter(|ray| tree.closest(ray).is_some()).count();
+    let mut any = |rays: &[Ray]| rays.iter().filter(|ray| tree.any(ray, None)).count();
+    line("primary", "Mrays/s", rates(&rays.primary, [&mut closest])[0], None);
+    line("diffuse", "Mrays/s", rates(&rays.diffuse, [&mut closest])[0], None);
+    line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
 /// A figure, the peer's, and how they stand.

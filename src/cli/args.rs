@@ -183,7 +183,7 @@ pub enum Shadows {
 pub enum Accel {
     /// Bounding volume hierarchy
     Bvh,
-    /// kd-tree (not available in this version)
+    /// kd-tree over the triangles of meshes
     Kdtree,
 }
 

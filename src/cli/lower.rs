@@ -34,12 +34,10 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         }
         other => other.map(|_| description::Integrator::Whitted),
     };
-    let accel = match args.accel {
-        Some(Accel::Kdtree) => {
-            return Err("--accel kdtree is not available in this version; use --accel bvh".to_owned());
-        }
-        other => other.map(|_| description::Accel::Bvh),
-    };
+    let accel = args.accel.map(|structure| match structure {
+        Accel::Bvh => description::Accel::Bvh,
+        Accel::Kdtree => description::Accel::KdTree,
+    });
     check_outputs(&args.outputs)?;
     let shadows = args.shadows.map(|how| match how {
         Shadows::Off => description::Shadows::Off,
@@ -167,7 +165,7 @@ mod tests {
             "a.toml b.toml",
             "a.toml --threads 5000",
             "a.toml --integrator path",
-            "a.toml --accel kdtree",
+            "a.toml --accel octree",
             "a.toml --seed -1",
         ] {
             assert!(lowered(wrong).is_err(), "{wrong}");

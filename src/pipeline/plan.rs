@@ -171,6 +171,7 @@ fn effective(render: &Render, settings: &RenderSettings, threads: usize, outputs
         dof: settings.dof,
         accel: match render.accel {
             Accel::Bvh => "bvh",
+            Accel::KdTree => "kdtree",
         },
         view: settings.view.name(),
         seed: settings.seed,

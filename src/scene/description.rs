@@ -125,6 +125,8 @@ pub enum Tonemap {
 pub enum Accel {
     /// Bounding volume hierarchy.
     Bvh,
+    /// kd-tree over the triangles of meshes.
+    KdTree,
 }
 
 /// The view.

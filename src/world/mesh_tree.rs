@@ -2,30 +2,42 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::accel::WideBvh;
+use crate::accel::{KdTree, WideBvh};
 use crate::assets::LoadedMesh;
 use crate::assets::mesh::vertex_normals;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
+use crate::scene::description::Accel;
+
+/// A tree of either kind; both give the same hits, bit for bit.
+#[derive(Debug)]
+enum Tree {
+    Boxes(WideBvh),
+    Planes(KdTree),
+}
 
 /// Triangles in the mesh's own coordinates, in the leaves of a tree.
 #[derive(Debug)]
 pub struct MeshTree {
     loaded: Arc<LoadedMesh>,
-    tree: WideBvh,
+    tree: Tree,
     /// Vertex normals, computed at their first use where the file has none.
     computed_normals: OnceLock<Vec<Vec3>>,
 }
 
 impl MeshTree {
-    /// Build it.
+    /// Build it, a tree of the kind that is asked for.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn build(loaded: Arc<LoadedMesh>, token: &CancelToken) -> Result<Self, Cancelled> {
+    pub fn build(loaded: Arc<LoadedMesh>, accel: Accel, token: &CancelToken) -> Result<Self, Cancelled> {
         let mesh = &loaded.mesh;
-        let tree = WideBvh::build(mesh.triangles.len() as u32, |id| mesh.corners(id), token)?;
+        let (count, corners) = (mesh.triangles.len() as u32, |id| mesh.corners(id));
+        let tree = match accel {
+            Accel::Bvh => Tree::Boxes(WideBvh::build(count, corners, token)?),
+            Accel::KdTree => Tree::Planes(KdTree::build(count, corners, token)?),
+        };
         Ok(Self { loaded, tree, computed_normals: OnceLock::new() })
     }
 
@@ -36,7 +48,10 @@ impl MeshTree {
 
     /// The box around all triangles.
     pub fn bounds(&self) -> Aabb {
-        self.tree.bounds()
+        match &self.tree {
+            Tree::Boxes(tree) => tree.bounds(),
+            Tree::Planes(tree) => tree.bounds(),
+        }
     }
 
     /// Vertex normals: the file's, or computed ones, at once if [`MeshTree::prepare_normals`] was called.
@@ -63,26 +78,48 @@ impl MeshTree {
 
     /// Bytes held by the tree with its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes()
+        match &self.tree {
+            Tree::Boxes(tree) => tree.memory_bytes(),
+            Tree::Planes(tree) => tree.memory_bytes(),
+        }
     }
 
     /// The nearest hit of a ray in the mesh's coordinates; of hits at one distance the triangle of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
-        self.tree.closest(ray)
+        match &self.tree {
+            Tree::Boxes(tree) => tree.closest(ray),
+            Tree::Planes(tree) => tree.closest(ray),
+        }
     }
 
     /// Whether the ray hits any triangle but `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
-        self.tree.any(ray, except)
+        match &self.tree {
+            Tree::Boxes(tree) => tree.any(ray, except),
+            Tree::Planes(tree) => tree.any(ray, except),
+        }
     }
 
     /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays.
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<ShapeHit>]) {
-        self.tree.closest_packet(rays, hits);
+        match &self.tree {
+            Tree::Boxes(tree) => tree.closest_packet(rays, hits),
+            Tree::Planes(tree) => {
+                for (ray, hit) in rays.iter().zip(hits) {
+                    *hit = tree.closest(ray);
+                }
+            }
+        }
     }
 
     /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle but its own of `except`.
     pub fn any_packet(&self, rays: &[Ray], except: &[Option<u32>]) -> u32 {
-        self.tree.any_packet(rays, except)
+        match &self.tree {
+            Tree::Boxes(tree) => tree.any_packet(rays, except),
+            Tree::Planes(tree) => {
+                let hits = rays.iter().zip(except).map(|(ray, &except)| tree.any(ray, except));
+                hits.enumerate().fold(0, |bits, (lane, hit)| bits | u32::from(hit) << lane)
+            }
+        }
     }
 }

@@ -162,6 +162,7 @@ mod tests {
     use crate::geometry::sphere::Sphere;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
+    use crate::scene::description::Accel;
     use crate::world::MeshTree;
 
     /// Random numbers in [−1, 1).
@@ -174,7 +175,7 @@ mod tests {
     }
 
     /// Spheres in a grid, three instances of a fan of triangles, a floor.
-    fn geometry() -> Geometry {
+    fn geometry(accel: Accel) -> Geometry {
         let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO], ..TriangleMesh::default() };
         for i in 0..40_u32 {
             let angle = i as f32 * 0.157;
@@ -182,7 +183,7 @@ mod tests {
             mesh.triangles.push([0, i + 1, (i + 1) % 40 + 1]);
         }
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        let tree = Arc::new(MeshTree::build(loaded, &CancelToken::new()).expect("nobody cancels"));
+        let tree = Arc::new(MeshTree::build(loaded, accel, &CancelToken::new()).expect("nobody cancels"));
         let mut shapes = vec![Shape::Plane(Plane::new(DVec3::new(0.0, -2.0, 0.0), DVec3::Y))];
         for i in 0..30 {
             let center = DVec3::new(f64::from(i % 5), f64::from(i / 5 % 3), f64::from(i / 15)) * 1.5
@@ -204,7 +205,12 @@ mod tests {
 
     #[test]
     fn a_packet_sees_what_its_rays_see_alone() {
-        let geometry = geometry();
+        for accel in [Accel::Bvh, Accel::KdTree] {
+            assert_packets(&geometry(accel));
+        }
+    }
+
+    fn assert_packets(geometry: &Geometry) {
         let mut next = random(3);
         let (mut hits, mut shadows) = (0, 0);
         for i in 0..3000 {

@@ -40,7 +40,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (4, 11, r#"`shadows` cannot be "softer"; did you mean "soft"?"#),
             (5, 10, r#"`filter` cannot be "gauss""#),
             (6, 11, r#"`tonemap` must be one of "none", "reinhard", "aces", "agx"; found 1"#),
-            (7, 9, r#"`accel` cannot be "octree""#),
+            (7, 9, r#"`accel` cannot be "octree"; did you mean "kdtree"?"#),
             (22, 8, r#"`type` cannot be "area""#),
             (27, 11, r#"`falloff` cannot be "cube""#),
         ],
@@ -260,7 +260,6 @@ const BROKEN: &[(&str, &[Said])] = &[
         "unavailable",
         &[
             (3, 14, r#"integrator "path" is not available in this version; use "whitted""#),
-            (4, 9, r#"accel "kdtree" is not available in this version; use "bvh""#),
             (5, 9, "`error` > 0 is not available in this version"),
             (13, 10, r#"filter "mipmap" is not available in this version; use one of "nearest", "bilinear""#),
             (24, 8, r#"type "spot" is not available in this version; use "point""#),

@@ -229,7 +229,7 @@ fn a_wrong_call_is_2() {
     for (line, word) in [
         ("ball.toml --once --samples 0", "--samples"),
         ("ball.toml --once --integrator path", "not available"),
-        ("ball.toml --once --accel kdtree", "not available"),
+        ("ball.toml --once --accel octree", "kdtree"),
         ("ball.toml --once -o a.xyz", "a.xyz"),
         ("ball.toml --once --crop 0,0,33,1", "32×24"),
         ("ball.toml --once --bit-depth 16 -o a.jpg", "cannot hold 16 bits"),

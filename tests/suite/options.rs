@@ -314,3 +314,23 @@ fn streams_that_nobody_reads() {
     child.wait().expect("it ends");
     assert_eq!(said, "");
 }
+
+#[test]
+fn both_trees_give_the_same_picture_of_every_scene_with_meshes() {
+    let desk = Desk::new();
+    for scene in ["mesh", "textures", "orbiter"] {
+        let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
+        let [boxes, planes] = ["bvh", "kdtree"].map(|accel| {
+            let size = "--width 96 --height 64 --samples 2 --bit-depth 16";
+            let report = desk.report(&format!("{path} {size} --accel {accel} -o {accel}.png"));
+            assert_eq!(report["settings"]["accel"], accel);
+            let file = fs::File::open(desk.path(&format!("{accel}.png"))).expect("a picture");
+            let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG");
+            let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
+            reader.next_frame(&mut pixels).expect("pixels");
+            pixels
+        });
+        assert!(boxes.iter().any(|&byte| byte != boxes[0]), "{scene}: something is seen");
+        assert!(boxes == planes, "{scene}");
+    }
+}

@@ -158,95 +158,14 @@ impl WideBvh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::pathological::{bits, brute, meshes, random, rays};
     use crate::geometry::watertight::ShearedRay;
-
-    /// Random numbers in [−1, 1).
-    fn random(seed: u64) -> impl FnMut() -> f32 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
-        }
-    }
-
-    /// Meshes that break trees: noise, grids with coplanar and doubled faces, slivers, one, none, all alike, NaN.
-    fn meshes() -> Vec<Vec<[Vec3; 3]>> {
-        let mut next = random(5);
-        let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
-        let noise = (0..700).map(|_| {
-            let at = point(10.0);
-            [at, at + point(1.0), at + point(1.0)]
-        });
-        let noise: Vec<_> = noise.collect();
-        let slivers = (0..300).map(|_| {
-            let (at, along) = (point(5.0), point(8.0));
-            [at, at + along, at + along * 0.5 + point(1e-5)]
-        });
-        let slivers: Vec<_> = slivers.collect();
-        let grid = (0..400).flat_map(|i| {
-            let at = Vec3::new((i % 20) as f32 - 10.0, 0.0, (i / 20) as f32 - 10.0);
-            let square = [at, at + Vec3::X, at + Vec3::X + Vec3::Z, at + Vec3::Z];
-            let halves = [[square[0], square[1], square[2]], [square[0], square[2], square[3]]];
-            [halves[0], halves[1], halves[0]]
-        });
-        let stairs = (0..200).map(|i| {
-            let (x, y) = ((i / 2) as f32 * 0.1, (i % 2) as f32);
-            [Vec3::new(x, y, -5.0), Vec3::new(x, y, 5.0), Vec3::new(x + 0.1, y + 0.1, 0.0)]
-        });
-        let alike = vec![[Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 3.0]; 333];
-        let mut with_nan = noise[..50].to_vec();
-        with_nan[7][1].y = f32::NAN;
-        with_nan[30][0] = Vec3::INFINITY;
-        vec![
-            noise.clone(),
-            slivers,
-            grid.collect(),
-            stairs.collect(),
-            alike,
-            noise[..1].to_vec(),
-            Vec::new(),
-            with_nan,
-        ]
-    }
-
-    fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
-        let sheared = ShearedRay::new(ray.origin, ray.direction);
-        let hits = (0..).zip(mesh).filter_map(|(id, corners)| {
-            sheared.intersect(corners, ray.t_max).map(|hit| ShapeHit { primitive: id, ..hit })
-        });
-        hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.primitive.cmp(&b.primitive)))
-    }
 
     fn built(mesh: &[[Vec3; 3]]) -> WideBvh {
         let tree = WideBvh::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
         let tree = tree.expect("nobody cancels");
         tree.validate(mesh.len() as u32, |id| mesh[id as usize]).expect("a sound tree");
         tree
-    }
-
-    /// Rays at random, at corners and edges, along axes with both zeros, and from corners.
-    fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
-        let mut next = random(11);
-        let mut rays = Vec::new();
-        for i in 0..2000 {
-            let origin = Vec3::new(next(), next(), next()) * 15.0;
-            let triangle = mesh.get(i % mesh.len().max(1)).copied().unwrap_or([Vec3::ZERO; 3]);
-            let target = match i % 5 {
-                0 => triangle[0],
-                1 => (triangle[0] + triangle[1]) * 0.5,
-                2 => (triangle[0] + triangle[1] + triangle[2]) / 3.0,
-                _ => Vec3::new(next(), next(), next()) * 5.0,
-            };
-            let zero = if i % 2 == 0 { 0.0 } else { -0.0 };
-            rays.push(Ray::new(origin, target - origin));
-            rays.push(Ray { t_max: 0.9, ..Ray::new(origin, target - origin) });
-            rays.push(Ray::new(Vec3::new(target.x, 20.0, target.z), Vec3::new(zero, -1.0, zero)));
-            rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
-        }
-        rays.push(Ray::new(Vec3::NAN, Vec3::X));
-        rays.push(Ray::new(Vec3::ZERO, Vec3::new(f32::INFINITY, 0.0, f32::NAN)));
-        rays.push(Ray::new(Vec3::ZERO, Vec3::ZERO));
-        rays
     }
 
     #[test]
@@ -258,9 +177,6 @@ mod tests {
                 for ray in rays(mesh) {
                     let expected = brute(mesh, &ray);
                     let found = tree.closest(&ray);
-                    let bits = |hit: Option<ShapeHit>| {
-                        hit.map(|hit| (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()))
-                    };
                     assert_eq!(bits(found), bits(expected), "mesh {number}, {instructions:?}, {ray:?}");
                     assert_eq!(
                         tree.any(&ray, None),

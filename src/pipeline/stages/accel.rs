@@ -60,10 +60,10 @@ pub(in crate::pipeline) fn accel(
     let key = keys::world(from.scene, &mesh_keys, &from.textures.keys, orbiter.as_deref());
     let same_trees = cache.geometry.get(geometry).is_some();
     if let Some(world) = cache.world.get(key).cloned() {
-        trees(from.meshes, cache, reading)?;
+        trees(from, cache, reading)?;
         return Ok(Staged::reused((key, world), "no shape changed"));
     }
-    let (trees, kept) = trees(from.meshes, cache, reading)?;
+    let (trees, kept) = trees(from, cache, reading)?;
     let built = trees.len() - kept;
     let parts = Parts { meshes: trees, textures: from.textures.texels.clone(), orbiter: from.parsed.orbiter };
     let last = cache.world.latest().cloned();
@@ -84,22 +84,24 @@ pub(in crate::pipeline) fn accel(
 
 /// The trees of all meshes, and how many were kept from before.
 fn trees(
-    meshes: &Meshes,
+    from: &Ingredients<'_>,
     cache: &mut AccelCache,
     reading: &Reading<'_>,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), Stop> {
     let mut kept = 0;
-    let mut trees = Vec::with_capacity(meshes.len());
-    for mesh in meshes {
-        let tree = match cache.trees.get(&mesh.key, mesh.key) {
+    let accel = from.scene.render.accel;
+    let mut trees = Vec::with_capacity(from.meshes.len());
+    for mesh in from.meshes {
+        let key = keys::tree(&mesh.key, accel);
+        let tree = match cache.trees.get(&key, key) {
             Some(tree) => {
                 kept += 1;
                 tree
             }
             None => {
-                let build = || MeshTree::build(mesh.mesh.clone(), reading.token);
+                let build = || MeshTree::build(mesh.mesh.clone(), accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
-                cache.trees.insert(mesh.key, mesh.key, tree.clone());
+                cache.trees.insert(key, key, tree.clone());
                 tree
             }
         };

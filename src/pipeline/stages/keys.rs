@@ -5,11 +5,17 @@ use super::super::fingerprint::{Fingerprint, Key};
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
 use crate::math::DVec3;
-use crate::scene::description::{Camera, ColorSource, MaterialKind, Scene, Shape};
+use crate::scene::description::{Accel, Camera, ColorSource, MaterialKind, Scene, Shape};
 
-/// What trees are built over.
+/// What a mesh's tree is built of.
+pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
+    Fingerprint::new("tree").key(mesh).index(accel as usize).finish()
+}
+
+/// What trees are built over, and which.
 pub(in crate::pipeline) fn geometry(scene: &Scene, meshes: &[Key]) -> Key {
     let mut key = Fingerprint::new("geometry");
+    key.index(scene.render.accel as usize);
     for object in &scene.objects {
         shape(&mut key, &object.shape, meshes);
     }
@@ -58,7 +64,7 @@ pub(in crate::pipeline) fn world(
     }
     camera(&mut key, &scene.camera, orbiter);
     let render = &scene.render;
-    key.vec3(render.ambient).vec3(render.background).index(render.accel as usize);
+    key.vec3(render.ambient).vec3(render.background);
     key.finish()
 }
 

@@ -38,6 +38,12 @@ fn each_edit_redoes_only_what_reads_it() {
     assert_statuses(&report, "drrdrsdd");
     assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree is kept");
 
+    bench.edit("exposure = 1.0", "exposure = 1.0\naccel = \"kdtree\"");
+    let report = bench.done().0;
+    assert_statuses(&report, "drrdsdd");
+    assert!(!report.stages[Stage::Accel as usize].why.contains("kept"), "a tree of another kind");
+    assert_eq!(report.settings.accel, "kdtree");
+
     bench.write("skin.ppm", "P6\n1 1\n255\nxyz");
     let report = bench.done().0;
     assert_statuses(&report, "rrdrrsdd");

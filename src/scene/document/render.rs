@@ -53,7 +53,7 @@ pub(super) fn read(root: &Table<'_>) -> Option<Render> {
         filter: key("filter").choice(&FILTERS, &[]).unwrap_or(default.filter),
         exposure: key("exposure").number32(Limits::Between(-100.0, 100.0)).unwrap_or(default.exposure),
         tonemap: key("tonemap").choice(&TONEMAPS, &[]).unwrap_or(default.tonemap),
-        accel: key("accel").choice(&[("bvh", Accel::Bvh)], &["kdtree"]).unwrap_or(default.accel),
+        accel: key("accel").choice(&ACCELS, &[]).unwrap_or(default.accel),
         seed: key("seed").whole(0..=MAX_U32).unwrap_or(default.seed),
         output: output(&table),
     };
@@ -64,6 +64,7 @@ pub(super) fn read(root: &Table<'_>) -> Option<Render> {
 }
 
 const INTEGRATORS: [(&str, Integrator); 1] = [("whitted", Integrator::Whitted)];
+const ACCELS: [(&str, Accel); 2] = [("bvh", Accel::Bvh), ("kdtree", Accel::KdTree)];
 const SHADOWS: [(&str, Shadows); 3] =
     [("off", Shadows::Off), ("hard", Shadows::Hard), ("soft", Shadows::Soft)];
 const FILTERS: [(&str, PixelFilter); 4] = [

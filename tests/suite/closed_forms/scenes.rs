@@ -94,6 +94,10 @@ impl Build {
         self.with(|scene| (scene.render.shadows, scene.render.shadow_samples) = (shadows, samples))
     }
 
+    pub fn accel(self, accel: Accel) -> Self {
+        self.with(|scene| scene.render.accel = accel)
+    }
+
     pub fn depth(self, max_depth: u32) -> Self {
         self.with(|scene| scene.render.max_depth = max_depth)
     }
@@ -133,7 +137,8 @@ impl Build {
     /// An instance without smoothing: (scale, rotate, translate).
     pub fn mesh(mut self, mesh: TriangleMesh, placed: [DVec3; 3], kind: MaterialKind) -> Self {
         let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
-        let tree = MeshTree::build(Arc::new(loaded), &CancelToken::new()).expect("nobody cancels");
+        let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
+            .expect("nobody cancels");
         self.parts.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
         let [scale, rotate, translate] = placed;
@@ -146,7 +151,8 @@ impl Build {
         let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
         let file = build.parts.meshes.len() - 1;
         let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
-        let tree = MeshTree::build(Arc::new(loaded), &CancelToken::new()).expect("nobody cancels");
+        let tree =
+            MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
         build.parts.meshes[file] = Arc::new(tree);
         build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)
     }

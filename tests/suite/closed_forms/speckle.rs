@@ -3,6 +3,7 @@
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::DVec3;
+use glimt::scene::description::Accel;
 
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::{Random, v};
@@ -51,27 +52,36 @@ fn triangles() -> Build {
     })
 }
 
-fn mesh() -> Build {
+/// Every face as 8 × 8 squares: the planes of a tree go through their edges.
+fn mesh(accel: Accel) -> Build {
     let mut mesh = TriangleMesh::default();
     for [c, u, w] in faces() {
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend([c, c + u, c + u + w, c + w].map(|p| p.as_vec3()));
-        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        let (u, w) = (u / 8.0, w / 8.0);
+        for c in (0..64).map(|i| c + u * f64::from(i % 8) + w * f64::from(i / 8)) {
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend([c, c + u, c + u + w, c + w].map(|p| p.as_vec3()));
+            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
     }
-    scene().mesh(mesh, AS_IT_IS, matte(0.5))
+    scene().accel(accel).mesh(mesh, AS_IT_IS, matte(0.5))
 }
 
 #[test]
 fn cubes_do_not_speckle() {
-    for (what, build) in
-        [("box", boxes()), ("grid", grid()), ("quads", quads()), ("triangles", triangles()), ("mesh", mesh())]
-    {
+    for (what, build) in [
+        ("box", boxes()),
+        ("grid", grid()),
+        ("quads", quads()),
+        ("triangles", triangles()),
+        ("mesh under a tree of boxes", mesh(Accel::Bvh)),
+        ("mesh under a tree of planes", mesh(Accel::KdTree)),
+    ] {
         let mut random = Random(7);
         let geometry = build.world().geometry;
         let mut inside = 0;
-        for _ in 0..200 {
+        for _ in 0..1000 {
             let eye = random.direction() * 6.0;
-            for _ in 0..150 {
+            for _ in 0..50 {
                 // A third of the rays at an edge, where pieces meet.
                 let mut target = v(random.signed(), random.signed(), random.signed());
                 if random.unit() < 0.3 {

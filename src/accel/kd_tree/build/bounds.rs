@@ -1,0 +1,190 @@
+//! Boxes in vector registers, and what is left of a triangle inside one.
+
+use crate::geometry::Aabb;
+use crate::math::{DVec3, Vec3, Vec4};
+
+/// A box; the last lanes mean nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    pub min: Vec4,
+    pub max: Vec4,
+}
+
+impl Bounds {
+    pub const EMPTY: Self = Self { min: Vec4::INFINITY, max: Vec4::NEG_INFINITY };
+
+    pub fn grow(&mut self, other: &Self) {
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+
+    pub fn aabb(&self) -> Aabb {
+        Aabb { min: self.min.truncate(), max: self.max.truncate() }
+    }
+
+    /// The parts below and above a plane.
+    pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
+        let (mut left, mut right) = (*self, *self);
+        left.max[axis] = at;
+        right.min[axis] = at;
+        [left, right]
+    }
+}
+
+/// A triangle's number and the box around what of it is inside a cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference {
+    /// The last lane of `min` holds the bits of the number.
+    pub bounds: Bounds,
+}
+
+impl Reference {
+    /// Of the whole triangle.
+    pub fn new(id: u32, corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners.map(|corner| corner.extend(0.0));
+        // `min` and `max` drop a NaN: it is put back.
+        let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
+        let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
+        min.w = f32::from_bits(id);
+        Self { bounds: Bounds { min, max: a.max(b).max(c) } }
+    }
+
+    pub fn id(&self) -> u32 {
+        self.bounds.min.w.to_bits()
+    }
+
+    /// Whether it can be hit at all and its box has a size.
+    pub fn is_usable(&self) -> bool {
+        (self.bounds.max - self.bounds.min).truncate().is_finite()
+    }
+
+    /// What is in each half, by boxes that are as small as rounding outwards lets them be.
+    pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
+        self.bounds.halves(axis, at).map(|half| Self { bounds: clipped(corners, &half) })
+    }
+}
+
+/// The box around what of a triangle is inside `bounds`; `bounds` itself where rounding leaves nothing.
+fn clipped(corners: [Vec3; 3], bounds: &Bounds) -> Bounds {
+    let (inside_min, inside_max) = Polygon::clipped(corners, &bounds.aabb()).extent();
+    let down = |exact: f64| {
+        let near = exact as f32;
+        if f64::from(near) > exact { near.next_down() } else { near }
+    };
+    let up = |exact: f64| {
+        let near = exact as f32;
+        if f64::from(near) < exact { near.next_up() } else { near }
+    };
+    let min = Vec3::new(down(inside_min.x), down(inside_min.y), down(inside_min.z));
+    let max = Vec3::new(up(inside_max.x), up(inside_max.y), up(inside_max.z));
+    let min = min.extend(bounds.min.w).max(bounds.min);
+    let max = max.extend(bounds.max.w).min(bounds.max);
+    if !min.truncate().cmple(max.truncate()).all() {
+        return *bounds;
+    }
+    let mut clipped = Bounds { min, max };
+    clipped.min.w = bounds.min.w;
+    clipped
+}
+
+/// A triangle cut by up to six planes (Sutherland, Hodgman, *Reentrant Polygon Clipping*, 1974), in double precision.
+#[derive(Clone, Copy)]
+pub struct Polygon {
+    points: [DVec3; 9],
+    count: usize,
+}
+
+impl Polygon {
+    const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
+
+    /// What is inside a box, its faces included.
+    pub fn clipped(corners: [Vec3; 3], bounds: &Aabb) -> Self {
+        let (least, greatest) =
+            (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+        let (mut whole, mut other) = (Self::NOTHING, Self::NOTHING);
+        let (mut from, mut to) = (&mut whole, &mut other);
+        for corner in corners {
+            from.push(corner.as_dvec3());
+        }
+        for axis in 0..3 {
+            if least[axis] < bounds.min[axis] {
+                from.cut(axis, f64::from(bounds.min[axis]), 1.0, to);
+                std::mem::swap(&mut from, &mut to);
+            }
+            if greatest[axis] > bounds.max[axis] {
+                from.cut(axis, f64::from(bounds.max[axis]), -1.0, to);
+                std::mem::swap(&mut from, &mut to);
+            }
+        }
+        *from
+    }
+
+    /// Keep what is above the plane, or below where `side` is −1.
+    fn cut(&self, axis: usize, at: f64, side: f64, kept: &mut Self) {
+        kept.count = 0;
+        let Some(mut before) = self.points().last().copied() else { return };
+        let mut before_height = (before[axis] - at) * side;
+        for &point in self.points() {
+            let height = (point[axis] - at) * side;
+            if (height > 0.0 && before_height < 0.0) || (height < 0.0 && before_height > 0.0) {
+                let mut crossing = before + (point - before) * (before_height / (before_height - height));
+                crossing[axis] = at;
+                kept.push(crossing);
+            }
+            if height >= 0.0 {
+                kept.push(point);
+            }
+            (before, before_height) = (point, height);
+        }
+    }
+
+    /// Nine points are the most that six planes leave of a triangle, but for rounding, whose surplus adds no extent.
+    fn push(&mut self, point: DVec3) {
+        if let Some(place) = self.points.get_mut(self.count) {
+            *place = point;
+            self.count += 1;
+        }
+    }
+
+    /// Its corners.
+    pub fn points(&self) -> &[DVec3] {
+        &self.points[..self.count]
+    }
+
+    /// Least and greatest coordinates; ∞ and −∞ where nothing is left.
+    pub fn extent(&self) -> (DVec3, DVec3) {
+        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        self.points().iter().fold(none, |(min, max), &p| (min.min(p), max.max(p)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clipped_corner_has_the_box_of_the_piece() {
+        let corners = [Vec3::ZERO, Vec3::new(4.0, 0.0, 0.0), Vec3::new(0.0, 4.0, 4.0)];
+        let whole = Reference::new(7, corners);
+        let [left, right] = whole.split(0, 3.0, corners);
+        assert_eq!((left.id(), right.id()), (7, 7));
+        assert_eq!(
+            right.bounds.aabb(),
+            Aabb { min: Vec3::new(3.0, 0.0, 0.0), max: Vec3::new(4.0, 1.0, 1.0) }
+        );
+        assert_eq!(left.bounds.aabb(), Aabb { min: Vec3::ZERO, max: Vec3::new(3.0, 4.0, 4.0) });
+    }
+
+    #[test]
+    fn rounding_is_outwards() {
+        let corners = [Vec3::ZERO, Vec3::new(3.0, 1.0, 0.1), Vec3::new(3.0, 1.0, 0.7)];
+        let [left, right] = Reference::new(0, corners).split(0, 1.0, corners);
+        for (low, exact, high) in [
+            (right.bounds.min.y, 1.0 / 3.0, left.bounds.max.y),
+            (right.bounds.min.z, f64::from(0.1_f32) / 3.0, f32::INFINITY),
+            (f32::NEG_INFINITY, f64::from(0.7_f32) / 3.0, left.bounds.max.z),
+        ] {
+            assert!(f64::from(low) <= exact && exact <= f64::from(high), "{low} {exact} {high}");
+        }
+    }
+}

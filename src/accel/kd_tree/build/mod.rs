@@ -1,0 +1,184 @@
+//! Building: from the top, each cell by the plane of least expected cost; large cells by bins, small ones by perfect splits,
+//! until a leaf is as cheap. Triangles on both sides of a plane go to both, each with the box of its piece.
+//!
+//! The tree is a function of the triangles alone, not of the threads.
+
+mod bins;
+mod bounds;
+mod cost;
+mod subtree;
+mod sweep;
+
+use rayon::prelude::*;
+
+use super::node::{Kind, Node, Triangle};
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+
+use bounds::{Bounds, Reference};
+use subtree::Subtree;
+
+pub use bounds::Polygon;
+
+/// Cells of at most this many references are built by one thread; the token is polled between them.
+const TASK_SIZE: usize = 4096;
+
+/// No triangle yet.
+const NOWHERE: u32 = u32::MAX;
+
+/// What building made.
+pub struct Built {
+    pub nodes: Vec<Node>,
+    /// Places of `triangles`, leaf by leaf.
+    pub references: Vec<u32>,
+    pub triangles: Vec<Triangle>,
+    pub bounds: Aabb,
+}
+
+/// Planes above a leaf at most, for so many triangles (Havran's 8 + 1.3·log₂ n).
+pub fn depth_limit(count: usize) -> u32 {
+    8 + (1.3 * (count.max(1) as f32).log2()) as u32
+}
+
+/// Build over `count` triangles; those whose box has no finite size are in no leaf.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn build(
+    count: u32,
+    corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+    token: &CancelToken,
+) -> Result<Built, Cancelled> {
+    let mut references: Vec<Reference> =
+        (0..count).into_par_iter().map(|id| Reference::new(id, corners(id))).collect();
+    token.check()?;
+    if !references.par_iter().all(Reference::is_usable) {
+        references.retain(Reference::is_usable);
+    }
+    if references.is_empty() {
+        let (nodes, references, triangles) = Default::default();
+        return Ok(Built { nodes, references, triangles, bounds: Aabb::EMPTY });
+    }
+    let mut around = Bounds::EMPTY;
+    for reference in &references {
+        around.grow(&reference.bounds);
+    }
+    let levels = depth_limit(references.len());
+    let part = part(Cell { references, bounds: around, around, levels }, &corners, token)?;
+    let mut all = Subtree::default();
+    part.append_to(&mut all);
+    token.check()?;
+    let (references, order) = by_first_use(all.ids, count);
+    let triangles = order.into_par_iter().map(|id| Triangle { corners: corners(id), id }).collect();
+    Ok(Built { nodes: all.nodes, references, triangles, bounds: around.aabb() })
+}
+
+/// Triangles in the order in which leaves first name them, and their places there instead of their numbers.
+fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
+    let mut places = vec![NOWHERE; count as usize];
+    let mut order = Vec::with_capacity(count as usize);
+    for id in &mut ids {
+        let place = &mut places[*id as usize];
+        if *place == NOWHERE {
+            *place = order.len() as u32;
+            order.push(*id);
+        }
+        *id = *place;
+    }
+    (ids, order)
+}
+
+/// A part of space and what is in it.
+struct Cell {
+    references: Vec<Reference>,
+    bounds: Bounds,
+    /// The box around the references.
+    around: Bounds,
+    /// How many planes may yet follow.
+    levels: u32,
+}
+
+impl Cell {
+    /// The plane to split it by; none for a leaf.
+    fn plane(&self) -> Option<cost::Plane> {
+        if self.levels == 0 || self.references.is_empty() {
+            None
+        } else if self.references.len() <= sweep::SWEPT {
+            sweep::cheapest(&self.references, &self.bounds)
+        } else {
+            bins::cheapest(&self.references, &self.bounds, &self.around)
+        }
+    }
+
+    /// Its halves. What only touches the plane goes to the side that it is on.
+    fn split(self, plane: &cost::Plane, corners: &impl Fn(u32) -> [Vec3; 3]) -> [Self; 2] {
+        let Self { mut references, bounds, levels, .. } = self;
+        let mut right = Vec::with_capacity(references.len() / 2);
+        let mut around = [Bounds::EMPTY; 2];
+        let (axis, at) = (plane.axis, plane.at);
+        references.retain_mut(|reference| {
+            let (min, max) = (reference.bounds.min[axis], reference.bounds.max[axis]);
+            let (below, above) = (min < at, max > at);
+            if below && above {
+                let [own, other] = reference.split(axis, at, corners(reference.id()));
+                around[0].grow(&own.bounds);
+                around[1].grow(&other.bounds);
+                *reference = own;
+                right.push(other);
+                return true;
+            }
+            let goes_right = above || (!below && plane.planar_right);
+            around[usize::from(goes_right)].grow(&reference.bounds);
+            if goes_right {
+                right.push(*reference);
+            }
+            !goes_right
+        });
+        let [left_bounds, right_bounds] = bounds.halves(axis, at);
+        let levels = levels - 1;
+        [
+            Self { references, bounds: left_bounds, around: around[0], levels },
+            Self { references: right, bounds: right_bounds, around: around[1], levels },
+        ]
+    }
+}
+
+/// A part of the tree above the subtrees.
+enum Part {
+    /// Two halves.
+    Halves { axis: usize, at: f32, halves: Box<[Part; 2]> },
+    /// Built by one thread.
+    Built(Subtree),
+}
+
+impl Part {
+    /// Node before children, left before right.
+    fn append_to(self, all: &mut Subtree) {
+        match self {
+            Self::Built(subtree) => all.append(&subtree),
+            Self::Halves { axis, at, halves } => {
+                let place = all.nodes.len();
+                all.nodes.push(Node::new(Kind::Leaf { first: 0, count: 0 }));
+                let [left, right] = *halves;
+                left.append_to(all);
+                all.nodes[place] = Node::new(Kind::Inner { axis, at, right: all.nodes.len() as u32 });
+                right.append_to(all);
+            }
+        }
+    }
+}
+
+/// Split until one thread can take over.
+fn part(
+    cell: Cell,
+    corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
+    token: &CancelToken,
+) -> Result<Part, Cancelled> {
+    token.check()?;
+    let plane = if cell.references.len() > TASK_SIZE { cell.plane() } else { None };
+    let Some(plane) = plane else { return Ok(Part::Built(Subtree::build(cell, corners))) };
+    let [left, right] = cell.split(&plane, corners);
+    let (left, right) = rayon::join(|| part(left, corners, token), || part(right, corners, token));
+    Ok(Part::Halves { axis: plane.axis, at: plane.at, halves: Box::new([left?, right?]) })
+}

@@ -1,0 +1,91 @@
+//! A tree of planes over triangles (J. L. Bentley, *Multidimensional binary search trees used for associative searching*,
+//! 1975): another structure altogether than the tree of boxes, with the same answers to the bit.
+//!
+//! Planes are chosen by surface areas; triangles on both sides of one are in both children, with the box of what is there
+//! of them. No leaf is missed by rounding; of hits at one distance the lowest number wins.
+
+mod build;
+mod node;
+mod traverse;
+mod validate;
+
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+
+use node::{Kind, Node, Triangle};
+
+/// A tree over triangles.
+#[derive(Clone, Debug)]
+pub struct KdTree {
+    /// The root is node 0, a left child follows its parent; empty where there are no triangles.
+    nodes: Vec<Node>,
+    /// Places of `triangles`.
+    references: Vec<u32>,
+    /// Each once, in the order in which leaves first name them.
+    triangles: Vec<Triangle>,
+    bounds: Aabb,
+}
+
+impl KdTree {
+    /// Build over `count` triangles that are known by their number; those with a NaN are never hit.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build(
+        count: u32,
+        corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        let build::Built { nodes, references, triangles, bounds } = build::build(count, corners, token)?;
+        Ok(Self { nodes, references, triangles, bounds })
+    }
+
+    /// The box around all triangles.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.references.as_slice())
+            + size_of_val(self.triangles.as_slice())
+    }
+
+    /// What a random line that meets the box around all is expected to visit, by surface areas: nodes, leaves among them,
+    /// and triangles.
+    pub fn expected_visits(&self) -> (f64, f64) {
+        let whole = f64::from(self.bounds.half_area());
+        let mut visits = (0.0, 0.0);
+        self.walk(|cell, kind| {
+            let share = f64::from(cell.half_area()) / whole;
+            visits.0 += share;
+            if let Kind::Leaf { count, .. } = kind {
+                visits.1 += share * f64::from(count);
+            }
+        });
+        visits
+    }
+
+    /// Every node with its cell, parents first.
+    fn walk(&self, mut visit: impl FnMut(Aabb, Kind)) {
+        let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(0_u32, self.bounds)] };
+        while let Some((place, cell)) = pending.pop() {
+            let kind = self.nodes[place as usize].kind();
+            visit(cell, kind);
+            if let Kind::Inner { axis, at, right } = kind {
+                let [below, above] = halves(cell, axis, at);
+                pending.extend([(right, above), (place + 1, below)]);
+            }
+        }
+    }
+}
+
+/// The parts of a box below and above a plane.
+fn halves(cell: Aabb, axis: usize, at: f32) -> [Aabb; 2] {
+    let (mut below, mut above) = (cell, cell);
+    below.max[axis] = at;
+    above.min[axis] = at;
+    [below, above]
+}

@@ -1,0 +1,160 @@
+//! Front to back with a stack of what is behind.
+//!
+//! Every distance is padded so far that a triangle which the test says is hit is met, whatever rounding did: the test's
+//! and the planes' arithmetic displace a ray by a few roundings of the lengths that they work on, none of which is
+//! greater than the distance from the ray's origin to the far end of the mesh.
+
+use super::KdTree;
+use super::node::Kind;
+use crate::geometry::watertight::ShearedRay;
+use crate::geometry::{Aabb, Ray, ShapeHit};
+
+/// Displacement of a ray by rounding, relative to the greatest length.
+const PAD: f32 = 32.0 * f32::EPSILON;
+
+/// Deepest stack: the depth limit for as many triangles as there are numbers, and one more.
+const STACK_SIZE: usize = 64;
+
+/// A ray made ready for planes, in steps of a direction whose greatest component is between 1 and 2.
+struct PlaneRay {
+    origin: [f32; 3],
+    inverse: [f32; 3],
+    backward: [bool; 3],
+    /// By how much a plane or the ray may be elsewhere.
+    pad: f32,
+    /// Steps in the ray's unit of t.
+    steps: f32,
+}
+
+impl PlaneRay {
+    fn new(ray: &Ray, bounds: &Aabb) -> Self {
+        let greatest = ray.direction.abs().max_element();
+        // The power of two just below, of the exponent's bits alone: scaling by it is exact.
+        let steps = f32::from_bits(greatest.to_bits() & 0x7f80_0000)
+            .clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
+        let inverse = (ray.direction * (1.0 / steps)).recip();
+        let reach = (bounds.min - ray.origin).abs().max((bounds.max - ray.origin).abs()).max_element();
+        Self {
+            origin: ray.origin.to_array(),
+            inverse: inverse.to_array(),
+            backward: inverse.to_array().map(|inverse| inverse.is_sign_negative()),
+            pad: reach * PAD,
+            steps,
+        }
+    }
+
+    /// Where it is at a plane for certain not before, and not after. Where it runs in the plane but for rounding that is
+    /// always; beside it −∞ or ∞. NaN stands for no bound.
+    #[inline(always)]
+    fn meets(&self, axis: usize, at: f32) -> (f32, f32) {
+        let distance = at - self.origin[axis];
+        let low = (distance - self.pad) * self.inverse[axis];
+        let high = (distance + self.pad) * self.inverse[axis];
+        if self.backward[axis] { (high, low) } else { (low, high) }
+    }
+
+    /// The part of it that is in the box.
+    fn inside(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
+        let (mut near, mut far) = (0.0_f32, self.end(t_max));
+        for axis in 0..3 {
+            let (low, high) = (self.meets(axis, bounds.min[axis]), self.meets(axis, bounds.max[axis]));
+            let (enter, leave) = if self.backward[axis] { (high.0, low.1) } else { (low.0, high.1) };
+            near = if enter > near { enter } else { near };
+            far = if leave < far { leave } else { far };
+        }
+        (near <= far).then_some((near, far))
+    }
+
+    /// Where it ends that ends at `t_max`, at the latest.
+    #[inline(always)]
+    fn end(&self, t_max: f32) -> f32 {
+        t_max * self.steps + self.pad
+    }
+}
+
+/// What is left for later: a node and the part of the ray in it.
+type Pending = (u32, f32, f32);
+
+impl KdTree {
+    /// The nearest hit; of hits at one distance the triangle of the lowest number.
+    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
+        let sheared = ShearedRay::new(ray.origin, ray.direction);
+        let mut best: Option<ShapeHit> = None;
+        let mut t_max = ray.t_max;
+        self.visit(ray, |leaf| {
+            for &place in leaf {
+                let triangle = &self.triangles[place as usize];
+                let Some(hit) = sheared.intersect(&triangle.corners, t_max) else { continue };
+                if best.is_none_or(|best| (hit.t, triangle.id) < (best.t, best.primitive)) {
+                    best = Some(ShapeHit { primitive: triangle.id, ..hit });
+                    t_max = hit.t;
+                }
+            }
+            Some(t_max)
+        });
+        best
+    }
+
+    /// Whether the ray hits any triangle but `except`.
+    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
+        let sheared = ShearedRay::new(ray.origin, ray.direction);
+        let mut found = false;
+        self.visit(ray, |leaf| {
+            found = leaf.iter().any(|&place| {
+                let triangle = &self.triangles[place as usize];
+                Some(triangle.id) != except && sheared.intersect(&triangle.corners, ray.t_max).is_some()
+            });
+            (!found).then_some(ray.t_max)
+        });
+        found
+    }
+
+    /// Visit the leaves that the ray may meet, near ones first. `test` gets the places of a leaf's triangles and returns the new end of the ray; none ends the visit.
+    /// A ray that is not finite meets none.
+    #[inline(always)]
+    fn visit(&self, ray: &Ray, mut test: impl FnMut(&[u32]) -> Option<f32>) {
+        if self.nodes.is_empty() || !ray.origin.is_finite() || !ray.direction.is_finite() {
+            return;
+        }
+        let planes = PlaneRay::new(ray, &self.bounds);
+        let Some((mut near, mut far)) = planes.inside(&self.bounds, ray.t_max) else { return };
+        let mut stack: [Pending; STACK_SIZE] = [(0, 0.0, 0.0); STACK_SIZE];
+        let mut size = 0;
+        let mut place = 0;
+        loop {
+            match self.nodes[place as usize].kind() {
+                Kind::Inner { axis, at, right } => {
+                    let (low, high) = planes.meets(axis, at);
+                    let (first, second) =
+                        if planes.backward[axis] { (right, place + 1) } else { (place + 1, right) };
+                    if low > far {
+                        place = first;
+                    } else if high < near {
+                        place = second;
+                    } else {
+                        stack[size] = (second, if low > near { low } else { near }, far);
+                        size += 1;
+                        place = first;
+                        far = if high < far { high } else { far };
+                    }
+                    continue;
+                }
+                Kind::Leaf { first, count } => {
+                    let references = &self.references[first as usize..][..count as usize];
+                    let Some(t_max) = test(references) else { return };
+                    let end = planes.end(t_max);
+                    loop {
+                        if size == 0 {
+                            return;
+                        }
+                        size -= 1;
+                        (place, near, far) = stack[size];
+                        if !(near > end) {
+                            break;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

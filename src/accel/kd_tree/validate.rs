@@ -1,0 +1,147 @@
+//! Whether a tree is sound, by other means than those that built it.
+
+use super::build::{Polygon, depth_limit};
+use super::node::Kind;
+use super::{KdTree, halves};
+use crate::geometry::Aabb;
+use crate::math::{DVec3, Vec3};
+
+/// What a walk from the root knows of a node.
+struct Visit {
+    place: u32,
+    cell: Aabb,
+    depth: u32,
+    /// Triangles of which something is in the cell, its faces included.
+    inside: Vec<u32>,
+}
+
+impl KdTree {
+    /// Walks the tree and says what is wrong with it: planes outside their cells (else the leaves tile the box), nodes that
+    /// are reached twice or never, a depth beyond the limit, leaves that name a triangle twice or one that is elsewhere,
+    /// leaves that do not name one which reaches into them, faces between leaves with a triangle that neither names.
+    ///
+    /// # Errors
+    /// The first fault, in words.
+    pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
+        let usable = |id: &u32| {
+            let bounds = Aabb::around(corners(*id));
+            corners(*id).iter().all(|corner| corner.is_finite()) && bounds.extent().is_finite()
+        };
+        let all: Vec<u32> = (0..count).filter(usable).collect();
+        if self.nodes.is_empty() {
+            return if all.is_empty() { Ok(()) } else { Err("a tree without nodes".to_owned()) };
+        }
+        if Aabb::around(all.iter().flat_map(|&id| corners(id))) != self.bounds {
+            return Err("the box is not that of the triangles".to_owned());
+        }
+        let limit = depth_limit(all.len());
+        let mut named = Named::new(&all, &corners);
+        let mut reached = 0;
+        let mut pending = vec![Visit { place: 0, cell: self.bounds, depth: 0, inside: all }];
+        while let Some(Visit { place, cell, depth, inside }) = pending.pop() {
+            if depth > limit {
+                return Err(format!("node {place} is {depth} planes deep"));
+            }
+            if place != reached {
+                return Err(format!("node {place} is not where it belongs"));
+            }
+            reached += 1;
+            match self.nodes[place as usize].kind() {
+                Kind::Inner { axis, at, right } => {
+                    if !(at > cell.min[axis] && at < cell.max[axis]) {
+                        return Err(format!("the plane of node {place} is outside its cell"));
+                    }
+                    let [below, above] = halves(cell, axis, at);
+                    for (place, cell) in [(right, above), (place + 1, below)] {
+                        let touches = |id: &&u32| !Polygon::clipped(corners(**id), &cell).points().is_empty();
+                        let inside = inside.iter().filter(touches).copied().collect();
+                        pending.push(Visit { place, cell, depth: depth + 1, inside });
+                    }
+                }
+                Kind::Leaf { first, count } => {
+                    let ids = self.references[first as usize..][..count as usize].iter();
+                    let ids: Vec<u32> = ids.map(|&at| self.triangles[at as usize].id).collect();
+                    leaf(place, &cell, &inside, &ids, &corners)?;
+                    named.note(&cell, &inside, &ids);
+                }
+            }
+        }
+        if reached as usize != self.nodes.len() {
+            return Err("nodes that are never reached".to_owned());
+        }
+        if let Some(triangle) = self.triangles.iter().find(|own| own.corners != corners(own.id)) {
+            return Err(format!("triangle {} has other corners", triangle.id));
+        }
+        named.missing()
+    }
+}
+
+/// Whether a leaf names what it must and no more.
+fn leaf(
+    place: u32,
+    cell: &Aabb,
+    inside: &[u32],
+    ids: &[u32],
+    corners: &impl Fn(u32) -> [Vec3; 3],
+) -> Result<(), String> {
+    let mut sorted = ids.to_vec();
+    sorted.sort_unstable();
+    if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
+        return Err(format!("leaf {place} names a triangle twice"));
+    }
+    if let Some(id) = sorted.iter().find(|&&id| !overlap(cell, &Aabb::around(corners(id)))) {
+        return Err(format!("leaf {place} names triangle {id}, which is elsewhere"));
+    }
+    let must = |id: &&u32| reaches_into(cell, corners(**id));
+    match inside.iter().filter(must).find(|id| sorted.binary_search(id).is_err()) {
+        Some(id) => Err(format!("leaf {place} does not name triangle {id}")),
+        None => Ok(()),
+    }
+}
+
+fn overlap(a: &Aabb, b: &Aabb) -> bool {
+    a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
+}
+
+/// Whether more of a triangle is in a cell than what lies in one of its faces.
+fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
+    let (min, max) = Polygon::clipped(corners, cell).extent();
+    (0..3).all(|axis| {
+        let (low, high) = (f64::from(cell.min[axis]), f64::from(cell.max[axis]));
+        let rounding = 1e-12 * low.abs().max(high.abs());
+        low == high || (max[axis] > low + rounding && min[axis] < high - rounding)
+    })
+}
+
+/// Points of every triangle, and whether a leaf at the point names it.
+struct Named {
+    points: Vec<(u32, Vec<(DVec3, bool)>)>,
+}
+
+impl Named {
+    fn new(ids: &[u32], corners: &impl Fn(u32) -> [Vec3; 3]) -> Self {
+        let points = |&id: &u32| {
+            let [a, b, c] = corners(id).map(|corner| corner.as_dvec3());
+            let weights =
+                (0..=4).flat_map(|i| (0..=4 - i).map(move |j| (f64::from(i) / 4.0, f64::from(j) / 4.0)));
+            (id, weights.map(|(u, v)| (a + (b - a) * u + (c - a) * v, false)).collect())
+        };
+        Self { points: ids.iter().map(points).collect() }
+    }
+
+    fn note(&mut self, cell: &Aabb, inside: &[u32], ids: &[u32]) {
+        let size = cell.min.abs().max(cell.max.abs()).as_dvec3() * 1e-12;
+        let (min, max) = (cell.min.as_dvec3() - size, cell.max.as_dvec3() + size);
+        for id in inside.iter().filter(|id| ids.contains(id)) {
+            let Ok(place) = self.points.binary_search_by_key(id, |(id, _)| *id) else { continue };
+            for (point, named) in &mut self.points[place].1 {
+                *named |= min.cmple(*point).all() && point.cmple(max).all();
+            }
+        }
+    }
+
+    fn missing(&self) -> Result<(), String> {
+        let lost = self.points.iter().find(|(_, points)| points.iter().any(|(_, named)| !named));
+        lost.map_or(Ok(()), |(id, _)| Err(format!("no leaf names triangle {id} where a part of it is")))
+    }
+}

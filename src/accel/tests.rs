@@ -1,0 +1,218 @@
+//! Brute force, the tree of planes and the tree of boxes beside each other.
+
+use rayon::prelude::*;
+
+use super::pathological::{bits, brute, meshes, random, rays};
+use super::{KdTree, WideBvh};
+use crate::control::CancelToken;
+use crate::geometry::watertight::ShearedRay;
+use crate::geometry::{Aabb, Ray};
+use crate::math::Vec3;
+
+type Mesh = Vec<[Vec3; 3]>;
+
+fn kd_tree(mesh: &[[Vec3; 3]]) -> KdTree {
+    let tree = KdTree::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
+    tree.expect("nobody cancels")
+}
+
+fn wide_bvh(mesh: &[[Vec3; 3]]) -> WideBvh {
+    let tree = WideBvh::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
+    tree.expect("nobody cancels")
+}
+
+/// A closed box of so many squares along each edge.
+fn cuboid(squares: u32) -> Mesh {
+    let at = |face: usize, i: u32, j: u32| {
+        let (u, v) = (i as f32 / squares as f32 * 2.0 - 1.0, j as f32 / squares as f32 * 2.0 - 1.0);
+        let side = if face < 3 { 1.0 } else { -1.0 };
+        let mut point = Vec3::splat(side);
+        point[(face + 1) % 3] = u;
+        point[(face + 2) % 3] = v;
+        point
+    };
+    let squares =
+        (0..6).flat_map(|face| (0..squares * squares).map(move |k| (face, k / squares, k % squares)));
+    squares
+        .flat_map(|(face, i, j)| {
+            let [a, b, c, d] =
+                [at(face, i, j), at(face, i + 1, j), at(face, i + 1, j + 1), at(face, i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect()
+}
+
+/// Triangles of all sizes anywhere, long ones among them.
+fn noise(seed: u64, count: usize) -> Mesh {
+    let mut next = random(seed);
+    let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
+    let triangle = |i: usize| {
+        let at = point(10.0);
+        let size = [0.1, 1.0, 5.0][i % 3];
+        [at, at + point(size), at + point(size)]
+    };
+    (0..count).map(triangle).collect()
+}
+
+/// Fifty and more: each pathological mesh, boxes and noise, as it is, far from the origin, tiny and huge.
+fn scenes() -> Vec<Mesh> {
+    let shorten = |mesh: Mesh| mesh.into_iter().take(240).collect::<Mesh>();
+    let mut own: Vec<Mesh> = meshes().into_iter().map(shorten).collect();
+    own.extend([cuboid(1), cuboid(4), noise(1, 40), noise(2, 240), noise(3, 200)]);
+    let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
+    let placed = |size: f32, at: Vec3| {
+        let place = move |mesh: &Mesh| mesh.iter().map(|t| t.map(|corner| corner * size + at)).collect();
+        own.iter().map(place).collect::<Vec<Mesh>>()
+    };
+    let (tiny, huge) = (placed(2.0_f32.powi(-30), Vec3::ZERO), placed(2.0_f32.powi(30), Vec3::ZERO));
+    let far = placed(1.0, far);
+    [own, tiny, huge, far].concat()
+}
+
+/// A ray at a mesh: from outside, from far outside, from one of its corners or edges; at one of its points, anywhere, along
+/// an axis, in the plane of two axes.
+fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut() -> f32) -> Ray {
+    let (center, size) = (bounds.center(), bounds.extent().max_element().max(f32::MIN_POSITIVE));
+    let mut pick = || mesh[((next() * 0.5 + 0.5) * mesh.len() as f32) as usize % mesh.len()];
+    let (from, to) = (pick(), pick());
+    let mut anywhere = |size: f32| Vec3::new(next(), next(), next()) * size;
+    let origin = match kind % 7 {
+        0 => from[0],
+        1 => (from[0] + from[1]) * 0.5,
+        2 => center + anywhere(100.0 * size),
+        _ => center + anywhere(1.5 * size),
+    };
+    let target = match kind / 7 % 4 {
+        0 => to[0],
+        1 => (to[0] + to[1]) * 0.5,
+        2 => to[0] * 0.3 + to[1] * 0.3 + to[2] * 0.4,
+        _ => center + anywhere(0.5 * size),
+    };
+    let zero = if kind.is_multiple_of(2) { 0.0 } else { -0.0 };
+    let mut direction = target - origin;
+    match kind / 28 % 4 {
+        0 => direction[kind % 3] = zero,
+        1 => {
+            // Beside the target along an axis, to meet it.
+            let axis = kind % 3;
+            let mut origin = target;
+            origin[axis] = center[axis] + 2.0 * size;
+            let mut direction = Vec3::splat(zero);
+            direction[axis] = -1.0;
+            return Ray::new(origin, direction);
+        }
+        _ => {}
+    }
+    let t_max = if kind.is_multiple_of(11) { 1.0 } else { f32::INFINITY };
+    Ray { t_max, ..Ray::new(origin, direction) }
+}
+
+/// How many of so many rays at a scene each get another answer from either tree than by brute force, and the first.
+fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<String>) {
+    let (planes, boxes) = (kd_tree(mesh), wide_bvh(mesh));
+    let mut next = random(seed);
+    let (mut different, mut first) = (0, None);
+    for kind in 0..count {
+        let ray = if mesh.is_empty() {
+            Ray::new(Vec3::new(next(), next(), next()), Vec3::new(next(), next(), next()))
+        } else {
+            aimed(mesh, &planes.bounds(), kind, &mut next)
+        };
+        let expected = brute(mesh, &ray);
+        let except = expected.map(|hit| hit.primitive).filter(|_| kind.is_multiple_of(2));
+        let sheared = ShearedRay::new(ray.origin, ray.direction);
+        let is_hit = |(corners, id): (&[Vec3; 3], u32)| {
+            Some(id) != except && sheared.intersect(corners, ray.t_max).is_some()
+        };
+        let shadow = expected.is_some() && mesh.iter().zip(0..).any(is_hit);
+        let found = [planes.closest(&ray), boxes.closest(&ray)];
+        let shadows = [planes.any(&ray, except), boxes.any(&ray, except)];
+        if found.iter().any(|&found| bits(found) != bits(expected)) || shadows != [shadow; 2] {
+            different += 1;
+            first.get_or_insert_with(|| {
+                format!("{ray:?}: {expected:?} {shadow}, found {found:?} {shadows:?}")
+            });
+        }
+    }
+    (different, first)
+}
+
+fn no_difference(rays: usize) {
+    let scenes = scenes();
+    assert!(scenes.len() >= 50);
+    let faults: Vec<_> = (0..scenes.len())
+        .into_par_iter()
+        .map(|scene| (scene, differences(&scenes[scene], scene as u64, rays.div_ceil(scenes.len()))))
+        .filter(|(_, (different, _))| *different > 0)
+        .collect();
+    assert!(faults.is_empty(), "scene, rays, first: {faults:#?}");
+}
+
+#[test]
+fn a_million_rays_see_the_same_by_brute_force_and_under_both_trees() {
+    no_difference(1_000_000);
+}
+
+/// `cargo test --release --lib ten_million_rays -- --ignored`
+#[test]
+#[ignore = "takes minutes"]
+fn ten_million_rays_see_the_same_by_brute_force_and_under_both_trees() {
+    no_difference(10_000_000);
+}
+
+#[test]
+fn trees_of_planes_are_sound_and_see_what_brute_force_sees() {
+    for (number, mesh) in meshes().into_iter().chain([cuboid(3), noise(4, 3000)]).enumerate() {
+        let tree = kd_tree(&mesh);
+        tree.validate(mesh.len() as u32, |id| mesh[id as usize])
+            .unwrap_or_else(|fault| panic!("{number}: {fault}"));
+        for ray in rays(&mesh).iter().step_by(if mesh.len() > 1000 { 8 } else { 1 }) {
+            let expected = brute(&mesh, ray);
+            assert_eq!(bits(tree.closest(ray)), bits(expected), "mesh {number}, {ray:?}");
+            assert_eq!(tree.any(ray, None), expected.is_some(), "mesh {number}, {ray:?}");
+        }
+    }
+}
+
+#[test]
+fn every_scene_has_a_sound_tree_of_planes() {
+    for (number, mesh) in scenes().iter().enumerate() {
+        let sound = kd_tree(mesh).validate(mesh.len() as u32, |id| mesh[id as usize]);
+        assert_eq!(sound, Ok(()), "scene {number}");
+    }
+}
+
+/// Planes split this mesh into many leaves: were it one leaf, no test above would test a plane.
+#[test]
+fn planes_part_what_can_be_parted() {
+    let mesh = noise(9, 3000);
+    let (nodes, triangles) = kd_tree(&mesh).expected_visits();
+    assert!(nodes > 10.0 && triangles < 100.0, "{nodes} nodes, {triangles} triangles");
+}
+
+#[test]
+fn the_tree_is_the_same_whatever_the_threads() {
+    let mesh = noise(6, 80_000);
+    let text = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        format!("{:?}", pool.install(|| kd_tree(&mesh)))
+    };
+    let one = text(1);
+    assert!(one == text(2) && one == text(7));
+}
+
+#[test]
+fn a_cancelled_build_stops() {
+    let token = CancelToken::new();
+    token.cancel();
+    assert!(KdTree::build(1, |_| [Vec3::ZERO, Vec3::X, Vec3::Y], &token).is_err());
+}
+
+#[test]
+fn a_leaf_without_one_of_its_triangles_is_found_out() {
+    let mesh = noise(9, 400);
+    let mut shifted = mesh.clone();
+    shifted[17] = shifted[17].map(|corner| corner + Vec3::splat(0.5));
+    let tree = kd_tree(&mesh);
+    assert!(tree.validate(mesh.len() as u32, |id| shifted[id as usize]).is_err());
+}
