@@ -40,7 +40,7 @@ fn each_edit_redoes_only_what_reads_it() {
 
     bench.edit("exposure = 1.0", "exposure = 1.0\naccel = \"kdtree\"");
     let report = bench.done().0;
-    assert_statuses(&report, "drrdsdd");
+    assert_statuses(&report, "drrdrsdd");
     assert!(!report.stages[Stage::Accel as usize].why.contains("kept"), "a tree of another kind");
     assert_eq!(report.settings.accel, "kdtree");
 
