@@ -1,7 +1,8 @@
-//! The ray kernel: what building takes and holds, and millions of rays a second, on one thread: primary rays, one
-//! cosine-distributed bounce, any hit towards a point light.
+//! The ray kernel: what building takes and holds, and millions of rays a second, on one thread and on all: primary rays,
+//! one cosine-distributed bounce, any hit towards a point light.
 //!
-//! - `cargo bench --bench rays` runs on generated meshes, `-- a.ply b.obj c.mesh` on files.
+//! - `cargo bench --bench rays` runs on generated meshes, `-- a.ply b.obj c.mesh` on files; `-- ball` on a generated one
+//!   of a million triangles.
 //! - `--embree LIB` stands the same beside Embree 4: `LIB` is a `libembree4.so`, its scene robust and of medium quality.
 //!   `--embree-isa avx512` lets it use those (its packets of 16 need them, its single rays are faster by AVX2).
 //! - `--instructions NAME` traverses by those alone.
@@ -26,6 +27,7 @@ use glimt::accel::{KdTree, PACKET, WideBvh};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
+use rayon::prelude::*;
 
 /// Chunks are timed this often.
 const RUNS: usize = 7;
@@ -53,13 +55,17 @@ fn main() {
         })
     });
     for file in &asked.files {
+        if file == "ball" {
+            measure("ball 1M", &meshes::rippled_ball(708), embree.as_ref(), &asked);
+            continue;
+        }
         match meshes::load(Path::new(file)) {
             Ok(mesh) => measure(file.rsplit('/').next().unwrap_or(file), &mesh, embree.as_ref(), &asked),
             Err(error) => println!("{file}: {error}"),
         }
     }
     if asked.files.is_empty() {
-        for (name, rings) in [("ball 10k", 71), ("ball 100k", 224), ("ball 1M", 708)] {
+        for (name, rings) in [("ball 10k", 71), ("ball 100k", 224), ("ball 1M", 708), ("ball 10M", 2237)] {
             measure(name, &meshes::rippled_ball(rings), embree.as_ref(), &asked);
         }
     }
@@ -144,12 +150,48 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
         closest("diffuse", &tree, scene.as_ref(), &rays.diffuse);
         any("shadow", &tree, scene.as_ref(), &rays.shadow);
         packets(&tree, scene.as_ref(), &rays);
+        all_threads(&tree, &rays, threads);
         for (rays, answers) in &asked.given {
             if let Err(error) = compare::compare(&tree, mesh, rays, answers) {
                 println!("  {}: {error}", rays.display());
             }
         }
     }
+}
+
+/// The same by all threads: packets of primary and shadow rays, single diffuse ones.
+fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
+    let chunks = |rays: &[Ray], way: &(dyn Fn(&[Ray]) -> usize + Sync)| {
+        let mut best = f64::INFINITY;
+        for _ in 0..RUNS {
+            best = best.min(seconds(|| {
+                let found: usize = rays.par_chunks(1024).map(way).sum();
+                std::hint::black_box(found);
+            }));
+        }
+        rays.len() as f64 / best / 1e6
+    };
+    println!("  {:?}, {threads} threads: packets, but diffuse rays single", tree.instructions());
+    let closest = |rays: &[Ray]| {
+        let mut hits = [None; PACKET];
+        let mut found = |some: &[Ray]| {
+            tree.closest_packet(some, &mut hits[..some.len()]);
+            hits[..some.len()].iter().flatten().count()
+        };
+        rays.chunks(PACKET).map(&mut found).sum()
+    };
+    let any = |rays: &[Ray]| {
+        let found = |some: &[Ray]| tree.any_packet(some, &[None; PACKET][..some.len()]).count_ones() as usize;
+        rays.chunks(PACKET).map(found).sum()
+    };
+    line("primary", "Mrays/s", chunks(&rays.primary, &closest), None);
+    line(
+        "diffuse",
+        "Mrays/s",
+        chunks(&rays.diffuse, &|rays| rays.iter().filter_map(|ray| tree.closest(ray)).count()),
+        None,
+    );
+    line("shadow", "Mrays/s", chunks(&rays.shadow, &any), None);
 }
 
 /// The same of the tree of planes.
