@@ -30,6 +30,8 @@ const RAY_QUERY_FLAG_COHERENT: c_int = 1 << 16;
 pub enum Quality {
     /// `RTC_BUILD_QUALITY_MEDIUM`, its default.
     Medium = 1,
+    /// `RTC_BUILD_QUALITY_HIGH`: spatial splits.
+    High = 2,
 }
 
 /// `RTCRayHit`.

@@ -6,6 +6,7 @@
 //! - `--embree LIB` stands the same beside Embree 4: `LIB` is a `libembree4.so`, its scene robust and of medium quality.
 //!   `--embree-isa avx512` lets it use those (its packets of 16 need them, its single rays are faster by AVX2).
 //! - `--instructions NAME` traverses by those alone.
+//! - `--high` cuts large triangles first, `Quality::High`, also Embree's.
 //! - `--build` builds and traces nothing.
 //! - `--rays FILE --hits FILE` (or `--occluded FILE`), any number of times, counts what differs from given answers.
 //!
@@ -21,8 +22,8 @@ mod meshes;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use embree::{Embree, Quality, Scene};
-use glimt::accel::wide_bvh::Instructions;
+use embree::{Embree, Scene};
+use glimt::accel::wide_bvh::{Instructions, Quality};
 use glimt::accel::{KdTree, PACKET, WideBvh};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
@@ -41,6 +42,7 @@ struct Asked {
     instructions: Option<Instructions>,
     isa: Option<String>,
     build_only: bool,
+    high: bool,
     /// Files of rays, each with its answers.
     given: Vec<(PathBuf, PathBuf)>,
     files: Vec<String>,
@@ -83,6 +85,7 @@ fn asked() -> Asked {
                 asked.instructions =
                     Instructions::ALL.into_iter().find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
             }
+            "--high" => asked.high = true,
             "--build" => asked.build_only = true,
             "--rays" => rays = arguments.next().map(PathBuf::from),
             "--hits" | "--occluded" => {
@@ -105,7 +108,11 @@ fn seconds(run: impl FnOnce()) -> f64 {
 fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Asked) {
     let count = mesh.triangles.len() as u32;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let build = || WideBvh::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
+    let quality = if asked.high { Quality::High } else { Quality::Medium };
+    let build = || {
+        let corners = |id| mesh.corners(id);
+        WideBvh::build_with(quality, count, corners, &CancelToken::new()).expect("nobody cancels")
+    };
     let (mut own_build, mut peer_build) = (f64::INFINITY, f64::INFINITY);
     let mut tree = None;
     let mut scene = None;
@@ -114,8 +121,12 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
         own_build = own_build.min(seconds(|| tree = Some(build())));
         if let Some(embree) = embree {
             drop(scene.take());
-            let mut new =
-                embree.build(mesh, Quality::Medium, threads, asked.isa.as_deref().unwrap_or("avx2"));
+            let mut new = embree.build(
+                mesh,
+                if asked.high { embree::Quality::High } else { embree::Quality::Medium },
+                threads,
+                asked.isa.as_deref().unwrap_or("avx2"),
+            );
             peer_build = peer_build.min(seconds(|| new.commit()));
             scene = Some(new);
         }

@@ -4,6 +4,7 @@
 
 pub mod bvh;
 pub mod kd_tree;
+mod reference;
 pub mod wide_bvh;
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Whether a tree is sound, by other means than those that built it.
 
-use super::build::{Polygon, depth_limit};
+use super::build::depth_limit;
 use super::node::Kind;
 use super::{KdTree, halves};
+use crate::accel::reference::Polygon;
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 

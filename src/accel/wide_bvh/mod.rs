@@ -26,6 +26,17 @@ pub struct WideBvh {
     packs: Vec<TrianglePack>,
     bounds: Aabb,
     instructions: Instructions,
+    quality: Quality,
+}
+
+/// How much work goes into a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// Each triangle in one leaf.
+    #[default]
+    Medium,
+    /// Triangles that are much smaller than their boxes in several.
+    High,
 }
 
 impl WideBvh {
@@ -38,8 +49,21 @@ impl WideBvh {
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        let build::Built { nodes, packs, bounds } = build::build(count, corners, token)?;
-        Ok(Self { nodes, packs, bounds, instructions: Instructions::best() })
+        Self::build_with(Quality::default(), count, corners, token)
+    }
+
+    /// The same with more or less work; the hits are the same.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build_with(
+        quality: Quality,
+        count: u32,
+        corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        let build::Built { nodes, packs, bounds } = build::build(count, corners, quality, token)?;
+        Ok(Self { nodes, packs, bounds, instructions: Instructions::best(), quality })
     }
 
     /// The same tree, traversed by other instructions; those that the processor has not got give way to the best it has.
@@ -123,7 +147,8 @@ impl WideBvh {
     /// # Errors
     /// The first fault, in words.
     pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
-        let mut seen = vec![false; count as usize];
+        let mut leaves: Vec<Vec<Aabb>> = vec![Vec::new(); count as usize];
+        let in_pieces = self.quality == Quality::High;
         let mut pending: Vec<(u32, Aabb)> =
             if self.nodes.is_empty() { Vec::new() } else { vec![(0, self.bounds)] };
         while let Some((index, outer)) = pending.pop() {
@@ -138,20 +163,28 @@ impl WideBvh {
                     node::Child::Leaf { first, count } => {
                         for pack in &self.packs[first as usize..(first + count) as usize] {
                             for id in pack.ids() {
-                                if Aabb::around(corners(id)).union(bounds) != bounds {
+                                if !in_pieces && Aabb::around(corners(id)).union(bounds) != bounds {
                                     return Err(format!("triangle {id} reaches out of its leaf"));
                                 }
-                                if std::mem::replace(&mut seen[id as usize], true) {
+                                if !in_pieces && !leaves[id as usize].is_empty() {
                                     return Err(format!("triangle {id} is in two leaves"));
                                 }
+                                leaves[id as usize].push(bounds);
                             }
                         }
                     }
                 }
             }
         }
-        let lost = |id: &u32| !seen[*id as usize] && corners(*id).iter().all(|corner| corner.is_finite());
-        (0..count).find(lost).map_or(Ok(()), |id| Err(format!("triangle {id} is in no leaf")))
+        let in_a_leaf = |id: u32, point: Vec3| {
+            leaves[id as usize].iter().any(|leaf| leaf.union(Aabb::around([point])) == *leaf)
+        };
+        let lost = |id: &u32| {
+            let [a, b, c] = corners(*id);
+            let points = [a, b, c, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+            points.iter().all(|point| point.is_finite()) && !points.iter().all(|&point| in_a_leaf(*id, point))
+        };
+        (0..count).find(lost).map_or(Ok(()), |id| Err(format!("a part of triangle {id} is in no leaf")))
     }
 }
 
@@ -162,7 +195,12 @@ mod tests {
     use crate::geometry::watertight::ShearedRay;
 
     fn built(mesh: &[[Vec3; 3]]) -> WideBvh {
-        let tree = WideBvh::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
+        built_with(Quality::Medium, mesh)
+    }
+
+    fn built_with(quality: Quality, mesh: &[[Vec3; 3]]) -> WideBvh {
+        let tree =
+            WideBvh::build_with(quality, mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
         let tree = tree.expect("nobody cancels");
         tree.validate(mesh.len() as u32, |id| mesh[id as usize]).expect("a sound tree");
         tree
@@ -170,9 +208,12 @@ mod tests {
 
     #[test]
     fn every_way_to_traverse_gives_the_bits_of_testing_every_triangle() {
+        let of_each =
+            |mesh: &[[Vec3; 3]]| [Quality::Medium, Quality::High].map(|quality| built_with(quality, mesh));
         for (number, mesh) in meshes().iter().enumerate() {
-            let tree = built(mesh);
-            for instructions in Instructions::ALL {
+            for (tree, instructions) in
+                of_each(mesh).iter().flat_map(|tree| Instructions::ALL.map(|one| (tree, one)))
+            {
                 let tree = tree.clone().with(instructions);
                 for ray in rays(mesh) {
                     let expected = brute(mesh, &ray);

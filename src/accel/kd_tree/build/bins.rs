@@ -4,8 +4,8 @@
 
 use rayon::prelude::*;
 
-use super::bounds::{Bounds, Reference};
 use super::cost::{Plane, Search};
+use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
 /// Bins along an axis.

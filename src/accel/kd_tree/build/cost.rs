@@ -1,7 +1,7 @@
 //! What a split is expected to cost, by surface areas (MacDonald, Booth, *Heuristics for ray tracing using space
 //! subdivision*, 1990).
 
-use super::bounds::Bounds;
+use crate::accel::reference::Bounds;
 use crate::math::Vec3;
 
 /// What one step of traversal costs, in tests of a triangle.

@@ -4,7 +4,6 @@
 //! The tree is a function of the triangles alone, not of the threads.
 
 mod bins;
-mod bounds;
 mod cost;
 mod subtree;
 mod sweep;
@@ -16,10 +15,8 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
-use bounds::{Bounds, Reference};
+use crate::accel::reference::{Bounds, Reference};
 use subtree::Subtree;
-
-pub use bounds::Polygon;
 
 /// Cells of at most this many references are built by one thread; the token is polled between them.
 const TASK_SIZE: usize = 4096;

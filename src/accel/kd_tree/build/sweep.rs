@@ -1,8 +1,8 @@
 //! Small cells: every plane through a face of a clipped triangle's box is tried ("perfect splits": Wald, Havran, *On
 //! building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006).
 
-use super::bounds::{Bounds, Reference};
 use super::cost::{Plane, Search};
+use crate::accel::reference::{Bounds, Reference};
 
 /// Cells of at most this many references are swept.
 pub const SWEPT: usize = 24;

@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::Part;
 use super::subtree::{Pack, Subtree};
-use super::{Bounds, Part};
+use crate::accel::reference::Bounds;
 use crate::accel::wide_bvh::node::{Child, Node, WIDTH};
 use crate::accel::wide_bvh::simd::pages;
 
@@ -26,7 +27,7 @@ impl Part {
             Self::Built(subtree) => subtree.bounds,
             Self::Halves(halves) => {
                 let mut bounds = halves[0].0;
-                bounds.grow(halves[1].0.min, halves[1].0.max);
+                bounds.grow(&halves[1].0);
                 bounds
             }
         }

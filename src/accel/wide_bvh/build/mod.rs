@@ -4,79 +4,24 @@
 //! The tree is a function of the triangles alone, not of the threads.
 
 mod join;
+mod pieces;
 mod split;
 mod subtree;
 
 use rayon::prelude::*;
 
+use super::Quality;
 use super::node::{Node, TrianglePack};
+use crate::accel::reference::{Bounds, Reference};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
-use crate::math::{Vec3, Vec4};
+use crate::math::Vec3;
 
 use split::{Segment, partition};
 use subtree::Subtree;
 
 /// Parts of at most this many triangles are built by one thread; the token is polled between them.
 const TASK_SIZE: usize = 8192;
-
-/// A triangle's box while the tree is built; the last lane of `min` holds the bits of its number.
-#[derive(Clone, Copy, Debug)]
-struct Reference {
-    min: Vec4,
-    max: Vec4,
-}
-
-impl Reference {
-    fn new(id: u32, corners: [Vec3; 3]) -> Self {
-        let [a, b, c] = corners.map(|corner| corner.extend(0.0));
-        let mut min = a.min(b).min(c);
-        min.w = f32::from_bits(id);
-        // `min` and `max` drop a NaN: it is put back.
-        let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
-        Self { min: min + Vec3::from(poison).extend(0.0), max: a.max(b).max(c) }
-    }
-
-    fn id(&self) -> u32 {
-        self.min.w.to_bits()
-    }
-
-    fn centroid(&self) -> Vec4 {
-        self.min * 0.5 + self.max * 0.5
-    }
-
-    /// Whether it can be hit at all and its box has a size.
-    fn is_usable(&self) -> bool {
-        (self.max - self.min).truncate().is_finite()
-    }
-}
-
-/// A box in vector registers; the last lanes mean nothing.
-#[derive(Clone, Copy, Debug)]
-struct Bounds {
-    min: Vec4,
-    max: Vec4,
-}
-
-impl Bounds {
-    const EMPTY: Self = Self { min: Vec4::INFINITY, max: Vec4::NEG_INFINITY };
-
-    #[inline(always)]
-    fn grow(&mut self, min: Vec4, max: Vec4) {
-        self.min = self.min.min(min);
-        self.max = self.max.max(max);
-    }
-
-    #[inline(always)]
-    fn half_area(&self) -> f32 {
-        let e = self.max - self.min;
-        e.x * e.y + e.y * e.z + e.z * e.x
-    }
-
-    fn aabb(&self) -> Aabb {
-        Aabb { min: self.min.truncate(), max: self.max.truncate() }
-    }
-}
 
 /// What building made.
 pub struct Built {
@@ -92,6 +37,7 @@ pub struct Built {
 pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+    quality: Quality,
     token: &CancelToken,
 ) -> Result<Built, Cancelled> {
     let mut references: Vec<Reference> =
@@ -102,6 +48,10 @@ pub fn build(
     }
     if references.is_empty() {
         return Ok(Built { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
+    }
+    if quality == Quality::High {
+        references = pieces::in_pieces(&references, &corners);
+        token.check()?;
     }
     let whole = Segment::whole(&references);
     let bounds = whole.bounds.aabb();

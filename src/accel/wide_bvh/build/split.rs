@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::{Bounds, Reference};
+use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::node::{MOST_PACKS, PACK};
 use crate::math::Vec4;
 
@@ -80,13 +80,13 @@ impl Boxes {
 
     #[inline(always)]
     fn grow(&mut self, reference: &Reference, centroid: Vec4) {
-        self.bounds.grow(reference.min, reference.max);
-        self.centroids.grow(centroid, centroid);
+        self.bounds.grow(&reference.bounds);
+        self.centroids.grow(&Bounds { min: centroid, max: centroid });
     }
 
     fn union(mut self, other: Self) -> Self {
-        self.bounds.grow(other.bounds.min, other.bounds.max);
-        self.centroids.grow(other.centroids.min, other.centroids.max);
+        self.bounds.grow(&other.bounds);
+        self.centroids.grow(&other.centroids);
         self
     }
 }
@@ -181,7 +181,7 @@ impl<const N: usize> Histogram<N> {
         let mut own = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 3]; N] };
         for reference in references {
             for (axis, bin) in bins.of(reference).into_iter().enumerate() {
-                own.bounds[bin % N][axis].grow(reference.min, reference.max);
+                own.bounds[bin % N][axis].grow(&reference.bounds);
                 own.counts[bin % N][axis] += 1;
             }
         }
@@ -196,7 +196,7 @@ impl<const N: usize> Histogram<N> {
     fn add(mut self, other: &Self) -> Self {
         for bin in 0..N {
             for axis in 0..3 {
-                self.bounds[bin][axis].grow(other.bounds[bin][axis].min, other.bounds[bin][axis].max);
+                self.bounds[bin][axis].grow(&other.bounds[bin][axis]);
                 self.counts[bin][axis] += other.counts[bin][axis];
             }
         }
@@ -212,7 +212,7 @@ impl<const N: usize> Histogram<N> {
             let (mut bounds, mut members) = (Bounds::EMPTY, 0);
             for bin in (1..count).rev() {
                 let own = &self.bounds[bin][axis];
-                bounds.grow(own.min, own.max);
+                bounds.grow(own);
                 members += self.counts[bin][axis];
                 if members > 0 {
                     right_cost[bin] = bounds.half_area() * blocks(members) as f32;
@@ -221,7 +221,7 @@ impl<const N: usize> Histogram<N> {
             (bounds, members) = (Bounds::EMPTY, 0);
             for (bin, right_cost) in right_cost.into_iter().enumerate().take(count).skip(1) {
                 let own = &self.bounds[bin - 1][axis];
-                bounds.grow(own.min, own.max);
+                bounds.grow(own);
                 members += self.counts[bin - 1][axis];
                 let cost = bounds.half_area() * blocks(members) as f32 + right_cost;
                 if members > 0 && cost < best.map_or(f32::INFINITY, |(_, _, least)| least) {
@@ -232,7 +232,7 @@ impl<const N: usize> Histogram<N> {
         let (axis, bin, cost) = best?;
         let around = |bins: &[[Bounds; 3]]| {
             bins.iter().fold(Bounds::EMPTY, |mut all, bin| {
-                all.grow(bin[axis].min, bin[axis].max);
+                all.grow(&bin[axis]);
                 all
             })
         };
@@ -287,8 +287,8 @@ fn partition_by_plane<const AXIS: usize>(
             (Vec4::splat(centroid[AXIS]) - start) * per_length - Vec4::splat(0.5) + Vec4::splat(ROUND);
         let is_left = place.cmplt(first_right);
         let on = |mask, otherwise| Vec4::select(mask, centroid, otherwise);
-        left.grow(on(is_left, Vec4::INFINITY), on(is_left, Vec4::NEG_INFINITY));
-        right.grow(on(!is_left, Vec4::INFINITY), on(!is_left, Vec4::NEG_INFINITY));
+        left.grow(&Bounds { min: on(is_left, Vec4::INFINITY), max: on(is_left, Vec4::NEG_INFINITY) });
+        right.grow(&Bounds { min: on(!is_left, Vec4::INFINITY), max: on(!is_left, Vec4::NEG_INFINITY) });
         middle += usize::from(is_left.test(0));
     }
     (middle, [left, right])

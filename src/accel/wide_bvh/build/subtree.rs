@@ -1,7 +1,7 @@
 //! The part of a tree that one thread makes.
 
 use super::split::{Segment, partition};
-use super::{Bounds, Reference};
+use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::node::{Child, Node, PACK, WIDTH};
 
 /// Which references a pack of triangles holds.

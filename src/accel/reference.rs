@@ -13,9 +13,17 @@ pub struct Bounds {
 impl Bounds {
     pub const EMPTY: Self = Self { min: Vec4::INFINITY, max: Vec4::NEG_INFINITY };
 
+    #[inline(always)]
     pub fn grow(&mut self, other: &Self) {
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
+    }
+
+    /// Half of the area of its surface.
+    #[inline(always)]
+    pub fn half_area(&self) -> f32 {
+        let e = self.max - self.min;
+        e.x * e.y + e.y * e.z + e.z * e.x
     }
 
     pub fn aabb(&self) -> Aabb {
@@ -47,6 +55,11 @@ impl Reference {
         let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
         min.w = f32::from_bits(id);
         Self { bounds: Bounds { min, max: a.max(b).max(c) } }
+    }
+
+    #[inline(always)]
+    pub fn centroid(&self) -> Vec4 {
+        self.bounds.min * 0.5 + self.bounds.max * 0.5
     }
 
     pub fn id(&self) -> u32 {

@@ -1,0 +1,137 @@
+//! Large triangles in several small boxes before a tree is built over them (Karras, Aila, *Fast Parallel Construction of
+//! High-Quality Bounding Volume Hierarchies*, 2013, section 4): those first whose box is much larger than they are, at
+//! the planes that halve the whole again and again.
+
+use rayon::prelude::*;
+
+use crate::accel::reference::{Bounds, Reference};
+use crate::math::Vec3;
+
+/// Pieces beyond one for each triangle, as a share of the triangles.
+const MOST_MORE: f64 = 0.3;
+
+/// The planes lie on a grid of 2 to this many cells along each axis.
+const LEVELS: u32 = 20;
+
+/// The references with some of them in pieces; the order and the pieces are a function of the triangles alone.
+pub fn in_pieces(references: &[Reference], corners: &(impl Fn(u32) -> [Vec3; 3] + Sync)) -> Vec<Reference> {
+    let grid = Grid::around(references);
+    let priority = |reference: &Reference| grid.priority(reference, corners(reference.id()));
+    let priorities: Vec<f32> = references.par_iter().map(priority).collect();
+    let factor = largest_factor(&priorities, (references.len() as f64 * MOST_MORE) as u64);
+    let pieces = |(reference, priority): (&Reference, &f32)| {
+        let mut pieces = Vec::new();
+        grid.cut(*reference, cuts(*priority, factor), corners(reference.id()), &mut pieces);
+        pieces
+    };
+    references.par_iter().zip(&priorities).flat_map_iter(pieces).collect()
+}
+
+/// How often a triangle is cut.
+fn cuts(priority: f32, factor: f32) -> u32 {
+    (priority * factor) as u32
+}
+
+/// By bisection the factor with which all are cut at most so often.
+fn largest_factor(priorities: &[f32], most: u64) -> f32 {
+    let total =
+        |factor: f32| priorities.par_iter().map(|&priority| u64::from(cuts(priority, factor))).sum::<u64>();
+    let sum: f64 = priorities.iter().map(|&priority| f64::from(priority)).sum();
+    if !(sum > 0.0 && sum.is_finite()) {
+        return 0.0;
+    }
+    // Rounding down takes less than one from each.
+    let (mut low, mut high) =
+        ((most as f64 / sum) as f32, ((most as f64 + priorities.len() as f64) / sum) as f32);
+    for _ in 0..12 {
+        let middle = 0.5 * (low + high);
+        if total(middle) <= most { low = middle } else { high = middle }
+    }
+    if total(low) <= most { low } else { 0.0 }
+}
+
+/// The box around everything, halved again and again.
+struct Grid {
+    start: Vec3,
+    extent: Vec3,
+}
+
+/// A plane of the grid.
+struct Plane {
+    axis: usize,
+    at: f32,
+    /// 0 halves a cell of the finest level, more a larger one.
+    level: u32,
+}
+
+impl Grid {
+    fn around(references: &[Reference]) -> Self {
+        let mut all = Bounds::EMPTY;
+        references.iter().for_each(|reference| all.grow(&reference.bounds));
+        Self { start: all.min.truncate(), extent: (all.max - all.min).truncate() }
+    }
+
+    /// The coarsest plane that goes through a box, if any does.
+    fn plane(&self, bounds: &Bounds) -> Option<Plane> {
+        let cells = (1_u32 << LEVELS) as f32;
+        let on_axis = |axis: usize| {
+            let place = |x: f32| (x - self.start[axis]) / self.extent[axis] * cells;
+            // A box that ends on a plane is below it.
+            let first = place(bounds.min[axis]) as u32;
+            let last = (place(bounds.max[axis]).ceil() as u32).saturating_sub(1).max(first);
+            let level = (first ^ last).checked_ilog2()?;
+            let at = self.start[axis] + self.extent[axis] * ((last >> level << level) as f32 / cells);
+            (bounds.min[axis] < at && at < bounds.max[axis]).then_some(Plane { axis, at, level })
+        };
+        let length = |plane: &Plane| bounds.max[plane.axis] - bounds.min[plane.axis];
+        (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))
+    }
+
+    /// How much there is to win by cutting a triangle: the area that its box has too much, less for finer planes.
+    fn priority(&self, reference: &Reference, [a, b, c]: [Vec3; 3]) -> f32 {
+        let Some(plane) = self.plane(&reference.bounds) else { return 0.0 };
+        let normal = (b - a).cross(c - a).abs();
+        let too_much = reference.bounds.half_area() - (normal.x + normal.y + normal.z);
+        let weight = 0.5_f32.powi((LEVELS - plane.level) as i32);
+        let priority = (too_much.max(0.0) * weight).cbrt();
+        if priority.is_finite() { priority } else { 0.0 }
+    }
+
+    /// Cut so often, the longer pieces more often.
+    fn cut(&self, reference: Reference, cuts: u32, corners: [Vec3; 3], pieces: &mut Vec<Reference>) {
+        let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
+        let Some(Plane { axis, at, .. }) = plane else { return pieces.push(reference) };
+        let halves = reference.split(axis, at, corners);
+        let [left, right] = halves.map(|half| (half.bounds.max - half.bounds.min).truncate().max_element());
+        let of_left = ((cuts - 1) as f32 * (left / (left + right)) + 0.5) as u32;
+        self.cut(halves[0], of_left, corners, pieces);
+        self.cut(halves[1], cuts - 1 - of_left.min(cuts - 1), corners, pieces);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_triangles_are_cut_and_flat_ones_are_not() {
+        let mesh: Vec<[Vec3; 3]> = (0..100)
+            .map(|i| {
+                let at = Vec3::new((i % 10) as f32, (i / 10) as f32, 0.0);
+                if i == 7 {
+                    [Vec3::ZERO, Vec3::splat(10.0), Vec3::new(9.9, 9.8, 10.0)]
+                } else {
+                    [at, at + Vec3::X, at + Vec3::Y]
+                }
+            })
+            .collect();
+        let references: Vec<_> =
+            mesh.iter().zip(0..).map(|(&corners, id)| Reference::new(id, corners)).collect();
+        let pieces = in_pieces(&references, &|id| mesh[id as usize]);
+        let of = |id: u32| pieces.iter().filter(move |piece| piece.id() == id);
+        assert!(of(7).count() > 10 && pieces.len() <= 130, "{} of {}", of(7).count(), pieces.len());
+        assert!((0..100).all(|id| id == 7 || of(id).count() == 1));
+        let area: f32 = of(7).map(|piece| piece.bounds.half_area()).sum();
+        assert!(area < 0.2 * references[7].bounds.half_area(), "{area}");
+    }
+}
