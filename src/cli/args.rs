@@ -183,6 +183,8 @@ pub enum Shadows {
 pub enum Accel {
     /// Bounding volume hierarchy
     Bvh,
+    /// The same with large triangles cut: longer to build, faster where they lie askew
+    BvhHigh,
     /// kd-tree over the triangles of meshes
     Kdtree,
 }

@@ -36,6 +36,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     };
     let accel = args.accel.map(|structure| match structure {
         Accel::Bvh => description::Accel::Bvh,
+        Accel::BvhHigh => description::Accel::BvhHigh,
         Accel::Kdtree => description::Accel::KdTree,
     });
     check_outputs(&args.outputs)?;

@@ -171,6 +171,7 @@ fn effective(render: &Render, settings: &RenderSettings, threads: usize, outputs
         dof: settings.dof,
         accel: match render.accel {
             Accel::Bvh => "bvh",
+            Accel::BvhHigh => "bvh-high",
             Accel::KdTree => "kdtree",
         },
         view: settings.view.name(),

@@ -125,6 +125,9 @@ pub enum Tonemap {
 pub enum Accel {
     /// Bounding volume hierarchy.
     Bvh,
+    /// The same, with large triangles of meshes in several of its leaves: longer to build, faster to trace where
+    /// triangles are long and lie askew.
+    BvhHigh,
     /// kd-tree over the triangles of meshes.
     KdTree,
 }

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use crate::accel::wide_bvh::Quality;
 use crate::accel::{KdTree, WideBvh};
 use crate::assets::LoadedMesh;
 use crate::assets::mesh::vertex_normals;
@@ -36,6 +37,7 @@ impl MeshTree {
         let (count, corners) = (mesh.triangles.len() as u32, |id| mesh.corners(id));
         let tree = match accel {
             Accel::Bvh => Tree::Boxes(WideBvh::build(count, corners, token)?),
+            Accel::BvhHigh => Tree::Boxes(WideBvh::build_with(Quality::High, count, corners, token)?),
             Accel::KdTree => Tree::Planes(KdTree::build(count, corners, token)?),
         };
         Ok(Self { loaded, tree, computed_normals: OnceLock::new() })

@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn a_packet_sees_what_its_rays_see_alone() {
-        for accel in [Accel::Bvh, Accel::KdTree] {
+        for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
             assert_packets(&geometry(accel));
         }
     }

@@ -296,6 +296,7 @@ fn every_word_that_this_version_has_is_known() {
     let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let words: &[(&str, &[&str])] = &[
         ("[render]\nshadows", &["off", "hard", "soft"]),
+        ("[render]\naccel", &["bvh", "bvh-high", "kdtree"]),
         ("[render]\nfilter", &["box", "tent", "gaussian", "mitchell"]),
         ("[render]\ntonemap", &["none", "reinhard", "aces", "agx"]),
         ("[textures.bumps]\nfile = \"textures/bumps.png\"\nfilter", &["nearest", "bilinear"]),

@@ -316,11 +316,11 @@ fn streams_that_nobody_reads() {
 }
 
 #[test]
-fn both_trees_give_the_same_picture_of_every_scene_with_meshes() {
+fn all_trees_give_the_same_picture_of_every_scene_with_meshes() {
     let desk = Desk::new();
     for scene in ["mesh", "textures", "orbiter"] {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
-        let [boxes, planes] = ["bvh", "kdtree"].map(|accel| {
+        let [boxes, pieces, planes] = ["bvh", "bvh-high", "kdtree"].map(|accel| {
             let size = "--width 96 --height 64 --samples 2 --bit-depth 16";
             let report = desk.report(&format!("{path} {size} --accel {accel} -o {accel}.png"));
             assert_eq!(report["settings"]["accel"], accel);
@@ -331,6 +331,6 @@ fn both_trees_give_the_same_picture_of_every_scene_with_meshes() {
             pixels
         });
         assert!(boxes.iter().any(|&byte| byte != boxes[0]), "{scene}: something is seen");
-        assert!(boxes == planes, "{scene}");
+        assert!(boxes == planes && boxes == pieces, "{scene}");
     }
 }

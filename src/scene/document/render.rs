@@ -64,7 +64,8 @@ pub(super) fn read(root: &Table<'_>) -> Option<Render> {
 }
 
 const INTEGRATORS: [(&str, Integrator); 1] = [("whitted", Integrator::Whitted)];
-const ACCELS: [(&str, Accel); 2] = [("bvh", Accel::Bvh), ("kdtree", Accel::KdTree)];
+const ACCELS: [(&str, Accel); 3] =
+    [("bvh", Accel::Bvh), ("bvh-high", Accel::BvhHigh), ("kdtree", Accel::KdTree)];
 const SHADOWS: [(&str, Shadows); 3] =
     [("off", Shadows::Off), ("hard", Shadows::Hard), ("soft", Shadows::Soft)];
 const FILTERS: [(&str, PixelFilter); 4] = [
