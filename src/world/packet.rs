@@ -5,6 +5,7 @@ use super::{Geometry, Hit};
 use crate::accel::PACKET;
 use crate::geometry::{Ray, RayF64};
 use crate::lights::Source;
+use crate::math::transform::Transform;
 
 /// Rays of a packet whose bits are set.
 fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
@@ -110,6 +111,7 @@ impl Geometry {
 }
 
 /// The rays of `met` in a mesh's coordinates, side by side, which lanes they came from, and how many they are.
+#[inline]
 fn local_rays(
     mesh: &MeshInstance,
     rays: &[Ray],
@@ -119,8 +121,10 @@ fn local_rays(
     let mut local = [rays[0]; PACKET];
     let mut lane_of = [0; PACKET];
     let mut count = 0;
+    let is_placed = mesh.transform != Transform::IDENTITY;
     for lane in lanes(met) {
-        local[count] = mesh.local_ray(&Ray { t_max: ends[lane], ..rays[lane] });
+        local[count] = if is_placed { mesh.local_ray(&rays[lane]) } else { rays[lane] };
+        local[count].t_max = ends[lane];
         lane_of[count] = lane;
         count += 1;
     }
@@ -160,7 +164,6 @@ mod tests {
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
-    use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;

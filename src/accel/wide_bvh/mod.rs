@@ -119,22 +119,37 @@ impl WideBvh {
     /// pixels do.
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
-        if self.nodes.is_empty() || rays.len() < 2 || !simd::closest_packet(self, rays, hits) {
-            for (ray, hit) in rays.iter().zip(hits) {
-                *hit = self.closest(ray);
-            }
+        if self.nodes.is_empty() {
+            return hits.fill(None);
+        }
+        if !simd::closest_packet(self, rays, hits) {
+            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest(ray));
         }
     }
 
     /// [`WideBvh::any`] of at most [`PACKET`] rays: a bit for each that hits. `except` has one for each ray.
     pub fn any_packet(&self, rays: &[Ray], except: &[Option<u32>]) -> u32 {
         debug_assert!(rays.len() <= PACKET && rays.len() == except.len());
-        let done =
-            if self.nodes.is_empty() || rays.len() < 2 { None } else { simd::any_packet(self, rays, except) };
-        done.unwrap_or_else(|| {
-            let bits = rays.iter().zip(except).enumerate();
-            bits.map(|(i, (ray, &except))| u32::from(self.any(ray, except)) << i).sum()
-        })
+        if self.nodes.is_empty() {
+            return 0;
+        }
+        if let Some(bits) = simd::any_packet(self, rays, except) {
+            return bits;
+        }
+        let mut bits = 0;
+        for_each_group(rays, |lanes| {
+            let count = lanes.len();
+            let (group, mut own) = (gathered(rays, lanes), [None; PACKET]);
+            own.iter_mut().zip(lanes).for_each(|(own, &lane)| *own = except[lane]);
+            let as_packet =
+                (count >= SMALL_GROUP).then(|| simd::any_packet(self, &group[..count], &own[..count]));
+            let hit = |i: usize| match as_packet.flatten() {
+                Some(found) => found & 1 << i != 0,
+                None => self.any(&group[i], own[i]),
+            };
+            lanes.iter().enumerate().for_each(|(i, lane)| bits |= u32::from(hit(i)) << lane);
+        });
+        bits
     }
 
     /// A ray that is not finite hits nothing; to the box tests it would be in every box, the empty ones too.
@@ -186,6 +201,50 @@ impl WideBvh {
         };
         (0..count).find(lost).map_or(Ok(()), |id| Err(format!("a part of triangle {id} is in no leaf")))
     }
+}
+
+/// Fewer shadow rays are faster one by one.
+const SMALL_GROUP: usize = 4;
+
+/// The lanes of those rays together that go to the same side along each axis, and furthest along the same one.
+fn for_each_group(rays: &[Ray], mut take: impl FnMut(&[usize])) {
+    let way = |ray: &Ray| {
+        let [x, y, z] = ray.direction.to_array().map(f32::abs);
+        let longest = if x > y && x > z {
+            0
+        } else if y > z && y >= x {
+            1
+        } else {
+            2
+        };
+        (ray.direction.cmplt(Vec3::ZERO).bitmask(), longest)
+    };
+    let mut left = (1_u32 << rays.len()) - 1;
+    while left != 0 {
+        let own = way(&rays[left.trailing_zeros() as usize]);
+        let (mut lanes, mut count) = ([0; PACKET], 0);
+        for (lane, ray) in rays.iter().enumerate() {
+            if left & 1 << lane != 0 && way(ray) == own {
+                lanes[count] = lane;
+                count += 1;
+                left &= !(1 << lane);
+            }
+        }
+        // A NaN is not even like itself.
+        if count == 0 {
+            lanes[0] = left.trailing_zeros() as usize;
+            count = 1;
+            left &= left - 1;
+        }
+        take(&lanes[..count]);
+    }
+}
+
+/// The rays of some lanes.
+fn gathered(rays: &[Ray], lanes: &[usize]) -> [Ray; PACKET] {
+    let mut gathered = [rays[lanes[0]]; PACKET];
+    gathered.iter_mut().zip(lanes).for_each(|(own, &lane)| *own = rays[lane]);
+    gathered
 }
 
 #[cfg(test)]
