@@ -65,17 +65,28 @@ pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 /// The same as a factor on the inverse of a direction, which is rounded once more.
 pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
+/// What the watertight test of triangles may be off across a ray, as a part of the distance: it errs by less than 13
+/// units of rounding in what it projects.
+const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
+
 /// A ray made ready for many boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
     origin: Vec3,
+    /// Added to boxes on each side.
+    margin: f32,
     inverse: Vec3,
 }
 
 impl SlabRay {
     /// Prepare it.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, inverse: direction.recip() }
+        Self { origin, margin: 0.0, inverse: direction.recip() }
+    }
+
+    /// Prepare it for boxes around triangles in `whole`: no box is missed whose triangle the watertight test may find.
+    pub fn for_triangles(origin: Vec3, direction: Vec3, whole: &Aabb) -> Self {
+        Self { margin: triangle_margin(origin, whole), ..Self::new(origin, direction) }
     }
 
     /// Where the ray enters the box, if it meets it at a t in [0, `t_max`]. Never misses a box that the exact ray meets:
@@ -85,8 +96,8 @@ impl SlabRay {
     /// The ray's own end is padded alike, so that a box is not missed whose hit is exactly there.
     #[inline(always)]
     pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
-        let a = (min - self.origin) * self.inverse;
-        let b = (max - self.origin) * self.inverse;
+        let a = (min - (self.origin + self.margin)) * self.inverse;
+        let b = (max - (self.origin - self.margin)) * self.inverse;
         let mut near = 0.0_f32;
         let mut far = t_max * SLAB_PAD;
         for axis in 0..3 {
@@ -97,6 +108,11 @@ impl SlabRay {
         }
         (near <= far).then_some(near)
     }
+}
+
+/// How far boxes in `whole` must reach beyond their triangles for a ray from `origin`.
+pub fn triangle_margin(origin: Vec3, whole: &Aabb) -> f32 {
+    (whole.min - origin).abs().max((whole.max - origin).abs()).max_element() * TRIANGLE_ERROR
 }
 
 #[cfg(test)]

@@ -2,13 +2,17 @@
 //! 2013): two triangles that share an edge leave no gap for any ray.
 
 use super::ShapeHit;
-use crate::math::Vec3;
 use crate::math::float::gamma;
+use crate::math::{DVec3, Vec3};
+
+/// A triangle is a needle to a ray where the bound on the error of t is a larger part of its distance than this.
+pub const ILL_CONDITIONED: f32 = 1.0 / 32.0;
 
 /// A ray made ready for many triangles: its longest axis is z and it is sheared to run along it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
     origin: Vec3,
+    direction: Vec3,
     axes: [usize; 3],
     shear: Vec3,
 }
@@ -29,7 +33,12 @@ impl ShearedRay {
             std::mem::swap(&mut x, &mut y);
         }
         let scale = 1.0 / direction[z];
-        Self { origin, axes: [x, y, z], shear: Vec3::new(direction[x] * scale, direction[y] * scale, scale) }
+        Self {
+            origin,
+            direction,
+            axes: [x, y, z],
+            shear: Vec3::new(direction[x] * scale, direction[y] * scale, scale),
+        }
     }
 
     /// The axes of the world that are its x, y and z.
@@ -47,11 +56,11 @@ impl ShearedRay {
     #[inline(always)]
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let [x, y, z] = self.axes;
-        let corners = corners.map(|corner| {
+        let sheared = corners.map(|corner| {
             let p = corner - self.origin;
             (p[x] - self.shear.x * p[z], p[y] - self.shear.y * p[z], p[z])
         });
-        let [(ax, ay, az), (bx, by, bz), (cx, cy, cz)] = corners;
+        let [(ax, ay, az), (bx, by, bz), (cx, cy, cz)] = sheared;
         let mut wa = cx * by - cy * bx;
         let mut wb = ax * cy - ay * cx;
         let mut wc = bx * ay - by * ax;
@@ -72,18 +81,45 @@ impl ShearedRay {
         }
         let inverse = 1.0 / determinant;
         let t = (wa * az + wb * bz + wc * cz) * self.shear.z * inverse;
-        if !(t > 0.0 && t <= t_max) {
-            return None;
+        let (error, reach) = self.distance_error(&sheared, inverse);
+        if error > reach * ILL_CONDITIONED {
+            return self.intersect_needle(corners, t_max);
         }
-        if t <= self.distance_error(&corners, inverse) {
-            return None;
-        }
-        Some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
+        (t > error && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
 
-    /// Bound on the absolute error of t. The sheared x and y err by lengths, z by units of t, which are the same for unit
-    /// directions only.
-    fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> f32 {
+    /// The hit of a triangle so thin for its distance that single precision cannot tell where it is along the ray. That the ray
+    /// goes through it is settled, so that neighbours leave no gap; where it passes by after all, the nearest point of
+    /// an edge counts.
+    #[cold]
+    fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
+        let [x, y, z] = self.axes;
+        let direction = self.direction.as_dvec3();
+        let shear = direction / direction[z];
+        let [a, b, c] = corners.map(|corner| {
+            let p = corner.as_dvec3() - self.origin.as_dvec3();
+            DVec3::new(p[x] - shear[x] * p[z], p[y] - shear[y] * p[z], p[z] / direction[z])
+        });
+        let cross = |p: DVec3, q: DVec3| p.x * q.y - p.y * q.x;
+        let (wa, wb, wc) = (cross(c, b), cross(a, c), cross(b, a));
+        let sum = wa + wb + wc;
+        let is_inside = wa * sum >= 0.0 && wb * sum >= 0.0 && wc * sum >= 0.0 && sum != 0.0;
+        let (t, u, v) = if is_inside {
+            ((wa * a.z + wb * b.z + wc * c.z) / sum, wb / sum, wc / sum)
+        } else {
+            let edges = [nearest_of_edge(a, b), nearest_of_edge(b, c), nearest_of_edge(c, a)];
+            let edge = (0..3).min_by(|&i, &j| edges[i].0.total_cmp(&edges[j].0)).unwrap_or(0);
+            let (_, part, t) = edges[edge];
+            let [u, v] = [[part, 0.0], [1.0 - part, part], [0.0, 1.0 - part]][edge];
+            (t, u, v)
+        };
+        let t = t as f32;
+        (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: u as f32, v: v as f32 })
+    }
+
+    /// Bound on the absolute error of t, and the greatest t of a corner. The sheared x and y err by lengths, z by units of t,
+    /// which are the same for unit directions only.
+    fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> (f32, f32) {
         let greatest = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
         let x = greatest(|corner| corner.0.abs());
         let y = greatest(|corner| corner.1.abs());
@@ -93,8 +129,18 @@ impl ShearedRay {
         let (error_x, error_y) = (gamma(5) * (x + depth), gamma(5) * (y + depth));
         let error_edge = 2.0 * (gamma(2) * x * y + error_y * x + error_x * y);
         let edge = 2.0 * x * y;
-        3.0 * (gamma(3) * edge * z + error_edge * z + error_z * edge) * inverse_determinant.abs()
+        let error = 3.0 * (gamma(3) * edge * z + error_edge * z + error_z * edge) * inverse_determinant.abs();
+        (error, z)
     }
+}
+
+/// Of the points between p and q, whose z are distances along a ray that is seen end-on at 0: how far off the nearest is,
+/// squared, what part of the way to q it is, and where along the ray.
+fn nearest_of_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
+    let (start, way) = (p.truncate(), (q - p).truncate());
+    let part = (-start.dot(way) / way.length_squared()).clamp(0.0, 1.0);
+    let part = if part.is_nan() { 0.0 } else { part };
+    ((start + way * part).length_squared(), part, p.z + (q.z - p.z) * part)
 }
 
 #[cfg(test)]
@@ -111,6 +157,37 @@ mod tests {
         assert_eq!(back.map(|hit| (hit.t, hit.u, hit.v)), Some((2.0, 0.25, 0.5)));
         assert_eq!(ShearedRay::new(Vec3::new(0.25, 0.5, 0.0), Vec3::Z).intersect(&triangle, 1.9), None);
         assert_eq!(ShearedRay::new(Vec3::new(0.9, 0.9, 0.0), Vec3::Z).intersect(&triangle, 10.0), None);
+    }
+
+    #[test]
+    fn a_sheet_with_a_needle_in_it_has_no_hole() {
+        let mut state = 3_u64;
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
+        };
+        for (width, distance) in
+            [(3e-4_f32, 200.0_f32), (1e-4, 200.0), (1e-4, 50.0), (1e-6, 3.0), (2e-7, 1e3)]
+        {
+            // A strip of this width across the middle of a tilted square, and the square's two other parts.
+            let point = |x: f32, y: f32| Vec3::new(x, y, 0.3 * x - 0.2 * y);
+            let [low, high] = [-width, width].map(|w| 0.5 * w);
+            let quad = |a: f32, b: f32| {
+                let [p, q, r, s] = [point(-1.0, a), point(1.0, a), point(1.0, b), point(-1.0, b)];
+                [[p, q, r], [p, r, s]]
+            };
+            let sheet: Vec<_> = [quad(-1.0, low), quad(low, high), quad(high, 1.0)].concat();
+            for _ in 0..20_000 {
+                let eye = Vec3::new(random(), random(), distance);
+                let target = point(random() * 0.9, random() * width);
+                let ray = ShearedRay::new(eye, target - eye);
+                let t =
+                    sheet.iter().filter_map(|corners| ray.intersect(corners, f32::INFINITY)).map(|hit| hit.t);
+                let t: Vec<f32> = t.collect();
+                let nearest = t.iter().copied().fold(f32::INFINITY, f32::min);
+                assert!((nearest - 1.0).abs() < 1e-2, "{width} at {distance}: {t:?}");
+            }
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::single::prefetch;
 use super::stack::Stack;
 use super::triangle;
 use crate::accel::PACKET as SIZE;
-use crate::geometry::aabb::SLAB_PAD;
+use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 
@@ -65,14 +65,15 @@ struct Frustum {
 
 impl Frustum {
     #[inline(always)]
-    fn new<V: Lanes>(rows: &Rows, packet: &Packet<V>, like: F8) -> Self {
+    fn new<V: Lanes>(rows: &Rows, packet: &Packet<V>, margin: f32, like: F8) -> Self {
         let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
         let mut inverse = [[like; 2]; 3];
         for axis in 0..3 {
             let ends = ends(&rows.origin[axis]);
             let negative = packet.near[axis] & 1;
-            near_origin[axis] = like.like(ends[1 - negative]);
-            far_origin[axis] = like.like(ends[negative]);
+            let margin = if negative == 1 { -margin } else { margin };
+            near_origin[axis] = like.like(ends[1 - negative] + margin);
+            far_origin[axis] = like.like(ends[negative] - margin);
             let mut row = [0.0; SIZE];
             packet.inverse[axis].store(&mut row);
             let [least, greatest] = self::ends(&row);
@@ -97,9 +98,22 @@ impl Frustum {
     }
 }
 
+/// The greatest margin that boxes need for any of the rays.
+#[inline(always)]
+fn margin(tree: &WideBvh, rays: &[Ray]) -> f32 {
+    let mut greatest = 0.0;
+    for ray in rays {
+        let own = triangle_margin(ray.origin, &tree.bounds);
+        greatest = if own > greatest { own } else { greatest };
+    }
+    greatest
+}
+
 /// The rows in registers, ready for boxes and triangles.
 struct Packet<V: Lanes> {
-    origin: [V; 3],
+    /// Origins for near and far planes, a margin apart.
+    near_origin: [V; 3],
+    far_origin: [V; 3],
     inverse: [V; 3],
     /// Origins along the axes of the sheared rays.
     sheared_origin: [V; 3],
@@ -113,31 +127,36 @@ struct Packet<V: Lanes> {
 impl<V: Lanes> Packet<V> {
     /// None where the rays do not go the same way: along each axis to the same side, the longest the same for all.
     #[inline(always)]
-    fn new(rows: &Rows, first: &Ray, like: V) -> Option<Self> {
+    fn new(rows: &Rows, first: &Ray, margin: f32, like: V) -> Option<Self> {
         let axes = ShearedRay::new(first.origin, first.direction).axes();
         let mut own = Self {
-            origin: [like; 3],
+            near_origin: [like; 3],
+            far_origin: [like; 3],
             inverse: [like; 3],
             sheared_origin: [like; 3],
             shear: [like; 3],
             axes,
             near: [0; 3],
         };
-        let (mut direction, mut size) = ([like; 3], [like; 3]);
+        let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
+        let margin = like.like(margin);
         let (zero, one) = (like.like(0.0), like.like(1.0));
         let all = V::bits(zero.eq(zero));
         for axis in 0..3 {
-            own.origin[axis] = like.gather(&rows.origin[axis]);
+            origin[axis] = like.gather(&rows.origin[axis]);
             direction[axis] = like.gather(&rows.direction[axis]);
             size[axis] = direction[axis].abs();
             own.inverse[axis] = one.over(direction[axis]);
             let up = V::bits(zero.lt(own.inverse[axis]) & own.inverse[axis].lt(like.like(f32::INFINITY)));
             let down =
                 V::bits(own.inverse[axis].lt(zero) & like.like(f32::NEG_INFINITY).lt(own.inverse[axis]));
-            let finite = V::bits(own.origin[axis].abs().lt(like.like(f32::INFINITY)));
+            let finite = V::bits(origin[axis].abs().lt(like.like(f32::INFINITY)));
             if (up != all && down != all) || finite != all {
                 return None;
             }
+            let (before, after) = (origin[axis] - margin, origin[axis] + margin);
+            own.near_origin[axis] = if down == all { before } else { after };
+            own.far_origin[axis] = if down == all { after } else { before };
             own.near[axis] = 2 * axis + usize::from(down == all);
         }
         // `ShearedRay::new`, side by side: which axis is the longest, and the shears.
@@ -152,7 +171,7 @@ impl<V: Lanes> Packet<V> {
         }
         let scale = own.inverse[axes[2] % 3];
         own.shear = [direction[axes[0] % 3] * scale, direction[axes[1] % 3] * scale, scale];
-        own.sheared_origin = [own.origin[axes[0] % 3], own.origin[axes[1] % 3], own.origin[axes[2] % 3]];
+        own.sheared_origin = [origin[axes[0] % 3], origin[axes[1] % 3], origin[axes[2] % 3]];
         Some(own)
     }
 
@@ -164,8 +183,8 @@ impl<V: Lanes> Packet<V> {
         for axis in 0..3 {
             let row = self.near[axis] % 6;
             let (to_near, to_far) = (end.like(node.rows[row][slot]), end.like(node.rows[row ^ 1][slot]));
-            near = ((to_near - self.origin[axis]) * self.inverse[axis]).max(near);
-            far = ((to_far - self.origin[axis]) * self.inverse[axis] * pad).min(far);
+            near = ((to_near - self.near_origin[axis]) * self.inverse[axis]).max(near);
+            far = ((to_far - self.far_origin[axis]) * self.inverse[axis] * pad).min(far);
         }
         V::bits(near.le(far)) != 0
     }
@@ -214,8 +233,9 @@ fn closest<V: Lanes>(
 ) -> bool {
     let Some(first) = rays.first() else { return false };
     let rows = Rows::new(rays, first);
-    let Some(packet) = Packet::new(&rows, first, like) else { return false };
-    let frustum = Frustum::new(&rows, &packet, like8);
+    let margin = margin(tree, rays);
+    let Some(packet) = Packet::new(&rows, first, margin, like) else { return false };
+    let frustum = Frustum::new(&rows, &packet, margin, like8);
     let t_max = like.gather(&rows.t_max);
     let pad = like.like(SLAB_PAD);
     let none = like.like(f32::from_bits(u32::MAX));
@@ -333,8 +353,9 @@ impl<V: Lanes> Nearest<V> {
 fn any<V: Lanes>(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>], like: V, like8: F8) -> Option<u32> {
     let first = rays.first()?;
     let rows = Rows::new(rays, first);
-    let packet = Packet::new(&rows, first, like)?;
-    let frustum = Frustum::new(&rows, &packet, like8);
+    let margin = margin(tree, rays);
+    let packet = Packet::new(&rows, first, margin, like)?;
+    let frustum = Frustum::new(&rows, &packet, margin, like8);
     let mut t_max = like.gather(&rows.t_max);
     let pad = like.like(SLAB_PAD);
     let mut end = t_max.greatest() * SLAB_PAD;

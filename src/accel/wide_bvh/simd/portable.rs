@@ -9,8 +9,10 @@ use crate::math::Vec3;
 
 /// Nearest first, by a stack in memory of its own.
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
-    let (slabs, sheared) =
-        (SlabRay::new(ray.origin, ray.direction), ShearedRay::new(ray.origin, ray.direction));
+    let (slabs, sheared) = (
+        SlabRay::for_triangles(ray.origin, ray.direction, &tree.bounds),
+        ShearedRay::new(ray.origin, ray.direction),
+    );
     let mut best: Option<ShapeHit> = None;
     let mut t_max = ray.t_max;
     let mut stack = vec![(0.0_f32, Child::Inner(0))];
@@ -39,8 +41,10 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 
 /// In any order, until one is hit.
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
-    let (slabs, sheared) =
-        (SlabRay::new(ray.origin, ray.direction), ShearedRay::new(ray.origin, ray.direction));
+    let (slabs, sheared) = (
+        SlabRay::for_triangles(ray.origin, ray.direction, &tree.bounds),
+        ShearedRay::new(ray.origin, ray.direction),
+    );
     let mut stack = vec![Child::Inner(0)];
     while let Some(child) = stack.pop() {
         match child {

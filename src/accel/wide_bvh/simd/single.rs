@@ -8,13 +8,15 @@ use super::lanes::{F4, F8, Lanes};
 use super::portable::nearer;
 use super::stack::Stack;
 use super::triangle::{self, Hits};
-use crate::geometry::aabb::{FAR_PAD, SLAB_PAD};
+use crate::geometry::aabb::{FAR_PAD, SLAB_PAD, triangle_margin};
 use crate::geometry::watertight::ShearedRay;
-use crate::geometry::{Ray, ShapeHit};
+use crate::geometry::{Aabb, Ray, ShapeHit};
 
 /// A ray in all lanes, with the rows of a node that are near and far along each axis.
 struct BoxRay {
-    origin: [F8; 3],
+    /// Origins for near and far planes, a margin apart.
+    near_origin: [F8; 3],
+    far_origin: [F8; 3],
     to_near: [F8; 3],
     /// The same, padded: a far plane is never met too early.
     to_far: [F8; 3],
@@ -23,15 +25,24 @@ struct BoxRay {
 
 impl BoxRay {
     #[inline(always)]
-    fn new(ray: &Ray, like: F8) -> Self {
+    fn new(ray: &Ray, whole: &Aabb, like: F8) -> Self {
         let (inverse, padded) = (ray.direction.recip(), ray.direction.recip() * FAR_PAD);
-        let near = |axis: usize| 2 * axis + usize::from(inverse[axis] < 0.0);
-        Self {
-            origin: [like.like(ray.origin.x), like.like(ray.origin.y), like.like(ray.origin.z)],
+        let margin = triangle_margin(ray.origin, whole);
+        let mut own = Self {
+            near_origin: [like; 3],
+            far_origin: [like; 3],
             to_near: [like.like(inverse.x), like.like(inverse.y), like.like(inverse.z)],
             to_far: [like.like(padded.x), like.like(padded.y), like.like(padded.z)],
-            near: [near(0), near(1), near(2)],
+            near: [0; 3],
+        };
+        for axis in 0..3 {
+            let is_down = inverse[axis] < 0.0;
+            let (before, after) = (ray.origin[axis] - margin, ray.origin[axis] + margin);
+            own.near_origin[axis] = like.like(if is_down { before } else { after });
+            own.far_origin[axis] = like.like(if is_down { after } else { before });
+            own.near[axis] = 2 * axis + usize::from(is_down);
         }
+        own
     }
 
     /// Where the ray enters the eight boxes, and a bit for each that it meets before `end`. A distance that is NaN leaves the
@@ -41,8 +52,8 @@ impl BoxRay {
         let (mut near, mut far) = (end.like(0.0), end);
         for axis in 0..3 {
             let row = self.near[axis] % 6;
-            let near_plane = end.gather(&node.rows[row]) - self.origin[axis];
-            let far_plane = end.gather(&node.rows[row ^ 1]) - self.origin[axis];
+            let near_plane = end.gather(&node.rows[row]) - self.near_origin[axis];
+            let far_plane = end.gather(&node.rows[row ^ 1]) - self.far_origin[axis];
             near = (near_plane * self.to_near[axis]).max(near);
             far = (far_plane * self.to_far[axis]).min(far);
         }
@@ -95,7 +106,7 @@ impl TriangleRay {
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     // SAFETY: this function has the instructions.
     let (like8, like4) = unsafe { (F8::splat(0.0), F4::splat(0.0)) };
-    let (boxes, triangles) = (BoxRay::new(ray, like8), TriangleRay::new(ray, like4));
+    let (boxes, triangles) = (BoxRay::new(ray, &tree.bounds, like8), TriangleRay::new(ray, like4));
     let mut best: Option<ShapeHit> = None;
     let mut t_max = ray.t_max;
     let mut end = like8.like(t_max * SLAB_PAD);
@@ -221,7 +232,7 @@ pub(super) fn prefetch(tree: &WideBvh, code: u32) {
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     // SAFETY: this function has the instructions.
     let (like8, like4) = unsafe { (F8::splat(0.0), F4::splat(0.0)) };
-    let (boxes, triangles) = (BoxRay::new(ray, like8), TriangleRay::new(ray, like4));
+    let (boxes, triangles) = (BoxRay::new(ray, &tree.bounds, like8), TriangleRay::new(ray, like4));
     let end = like8.like(ray.t_max * SLAB_PAD);
     let mut stack: Stack<u32> = Stack::new();
     stack.push(0);
