@@ -20,13 +20,13 @@ use crate::tui::{self, ColorChoice, Options, PreviewChoice, TuiError};
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(order: Order, console: &Console) -> Exit {
-    match live(order) {
+    match live(order, console) {
         Ok(exit) => exit,
         Err((exit, message)) => console.fail(exit, &message),
     }
 }
 
-fn live(order: Order) -> Result<Exit, (Exit, String)> {
+fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
     let mut worker = start().map_err(no_thread)?;
     let (sender, changes) = channel();
@@ -53,7 +53,10 @@ fn live(order: Order) -> Result<Exit, (Exit, String)> {
         changes,
     });
     worker.finish(PATIENCE);
-    outcome.map(|status| Exit(status.0)).map_err(|error| {
+    if outcome.as_ref().is_ok_and(|ended| ended.is_write_postponed) {
+        console.say("the image was not written: glimt was ended before every pixel had a sample");
+    }
+    outcome.map(|ended| Exit(ended.status.0)).map_err(|error| {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
         (exit, error.to_string())
     })

@@ -19,6 +19,9 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
+    /// Most triangles of a mesh: so many fit the numbers in the nodes of every kind of tree, cut in pieces or not.
+    pub const MOST_TRIANGLES: u32 = 1 << 27;
+
     /// The three corners of a triangle.
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])

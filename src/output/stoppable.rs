@@ -3,7 +3,7 @@
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
 use super::{BitDepth, EncodeOptions, OutputError};
-use crate::control::CancelToken;
+use crate::control::{CancelToken, Cancelled};
 use crate::film::RadianceImage;
 use crate::film::tone::{develop, develop16};
 
@@ -81,15 +81,15 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
     Ok(())
 }
 
-/// What became of writing: an error of a writer that was stopped is no error of the file.
+/// What became of writing: having been stopped is no error of the file. Only the error itself says that it was; the token
+/// may have been cancelled later, when the file was there already.
 pub(super) fn or_cancelled<T>(
     result: io::Result<T>,
-    token: &CancelToken,
     error: impl FnOnce(io::Error) -> OutputError,
 ) -> Result<T, OutputError> {
-    result.or_else(|failed| {
-        token.check()?;
-        Err(error(failed))
+    result.map_err(|failed| {
+        let stopped = failed.get_ref().is_some_and(|cause| cause.is::<Cancelled>());
+        if stopped { OutputError::Cancelled(Cancelled) } else { error(failed) }
     })
 }
 
@@ -121,6 +121,18 @@ mod tests {
         };
         assert!(developed(&image, &options, &token, stop).is_err());
         assert_eq!(parts, 1);
+    }
+
+    #[test]
+    fn only_what_was_stopped_is_cancelled() {
+        let token = CancelToken::new();
+        token.cancel();
+        let told = |result| or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));
+        let stopped = write_all(Vec::new(), b"abc", &token);
+        assert!(matches!(told(stopped), Err(OutputError::Cancelled(_))));
+        let full = io::Error::from(io::ErrorKind::StorageFull);
+        assert!(matches!(told(Err(full)), Err(OutputError::File { .. })));
+        assert!(told(Ok(())).is_ok());
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub fn atomic_until(path: &Path, bytes: &[u8], token: &CancelToken) -> Result<()
         Place::File(target) => replace(&target, bytes, token),
         Place::InPlace(place) => in_place(&place, bytes, token),
     };
-    stoppable::or_cancelled(written, token, |error| OutputError::file(path, error))
+    stoppable::or_cancelled(written, |error| OutputError::file(path, error))
 }
 
 /// Makes a file that would grow beyond `ulimit -f` an error instead of the end of the process (SIGXFSZ). [`atomic`]

@@ -44,7 +44,7 @@ fn by_hand() {
         changes,
     });
     match outcome {
-        Ok(status) => std::process::exit(i32::from(status.0)),
+        Ok(ended) => std::process::exit(i32::from(ended.status.0)),
         Err(error) => {
             println!("error: {error}");
             std::process::exit(1);

@@ -59,6 +59,15 @@ impl ExitStatus {
     pub const TERMINATED: Self = Self(143);
 }
 
+/// How the front end ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// How the program is to end.
+    pub status: ExitStatus,
+    /// Whether a picture was asked for that was still to be written, as not every pixel had a sample.
+    pub is_write_postponed: bool,
+}
+
 /// Why the front end could not go on.
 #[derive(Debug, thiserror::Error)]
 pub enum TuiError {

@@ -10,7 +10,7 @@ use crossterm::event::{Event as TerminalEvent, KeyEvent, KeyEventKind};
 
 use super::color::{self, ColorDepth};
 use super::event::{Effect, Event, KeyPress, Source};
-use super::options::{ExitStatus, Options, PreviewChoice, TuiError};
+use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
 use super::signals::{self, Listener};
 use super::state::{PreviewKind, Setup, State};
 use super::terminal::{self, Screen};
@@ -25,7 +25,7 @@ const FRAME: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// [`TuiError`] where there is no terminal, where it cannot be written to, and when the worker is gone.
-pub fn run(options: Options) -> Result<ExitStatus, TuiError> {
+pub fn run(options: Options) -> Result<Ended, TuiError> {
     terminal::require()?;
     let depth = color::depth(options.color, |name| std::env::var(name).ok());
     // Otherwise crossterm drops colours that were asked for by name where NO_COLOR is set.
@@ -135,25 +135,26 @@ enum End {
 }
 
 impl Ui {
-    fn run(mut self, events: &Receiver<Event>) -> Result<ExitStatus, TuiError> {
+    fn run(mut self, events: &Receiver<Event>) -> Result<Ended, TuiError> {
         let effects = start(&mut self.state);
         let mut end = self.perform(effects);
         while end.is_none() {
             end = self.draw_if_due().or_else(|| self.wait(events));
         }
         (self.commands)(Command::Quit);
-        match end {
+        let status = match end {
             // Whoever sends SIGHUP by hand still has the terminal and wants it back.
             Some(End::Quit(ExitStatus::HANGUP)) => {
                 if !terminal::is_there() {
                     self.screen.abandon();
                 }
-                Ok(ExitStatus::HANGUP)
+                ExitStatus::HANGUP
             }
-            Some(End::Error(error)) => Err(error),
-            Some(End::Quit(status)) => Ok(status),
-            None => Ok(ExitStatus::QUIT),
-        }
+            Some(End::Error(error)) => return Err(error),
+            Some(End::Quit(status)) => status,
+            None => ExitStatus::QUIT,
+        };
+        Ok(Ended { status, is_write_postponed: self.state.is_write_postponed })
     }
 
     /// Everything that has happened, or the next thing that does.

@@ -6,7 +6,7 @@ use crate::math::Vec3;
 const LEAF: u32 = 3;
 
 /// Greatest number that fits beside the axis.
-const MOST: u32 = u32::MAX >> 2;
+pub const MOST: u32 = u32::MAX >> 2;
 
 /// An inner node's left child is the next node.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,7 @@
 //! Nodes and packs of triangles, laid out for vector loads.
 
 use crate::geometry::Aabb;
+use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 
 /// Children of a node.
@@ -16,6 +17,9 @@ pub const MOST_PACKS: u32 = 8;
 const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
+
+/// A mesh in pieces has at most 1.3 references a triangle; no pack and no node is without one of its own.
+const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST_BITS);
 
 /// Eight boxes as rows of their least and greatest x, y and z, and what is in them.
 #[derive(Clone, Copy, Debug)]

@@ -12,9 +12,6 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Most triangles of a mesh: their indices and those of tree nodes stay within 32 bits.
-const MOST_TRIANGLES: usize = (u32::MAX / 2) as usize;
-
 /// Faces between two polls of the token.
 const BATCH: usize = 1 << 14;
 
@@ -71,7 +68,8 @@ pub(super) struct Parsed {
 /// Cut, drop, compact, complete.
 pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
     let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings, companions } = parsed;
-    let mut cutter = Cutter { positions: &positions, materials: &face_materials, ..Cutter::default() };
+    let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
+    let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
     cutter.cut_all(source, &faces)?;
     let Cutter { triangles, triangle_materials, dropped, .. } = cutter;
     if triangles.is_empty() {
@@ -97,16 +95,28 @@ fn no_usable_face(faces: usize, dropped: Dropped) -> String {
     )
 }
 
-#[derive(Default)]
 struct Cutter<'a> {
     positions: &'a [Vec3],
     materials: &'a [u32],
+    most_triangles: usize,
     triangles: Vec<[u32; 3]>,
     triangle_materials: Vec<u32>,
     dropped: Dropped,
 }
 
-impl Cutter<'_> {
+impl<'a> Cutter<'a> {
+    fn new(positions: &'a [Vec3], materials: &'a [u32], most_triangles: usize) -> Self {
+        let (triangles, triangle_materials) = Default::default();
+        Self {
+            positions,
+            materials,
+            most_triangles,
+            triangles,
+            triangle_materials,
+            dropped: Dropped::default(),
+        }
+    }
+
     fn cut_all(&mut self, source: &Source<'_>, faces: &Faces) -> Result<(), AssetError> {
         if self.take_as_they_are(faces) {
             return Ok(());
@@ -124,8 +134,9 @@ impl Cutter<'_> {
                 return Err(source.wrong(format!("face {}: an index is out of range", face + 1)));
             }
             self.cut(corners);
-            if self.triangles.len() > MOST_TRIANGLES {
-                return Err(source.wrong(format!("more than {MOST_TRIANGLES} triangles")));
+            if self.triangles.len() > self.most_triangles {
+                let most = self.most_triangles;
+                return Err(source.wrong(format!("more than {most} triangles; split it into several meshes")));
             }
             if let Some(&material) = self.materials.get(face) {
                 self.triangle_materials.resize(self.triangles.len(), material);
@@ -144,8 +155,9 @@ impl Cutter<'_> {
                 && points().iter().all(|point| point.is_finite())
                 && has_area(points())
         };
-        let all =
-            faces.arities.is_empty() && triangles.len() <= MOST_TRIANGLES && triangles.par_iter().all(good);
+        let all = faces.arities.is_empty()
+            && triangles.len() <= self.most_triangles
+            && triangles.par_iter().all(good);
         if all {
             self.triangles = triangles.to_vec();
             self.triangle_materials = self.materials.to_vec();
@@ -285,6 +297,18 @@ mod tests {
             let positions = vec![Vec3::ZERO, Vec3::X * scale, Vec3::Y * scale];
             let parsed = Parsed { positions, faces: faces(&[&[0, 1, 2]]), ..Parsed::default() };
             assert_eq!(assembled(parsed).expect("has area").mesh.triangles.len(), 1);
+        }
+    }
+
+    #[test]
+    fn more_triangles_than_trees_can_hold_are_refused_with_their_number() {
+        let token = CancelToken::new();
+        let watch = Watch { progress: &unwatched, token: &token };
+        let source = Source { path: Path::new("a.off"), bytes: &[], watch };
+        for list in [&[&[0, 1, 2][..], &[0, 2, 3]][..], &[&[0, 1, 2, 3]]] {
+            assert!(Cutter::new(&SQUARE, &[], 2).cut_all(&source, &faces(list)).is_ok());
+            let error = Cutter::new(&SQUARE, &[], 1).cut_all(&source, &faces(list)).expect_err("two");
+            assert_eq!(error.to_string(), "a.off: more than 1 triangles; split it into several meshes");
         }
     }
 

@@ -41,7 +41,7 @@ impl Ingredients<'_> {
     }
 }
 
-/// A world with the key of all that it is made of.
+/// A world with the key of all that its pictures depend on.
 pub(in crate::pipeline) type Keyed = (Key, Arc<World>);
 
 /// Build what is missing.
@@ -59,7 +59,8 @@ pub(in crate::pipeline) fn accel(
     let orbiter = from.parsed.orbiter.map(|camera| format!("{camera:?}"));
     let key = keys::world(from.scene, &mesh_keys, &from.textures.keys, orbiter.as_deref());
     let same_trees = cache.geometry.get(geometry).is_some();
-    if let Some(world) = cache.world.get(key).cloned() {
+    let built_key = keys::in_trees(&key, from.scene.render.accel);
+    if let Some(world) = cache.world.get(built_key).cloned() {
         trees(from, cache, reading)?;
         return Ok(Staged::reused((key, world), "no shape changed"));
     }
@@ -70,7 +71,7 @@ pub(in crate::pipeline) fn accel(
     let world =
         reading.pool.install(|| World::assemble(from.scene, &parts, last.as_deref(), reading.token))?;
     let value = (key, Arc::new(world));
-    cache.world.set(key, value.1.clone());
+    cache.world.set(built_key, value.1.clone());
     cache.geometry.set(geometry, ());
     Ok(match (same_trees, from.scene.objects.is_empty()) {
         (_, true) => Staged::skipped(value, "the scene has no shape"),

@@ -14,8 +14,16 @@ pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
 
 /// What trees are built over, and which.
 pub(in crate::pipeline) fn geometry(scene: &Scene, meshes: &[Key]) -> Key {
-    let mut key = Fingerprint::new("geometry");
-    key.index(scene.render.accel as usize);
+    in_trees(&shapes(scene, meshes), scene.render.accel)
+}
+
+/// What is made of these things with trees of a kind.
+pub(in crate::pipeline) fn in_trees(of: &Key, accel: Accel) -> Key {
+    Fingerprint::new("in trees").key(of).index(accel as usize).finish()
+}
+
+fn shapes(scene: &Scene, meshes: &[Key]) -> Key {
+    let mut key = Fingerprint::new("shapes");
     for object in &scene.objects {
         shape(&mut key, &object.shape, meshes);
     }
@@ -42,7 +50,7 @@ pub(in crate::pipeline) fn lights(scene: &Scene, meshes: &[Key]) -> Key {
     key.finish()
 }
 
-/// Everything that a world is made of.
+/// Everything that a world is made of but the kind of its trees: all kinds give the same picture bit for bit.
 pub(in crate::pipeline) fn world(
     scene: &Scene,
     meshes: &[Key],
@@ -50,7 +58,7 @@ pub(in crate::pipeline) fn world(
     orbiter: Option<&str>,
 ) -> Key {
     let mut key = Fingerprint::new("world");
-    key.key(&geometry(scene, meshes)).key(&lights(scene, meshes));
+    key.key(&shapes(scene, meshes)).key(&lights(scene, meshes));
     for object in &scene.objects {
         match object.material {
             Some(index) => material(&mut key, &scene.materials[index].kind, scene),
@@ -190,6 +198,13 @@ mod tests {
         let (before, after) = (keys(BALL), keys(&BALL.replace("[1, 0, 0]", "[0, 1, 0]")));
         assert_eq!((before.0, before.1), (after.0, after.1));
         assert_ne!(before.2, after.2);
+    }
+
+    #[test]
+    fn another_kind_of_tree_changes_the_trees_but_no_picture() {
+        let (before, after) = (keys(BALL), keys(&format!("[render]\naccel = \"kdtree\"\n{BALL}")));
+        assert_ne!(before.0, after.0);
+        assert_eq!((before.1, before.2), (after.1, after.2));
     }
 
     #[test]

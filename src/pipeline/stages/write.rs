@@ -105,7 +105,9 @@ pub(in crate::pipeline) fn write(
             Ok(bytes) => {
                 count += 1;
                 sink.written(path, bytes);
-                written.0.insert(path.clone(), (key, contents.read(path, token)?));
+                // The picture is on disk: a cancel from here on does not undo that.
+                let content = contents.read(path, &CancelToken::new())?;
+                written.0.insert(path.clone(), (key, content));
             }
             Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => errors.push(error.to_string()),

@@ -39,8 +39,10 @@ fn each_edit_redoes_only_what_reads_it() {
     assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree is kept");
 
     bench.edit("exposure = 1.0", "exposure = 1.0\naccel = \"kdtree\"");
-    let report = bench.done().0;
-    assert_statuses(&report, "drrdrsdd");
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "drrdrsrr");
+    assert!(unchanged, "every kind of tree gives the same picture");
+    assert_eq!(report.counters.camera_rays, 0);
     assert!(!report.stages[Stage::Accel as usize].why.contains("kept"), "a tree of another kind");
     assert_eq!(report.settings.accel, "kdtree");
 

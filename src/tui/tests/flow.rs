@@ -170,3 +170,27 @@ fn a_cancelled_render_says_that_it_stopped() {
     assert_eq!(desk.state.activity, Activity::Cancelled);
     assert!(desk.text().contains("stopped"));
 }
+
+#[test]
+fn a_write_that_is_still_postponed_at_the_end_is_known() {
+    let generation = 1;
+    let written = |generation| protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 };
+    let failed = protocol::Event::WriteFailed { generation, message: "full".to_owned() };
+    for (outcome, is_left) in [(None, true), (Some(written(generation)), false), (Some(failed), false)] {
+        let mut desk = Desk::new();
+        desk.press('w');
+        assert!(!desk.state.is_write_postponed, "the worker may write it at once");
+        desk.worker(protocol::Event::WritePostponed { generation });
+        if let Some(event) = outcome {
+            desk.worker(event);
+        }
+        assert!(matches!(desk.press('q')[..], [Effect::Quit(ExitStatus::QUIT)]));
+        assert_eq!(desk.state.is_write_postponed, is_left);
+    }
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::WritePostponed { generation });
+    desk.press('r');
+    assert!(desk.state.is_write_postponed, "the order goes over to the next request");
+    desk.worker(written(generation));
+    assert!(!desk.state.is_write_postponed, "the request before wrote it after all");
+}

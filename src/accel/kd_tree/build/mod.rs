@@ -10,9 +10,10 @@ mod sweep;
 
 use rayon::prelude::*;
 
-use super::node::{Kind, Node, Triangle};
+use super::node::{self, Kind, Node, Triangle};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
+use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 
 use crate::accel::reference::{Bounds, Reference};
@@ -20,6 +21,12 @@ use subtree::Subtree;
 
 /// Cells of at most this many references are built by one thread; the token is polled between them.
 const TASK_SIZE: usize = 4096;
+
+/// Most leaves and references in all, of a tree whose nodes, less than two for each leaf, have numbers that fit.
+const MOST_ROOM: u64 = node::MOST as u64 / 2;
+
+/// One leaf with all triangles is always possible.
+const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
 /// No triangle yet.
 const NOWHERE: u32 = u32::MAX;
@@ -47,6 +54,16 @@ pub fn build(
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
 ) -> Result<Built, Cancelled> {
+    build_within(MOST_ROOM, count, corners, token)
+}
+
+/// [`build`] with so much room for leaves and references together.
+fn build_within(
+    room: u64,
+    count: u32,
+    corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+    token: &CancelToken,
+) -> Result<Built, Cancelled> {
     let mut references: Vec<Reference> =
         (0..count).into_par_iter().map(|id| Reference::new(id, corners(id))).collect();
     token.check()?;
@@ -62,7 +79,7 @@ pub fn build(
         around.grow(&reference.bounds);
     }
     let levels = depth_limit(references.len());
-    let part = part(Cell { references, bounds: around, around, levels }, &corners, token)?;
+    let part = part(Cell { references, bounds: around, around, levels, room }, &corners, token)?;
     let mut all = Subtree::default();
     part.append_to(&mut all);
     token.check()?;
@@ -94,12 +111,21 @@ struct Cell {
     around: Bounds,
     /// How many planes may yet follow.
     levels: u32,
+    /// How many leaves and references together may come of it.
+    room: u64,
 }
 
 impl Cell {
+    /// The room of a leaf.
+    fn own_room(&self) -> u64 {
+        self.references.len() as u64 + 1
+    }
+
     /// The plane to split it by; none for a leaf.
     fn plane(&self) -> Option<cost::Plane> {
-        if self.levels == 0 || self.references.is_empty() {
+        // A plane through all triangles makes two of each.
+        let has_room = 2 * self.own_room() <= self.room;
+        if self.levels == 0 || self.references.is_empty() || !has_room {
             None
         } else if self.references.len() <= sweep::SWEPT {
             sweep::cheapest(&self.references, &self.bounds)
@@ -110,7 +136,7 @@ impl Cell {
 
     /// Its halves. What only touches the plane goes to the side that it is on.
     fn split(self, plane: &cost::Plane, corners: &impl Fn(u32) -> [Vec3; 3]) -> [Self; 2] {
-        let Self { mut references, bounds, levels, .. } = self;
+        let Self { mut references, bounds, levels, room, .. } = self;
         let mut right = Vec::with_capacity(references.len() / 2);
         let mut around = [Bounds::EMPTY; 2];
         let (axis, at) = (plane.axis, plane.at);
@@ -134,10 +160,12 @@ impl Cell {
         });
         let [left_bounds, right_bounds] = bounds.halves(axis, at);
         let levels = levels - 1;
-        [
-            Self { references, bounds: left_bounds, around: around[0], levels },
-            Self { references: right, bounds: right_bounds, around: around[1], levels },
-        ]
+        let mut left = Self { references, bounds: left_bounds, around: around[0], levels, room };
+        let mut right = Self { references: right, bounds: right_bounds, around: around[1], levels, room };
+        // In proportion: as `room` is enough for both, so is the share of each.
+        left.room = room * left.own_room() / (left.own_room() + right.own_room());
+        right.room = room - left.room;
+        [left, right]
     }
 }
 
@@ -178,4 +206,30 @@ fn part(
     let [left, right] = cell.split(&plane, corners);
     let (left, right) = rayon::join(|| part(left, corners, token), || part(right, corners, token));
     Ok(Part::Halves { axis: plane.axis, at: plane.at, halves: Box::new([left?, right?]) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tree_without_room_makes_leaves_early() {
+        let fan = |id: u32| {
+            let angle = id as f32 * 0.1;
+            [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]
+        };
+        let size = |room| {
+            let built = build_within(room, 6000, fan, &CancelToken::new()).expect("nobody cancels");
+            let leaf = |node: &&Node| matches!(node.kind(), Kind::Leaf { .. });
+            assert_eq!(built.triangles.len(), 6000);
+            (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64
+        };
+        let whole = size(MOST_ROOM);
+        assert!(whole > 20_000, "{whole}");
+        for room in [6001, 12_001, 12_002, 14_000, 20_000] {
+            assert!(size(room) <= room, "{} in {room}", size(room));
+        }
+        assert_eq!(size(6001), 6001, "one leaf");
+        assert!(size(20_000) > 6001, "what room there is is used");
+    }
 }
