@@ -1,5 +1,8 @@
 //! Boxes in vector registers, and what is left of a triangle inside one.
 
+use rayon::prelude::*;
+
+use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3, Vec4};
 
@@ -47,6 +50,24 @@ pub struct Reference {
 }
 
 impl Reference {
+    /// Of all triangles but those that cannot be hit or whose box has no finite size, by their numbers.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn usable(
+        count: u32,
+        corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
+        token: &CancelToken,
+    ) -> Result<Vec<Self>, Cancelled> {
+        let mut references: Vec<Self> =
+            (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect();
+        token.check()?;
+        if !references.par_iter().all(Self::is_usable) {
+            references.retain(Self::is_usable);
+        }
+        Ok(references)
+    }
+
     /// Of the whole triangle.
     pub fn new(id: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.extend(0.0));
@@ -67,7 +88,7 @@ impl Reference {
     }
 
     /// Whether it can be hit at all and its box has a size.
-    pub fn is_usable(&self) -> bool {
+    fn is_usable(&self) -> bool {
         (self.bounds.max - self.bounds.min).truncate().is_finite()
     }
 

@@ -94,7 +94,7 @@ impl Geometry {
         for &id in &self.unbounded {
             end = test(id, end).unwrap_or(end);
         }
-        self.tree.closest(&Ray { t_max: end, ..*ray }, |_, id, t_max| test(id, t_max));
+        self.tree.closest(&Ray { t_max: end, ..*ray }, test);
         best
     }
 
@@ -108,7 +108,7 @@ impl Geometry {
             }
             _ => self.shapes[id as usize].any(ray, &ray_f64, None),
         };
-        self.unbounded.iter().any(|&id| test(id)) || self.tree.any(ray, |_, id| test(id))
+        self.unbounded.iter().any(|&id| test(id)) || self.tree.any(ray, test)
     }
 
     /// The surface at a hit of this ray.

@@ -42,14 +42,6 @@ impl Bvh {
     /// # Errors
     /// [`Cancelled`].
     pub fn build(boxes: &[Aabb], token: &CancelToken) -> Result<Self, Cancelled> {
-        Self::build_for(boxes, 1, token)
-    }
-
-    /// The same, where `lanes` primitives of a leaf are tested in one go.
-    ///
-    /// # Errors
-    /// [`Cancelled`].
-    pub fn build_for(boxes: &[Aabb], lanes: usize, token: &CancelToken) -> Result<Self, Cancelled> {
         let mut references: Vec<Reference> = boxes
             .iter()
             .enumerate()
@@ -61,8 +53,7 @@ impl Bvh {
         }
         // A tree over n boxes has fewer than n nodes; every subtree writes into a stretch of its own.
         let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
-        let tree =
-            build_subtree(&mut references, &mut nodes, Start { place: 0, node: 0, depth: 0, lanes }, token)?;
+        let tree = build_subtree(&mut references, &mut nodes, Start { place: 0, node: 0, depth: 0 }, token)?;
         if tree.root.count > 0 {
             nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root, Child::NONE] };
         }
@@ -80,8 +71,6 @@ struct Start {
     node: usize,
     /// Levels above.
     depth: usize,
-    /// Primitives of a leaf that are tested in one go.
-    lanes: usize,
 }
 
 /// Build over references, into at most one node fewer.
@@ -103,9 +92,8 @@ fn build_subtree(
     };
     let (left_nodes, right_nodes) = rest.split_at_mut(left.len() - 1);
     let depth = start.depth + 1;
-    let left_start = Start { node: start.node + 1, depth, ..start };
-    let right_start =
-        Start { place: start.place + middle, node: start.node + 1 + left_nodes.len(), depth, ..start };
+    let left_start = Start { place: start.place, node: start.node + 1, depth };
+    let right_start = Start { place: start.place + middle, node: start.node + 1 + left_nodes.len(), depth };
     let (left, right) = if parallel {
         token.check()?;
         rayon::join(
@@ -130,11 +118,9 @@ fn partition(references: &mut [Reference], bounds: Aabb, start: &Start) -> Optio
     }
     let centroids = Aabb::around(references.iter().map(Reference::centroid));
     let split = (start.depth < SURFACE_AREA_LEVELS).then(|| best_split(references, centroids)).flatten();
-    let leaf_cost = count.div_ceil(start.lanes) as f32;
     match split {
         Some(split)
-            if count > LEAF_SIZE
-                || split.cost / (bounds.half_area() * start.lanes as f32) + TRAVERSAL_COST < leaf_cost =>
+            if count > LEAF_SIZE || split.cost / bounds.half_area() + TRAVERSAL_COST < count as f32 =>
         {
             let middle = partition_by(references, |reference| split.is_left(reference));
             (middle > 0 && middle < count).then_some(middle).or(Some(count / 2))
@@ -287,7 +273,7 @@ mod tests {
             .collect();
         let order = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| built(&boxes).order().to_vec())
+            pool.install(|| built(&boxes).order)
         };
         assert_eq!(order(1), order(7));
     }

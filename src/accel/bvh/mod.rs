@@ -50,56 +50,11 @@ struct Child {
     count: u32,
 }
 
-/// A part of a tree, to be walked from outside.
-#[derive(Clone, Copy, Debug)]
-pub struct Subtree {
-    /// The box around it.
-    pub bounds: Aabb,
-    child: Child,
-}
-
 impl Child {
     const NONE: Self = Self { first: 0, count: 0 };
 }
 
 impl Bvh {
-    /// The box around everything.
-    pub fn bounds(&self) -> Aabb {
-        self.bounds
-    }
-
-    /// Ids in the order of the leaves: data stored in this order is found at the place that traversal reports.
-    pub fn order(&self) -> &[u32] {
-        &self.order
-    }
-
-    /// The whole tree as a subtree; none where it is empty.
-    pub fn root(&self) -> Option<Subtree> {
-        let whole = Subtree { bounds: self.bounds, child: Child { first: 0, count: 0 } };
-        (!self.nodes.is_empty()).then_some(whole)
-    }
-
-    /// The two parts of a subtree, the second of which may be missing at the root; none of a leaf.
-    pub fn children(&self, subtree: &Subtree) -> Option<(Subtree, Option<Subtree>)> {
-        if subtree.child.count > 0 {
-            return None;
-        }
-        let node = &self.nodes[subtree.child.first as usize];
-        let part = |side: usize| Subtree { bounds: node.bounds[side], child: node.child[side] };
-        Some((part(0), (node.child[1] != Child::NONE).then(|| part(1))))
-    }
-
-    /// The ids in a leaf; none of an inner subtree.
-    pub fn ids(&self, subtree: &Subtree) -> Option<&[u32]> {
-        let Child { first, count } = subtree.child;
-        (count > 0).then(|| &self.order[first as usize..(first + count) as usize])
-    }
-
-    /// Nodes in all.
-    pub fn node_count(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.order.as_slice())

@@ -5,11 +5,11 @@ use crate::geometry::Ray;
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 
 impl Bvh {
-    /// Visit the leaves that the ray may meet, near ones first. `test(place, id, t_max)` tests one primitive, where `place`
-    /// is its place in [`Bvh::order`], and returns the new end of the ray if it hits; primitives at exactly the
-    /// ray's end are still tested, so that the caller can break ties by id.
+    /// Visit the leaves that the ray may meet, near ones first. `test(id, t_max)` tests one primitive and returns the new end of
+    /// the ray if it hits; primitives at exactly the ray's end are still tested, so that the caller can break ties
+    /// by id.
     #[inline]
-    pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, u32, f32) -> Option<f32>) {
+    pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, f32) -> Option<f32>) {
         if self.depth < SHALLOW_STACK {
             self.closest_within::<SHALLOW_STACK>(ray, test);
         } else {
@@ -21,7 +21,7 @@ impl Bvh {
     fn closest_within<const STACK_SIZE: usize>(
         &self,
         ray: &Ray,
-        mut test: impl FnMut(u32, u32, f32) -> Option<f32>,
+        mut test: impl FnMut(u32, f32) -> Option<f32>,
     ) {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let mut t_max = ray.t_max;
@@ -34,7 +34,7 @@ impl Bvh {
         loop {
             if current.count > 0 {
                 for place in current.first..current.first + current.count {
-                    if let Some(t) = test(place, self.order[place as usize], t_max) {
+                    if let Some(t) = test(self.order[place as usize], t_max) {
                         t_max = t;
                     }
                 }
@@ -75,9 +75,9 @@ impl Bvh {
         }
     }
 
-    /// Whether `test(place, id)` holds for any primitive that the ray may meet.
+    /// Whether `test(id)` holds for any primitive that the ray may meet.
     #[inline]
-    pub fn any(&self, ray: &Ray, test: impl FnMut(u32, u32) -> bool) -> bool {
+    pub fn any(&self, ray: &Ray, test: impl FnMut(u32) -> bool) -> bool {
         if self.depth < SHALLOW_STACK {
             self.any_within::<SHALLOW_STACK>(ray, test)
         } else {
@@ -86,7 +86,7 @@ impl Bvh {
     }
 
     #[inline]
-    fn any_within<const STACK_SIZE: usize>(&self, ray: &Ray, mut test: impl FnMut(u32, u32) -> bool) -> bool {
+    fn any_within<const STACK_SIZE: usize>(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let mut stack = [Child::NONE; STACK_SIZE];
         let mut size = 1;
@@ -98,7 +98,7 @@ impl Bvh {
             let current = stack[size];
             if current.count > 0 {
                 let mut places = current.first..current.first + current.count;
-                if places.any(|place| test(place, self.order[place as usize])) {
+                if places.any(|place| test(self.order[place as usize])) {
                     return true;
                 }
                 continue;
@@ -151,14 +151,14 @@ mod tests {
             let ray = Ray::new(origin, Vec3::new(next(), next(), next()) * 8.0 - origin);
             let slabs = SlabRay::new(ray.origin, ray.direction);
             let mut best: Option<(f32, u32)> = None;
-            tree.closest(&ray, |_, id, t_max| {
+            tree.closest(&ray, |id, t_max| {
                 let t = slabs.enter(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
                 let better = best.is_none_or(|(least, least_id)| (t, id) < (least, least_id));
                 better.then(|| best = Some((t, id)))?;
                 Some(t)
             });
             assert_eq!(best, brute(&boxes, &ray));
-            let any = tree.any(&ray, |_, id| {
+            let any = tree.any(&ray, |id| {
                 slabs.enter(boxes[id as usize].min, boxes[id as usize].max, ray.t_max).is_some()
             });
             assert_eq!(any, best.is_some());

@@ -64,12 +64,7 @@ fn build_within(
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
 ) -> Result<Built, Cancelled> {
-    let mut references: Vec<Reference> =
-        (0..count).into_par_iter().map(|id| Reference::new(id, corners(id))).collect();
-    token.check()?;
-    if !references.par_iter().all(Reference::is_usable) {
-        references.retain(Reference::is_usable);
-    }
+    let references = Reference::usable(count, &corners, token)?;
     if references.is_empty() {
         let (nodes, references, triangles) = Default::default();
         return Ok(Built { nodes, references, triangles, bounds: Aabb::EMPTY });

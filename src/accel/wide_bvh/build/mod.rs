@@ -40,12 +40,7 @@ pub fn build(
     quality: Quality,
     token: &CancelToken,
 ) -> Result<Built, Cancelled> {
-    let mut references: Vec<Reference> =
-        (0..count).into_par_iter().map(|id| Reference::new(id, corners(id))).collect();
-    token.check()?;
-    if !references.par_iter().all(Reference::is_usable) {
-        references.retain(Reference::is_usable);
-    }
+    let mut references = Reference::usable(count, &corners, token)?;
     if references.is_empty() {
         return Ok(Built { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
     }

@@ -254,7 +254,6 @@ fn closest<V: Lanes>(
                 push_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
             }
             Child::Leaf { first, count } => {
-                let before = best.found;
                 let mut any = 0;
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
                     for lane in 0..PACK {
@@ -264,7 +263,7 @@ fn closest<V: Lanes>(
                         any |= best.take(&packet, pack, lane, rays);
                     }
                 }
-                if any != 0 || before != best.found {
+                if any != 0 {
                     end = best.t.greatest() * SLAB_PAD;
                 }
             }
@@ -432,13 +431,7 @@ fn push_ordered<V: Lanes>(
             continue;
         }
         prefetch(tree, node.children[slot]);
-        stack.push((entries[slot], node.children[slot]));
-        let mut back = 0;
-        while back < pushed && stack.below(back + 1).0 < stack.below(back).0 {
-            let lower = *stack.below(back + 1);
-            *stack.below(back + 1) = std::mem::replace(stack.below(back), lower);
-            back += 1;
-        }
+        stack.insert((entries[slot], node.children[slot]), pushed);
         pushed += 1;
     }
 }

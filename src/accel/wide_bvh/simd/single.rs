@@ -201,14 +201,7 @@ fn push_ordered(
         if other.0 < nearest.0 {
             std::mem::swap(&mut other, &mut nearest);
         }
-        // Insertion into what this node pushed, which gets nearer towards the top.
-        stack.push(other);
-        let mut back = 0;
-        while back < pushed && stack.below(back + 1).0 < stack.below(back).0 {
-            let lower = *stack.below(back + 1);
-            *stack.below(back + 1) = std::mem::replace(stack.below(back), lower);
-            back += 1;
-        }
+        stack.insert(other, pushed);
         pushed += 1;
     }
     Some(nearest.1)

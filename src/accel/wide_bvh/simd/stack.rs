@@ -35,9 +35,23 @@ impl<T: Copy> Stack<T> {
 
     /// The entry `back` places below the top; it was pushed before.
     #[inline(always)]
-    pub fn below(&mut self, back: usize) -> &mut T {
+    fn below(&mut self, back: usize) -> &mut T {
         debug_assert!(back < self.size);
         // SAFETY: as in `pop`.
         unsafe { self.entries[self.size - 1 - back].assume_init_mut() }
+    }
+}
+
+impl<T: Copy> Stack<(f32, T)> {
+    /// Put one among the topmost `count`, which get nearer towards the top.
+    #[inline(always)]
+    pub fn insert(&mut self, entry: (f32, T), count: usize) {
+        self.push(entry);
+        let mut back = 0;
+        while back < count && self.below(back + 1).0 < self.below(back).0 {
+            let lower = *self.below(back + 1);
+            *self.below(back + 1) = std::mem::replace(self.below(back), lower);
+            back += 1;
+        }
     }
 }
