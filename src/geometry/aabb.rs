@@ -67,7 +67,7 @@ pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
 /// What the watertight test of triangles may be off across a ray, as a part of the distance: it errs by less than 13
 /// units of rounding in what it projects.
-const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
+pub const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
 
 /// A ray made ready for many boxes.
 #[derive(Clone, Copy, Debug)]

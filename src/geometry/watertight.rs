@@ -64,16 +64,21 @@ impl ShearedRay {
         let mut wa = cx * by - cy * bx;
         let mut wb = ax * cy - ay * cx;
         let mut wc = bx * ay - by * ax;
-        if wa == 0.0 || wb == 0.0 || wc == 0.0 {
+        let is_outside = |[least, greatest]: [f32; 2]| least < 0.0 && greatest > 0.0;
+        let ends = [least(wa, least(wb, wc)), greatest(wa, greatest(wb, wc))];
+        if is_outside(ends) {
+            return None;
+        }
+        if ends.contains(&0.0) {
             let exact = |px: f32, qy: f32, py: f32, qx: f32| {
                 (f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx)) as f32
             };
             wa = exact(cx, by, cy, bx);
             wb = exact(ax, cy, ay, cx);
             wc = exact(bx, ay, by, ax);
-        }
-        if (wa < 0.0 || wb < 0.0 || wc < 0.0) && (wa > 0.0 || wb > 0.0 || wc > 0.0) {
-            return None;
+            if is_outside([least(wa, least(wb, wc)), greatest(wa, greatest(wb, wc))]) {
+                return None;
+            }
         }
         let determinant = wa + wb + wc;
         if determinant == 0.0 {
@@ -132,6 +137,16 @@ impl ShearedRay {
         let error = 3.0 * (gamma(3) * edge * z + error_edge * z + error_z * edge) * inverse_determinant.abs();
         (error, z)
     }
+}
+
+/// The lesser; `b` where either is NaN, as vector instructions have it.
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater; `b` where either is NaN.
+fn greatest(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// Of the points between p and q, whose z are distances along a ray that is seen end-on at 0: how far off the nearest is,

@@ -1,5 +1,4 @@
-//! The front end in a real terminal with a worker that only pretends:
-//! `cargo test --release --lib by_hand -- --ignored --nocapture`. The file named by `GLIMT_BY_HAND` stands for the
+//! The front end in a real terminal with a worker that only pretends. The file named by `GLIMT_BY_HAND` stands for the
 //! scene: the word `broken` in it fails, `panic` panics, anything else renders. The key `w` panics in the front end.
 
 use std::path::PathBuf;
@@ -18,7 +17,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 
 #[test]
-#[ignore = "needs a terminal and a person"]
+#[ignore = "needs a person at a terminal: cargo test --release --lib by_hand -- --ignored --nocapture"]
 fn by_hand() {
     let scene = PathBuf::from(std::env::var("GLIMT_BY_HAND").unwrap_or_default());
     let (commands, orders) = channel();

@@ -145,9 +145,9 @@ fn no_ray_leaks_at_edges_and_vertices() {
     assert_watertight(22_000);
 }
 
-/// `cargo test --release --test suite leaks_of_many -- --ignored`: 10⁸ rays, some minutes.
+/// 10⁸ rays.
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "90 s on two cores: cargo test --release --test suite leaks_of_many -- --ignored"]
 fn leaks_of_many_rays() {
     assert_watertight(100_000_000 / 48);
 }

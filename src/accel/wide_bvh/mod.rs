@@ -1,8 +1,7 @@
 //! A tree eight boxes wide over triangles, four in a pack.
 //!
-//! Whatever instructions traverse it, a ray gets the same hit,
-//! bit for bit: box tests may only let through too much, the arithmetic of the triangle test is one and the same,
-//! and of hits at one distance the lowest id wins.
+//! Whatever instructions traverse it, a ray gets the same hit, bit for bit: box tests may only let through too much, the
+//! arithmetic of the triangle test is one and the same, and of hits at one distance the lowest id wins.
 
 mod build;
 mod node;
@@ -137,6 +136,12 @@ impl WideBvh {
             return bits;
         }
         let mut bits = 0;
+        if self.instructions == Instructions::Portable {
+            for (lane, (ray, &except)) in rays.iter().zip(except).enumerate() {
+                bits |= u32::from(self.any(ray, except)) << lane;
+            }
+            return bits;
+        }
         for_each_group(rays, |lanes| {
             let count = lanes.len();
             let (group, mut own) = (gathered(rays, lanes), [None; PACKET]);
@@ -152,9 +157,10 @@ impl WideBvh {
         bits
     }
 
-    /// A ray that is not finite hits nothing; to the box tests it would be in every box, the empty ones too.
+    /// A ray that is not finite, or goes nowhere, hits nothing; to the box tests it would be in every box.
     fn may_hit(&self, ray: &Ray) -> bool {
-        !self.nodes.is_empty() && ray.origin.is_finite() && ray.direction.is_finite()
+        let is_finite = ray.origin.is_finite() && ray.direction.is_finite();
+        !self.nodes.is_empty() && is_finite && ray.direction != Vec3::ZERO
     }
 
     /// Walks the tree and says what is wrong with it.
@@ -344,6 +350,26 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn rays_that_go_the_same_way_are_traced_side_by_side() {
+        let mesh = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
+        let rays: Vec<_> = (0..PACKET)
+            .map(|i| Ray::new(Vec3::new(0.1 + 0.02 * i as f32, 0.2, 1.0), Vec3::new(0.01, 0.02, -1.0)))
+            .collect();
+        let apart = [rays[0], Ray { direction: -rays[0].direction, ..rays[0] }];
+        for instructions in Instructions::ALL {
+            let tree = built(&mesh).with(instructions);
+            let are_vectors = tree.instructions() != Instructions::Portable;
+            let mut hits = [None; PACKET];
+            assert_eq!(simd::closest_packet(&tree, &rays, &mut hits), are_vectors, "{instructions:?}");
+            assert_eq!(hits.iter().flatten().count(), if are_vectors { PACKET } else { 0 });
+            let all = (1 << PACKET) - 1;
+            assert_eq!(simd::any_packet(&tree, &rays, &[None; PACKET]), are_vectors.then_some(all));
+            assert!(!simd::closest_packet(&tree, &apart, &mut hits[..2]), "{instructions:?}");
+            assert_eq!(simd::any_packet(&tree, &apart, &[None; 2]), None, "{instructions:?}");
         }
     }
 

@@ -18,6 +18,9 @@ const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
 
+/// The bits of a leaf that are not the number of its first pack.
+pub const LEAF_BITS: u32 = !((1 << FIRST_BITS) - 1);
+
 /// A mesh in pieces has at most 1.3 references a triangle; no pack and no node is without one of its own.
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST_BITS);
 
@@ -68,10 +71,11 @@ impl Child {
 }
 
 impl Node {
-    /// Eight empty boxes.
+    /// Eight empty boxes. Where numbers overflow, all boxes are met; in these then is the first pack, so that the way still
+    /// ends.
     pub const EMPTY: Self = {
         let (least, greatest) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Self { rows: [least, greatest, least, greatest, least, greatest], children: [0; WIDTH] }
+        Self { rows: [least, greatest, least, greatest, least, greatest], children: [LEAF; WIDTH] }
     };
 
     /// Fill a slot.

@@ -45,8 +45,7 @@ pub fn build(
         return Ok(Built { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
     }
     if quality == Quality::High {
-        references = pieces::in_pieces(&references, &corners);
-        token.check()?;
+        references = pieces::in_pieces(&references, &corners, token)?;
     }
     let whole = Segment::whole(&references);
     let bounds = whole.bounds.aabb();

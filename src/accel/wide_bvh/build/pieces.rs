@@ -5,6 +5,7 @@
 use rayon::prelude::*;
 
 use crate::accel::reference::{Bounds, Reference};
+use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
 /// Pieces beyond one for each triangle, as a share of the triangles.
@@ -13,18 +14,32 @@ const MOST_MORE: f64 = 0.3;
 /// The planes lie on a grid of 2 to this many cells along each axis.
 const LEVELS: u32 = 20;
 
+/// References that are cut between two looks at the token.
+const CHUNK: usize = 4096;
+
 /// The references with some of them in pieces; the order and the pieces are a function of the triangles alone.
-pub fn in_pieces(references: &[Reference], corners: &(impl Fn(u32) -> [Vec3; 3] + Sync)) -> Vec<Reference> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn in_pieces(
+    references: &[Reference],
+    corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
+    token: &CancelToken,
+) -> Result<Vec<Reference>, Cancelled> {
     let grid = Grid::around(references);
     let priority = |reference: &Reference| grid.priority(reference, corners(reference.id()));
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
     let factor = largest_factor(&priorities, (references.len() as f64 * MOST_MORE) as u64);
-    let pieces = |(reference, priority): (&Reference, &f32)| {
+    let of_chunk = |(references, priorities): (&[Reference], &[f32])| {
+        token.check()?;
         let mut pieces = Vec::new();
-        grid.cut(*reference, cuts(*priority, factor), corners(reference.id()), &mut pieces);
-        pieces
+        for (reference, &priority) in references.iter().zip(priorities) {
+            grid.cut(*reference, cuts(priority, factor), corners(reference.id()), &mut pieces);
+        }
+        Ok(pieces)
     };
-    references.par_iter().zip(&priorities).flat_map_iter(pieces).collect()
+    let chunks = references.par_chunks(CHUNK).zip(priorities.par_chunks(CHUNK));
+    Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 /// How often a triangle is cut.
@@ -127,7 +142,8 @@ mod tests {
             .collect();
         let references: Vec<_> =
             mesh.iter().zip(0..).map(|(&corners, id)| Reference::new(id, corners)).collect();
-        let pieces = in_pieces(&references, &|id| mesh[id as usize]);
+        let pieces =
+            in_pieces(&references, &|id| mesh[id as usize], &CancelToken::new()).expect("nobody cancels");
         let of = |id: u32| pieces.iter().filter(move |piece| piece.id() == id);
         assert!(of(7).count() > 10 && pieces.len() <= 130, "{} of {}", of(7).count(), pieces.len());
         assert!((0..100).all(|id| id == 7 || of(id).count() == 1));

@@ -13,6 +13,9 @@ pub mod pages;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
+mod ray;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
 mod single;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
@@ -60,7 +63,7 @@ impl Instructions {
 #[cfg(target_arch = "x86_64")]
 fn available() -> Instructions {
     use std::arch::is_x86_feature_detected as has;
-    if !has!("avx2") {
+    if !(has!("avx2") && has!("fma")) {
         Instructions::Portable
     } else if has!("avx512f") && has!("avx512vl") && has!("avx512dq") && has!("avx512bw") {
         Instructions::Avx512

@@ -6,7 +6,7 @@ use super::super::WideBvh;
 use super::super::node::{Child, Node, PACK, TrianglePack};
 use super::lanes::{F8, F16, Lanes, Pair};
 use super::single::prefetch;
-use super::stack::Stack;
+use super::stack::{Stack, entry, key};
 use super::triangle;
 use crate::accel::PACKET as SIZE;
 use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
@@ -193,7 +193,7 @@ impl<V: Lanes> Packet<V> {
     #[inline(always)]
     fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
         let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
-        triangle::hits(&[a, b, c], self.shear[2], t_max)
+        triangle::hits(&[a, b, c], self.shear[2], t_max, None)
     }
 
     /// A corner as each ray sees it; `row` is its first.
@@ -241,13 +241,13 @@ fn closest<V: Lanes>(
     let none = like.like(f32::from_bits(u32::MAX));
     let mut best = Nearest { t: t_max, u: t_max, v: t_max, id: none, found: 0 };
     let mut end = t_max.greatest() * SLAB_PAD;
-    let mut stack: Stack<(f32, u32)> = Stack::new();
-    stack.push((0.0, 0));
-    while let Some((entry, code)) = stack.pop() {
-        if entry > end {
+    let mut stack: Stack<u64> = Stack::new();
+    stack.push(key(0.0, 0));
+    while let Some(key) = stack.pop() {
+        if entry(key) > end {
             continue;
         }
-        match Child::decode(code) {
+        match Child::decode(key as u32) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
                 let (near, met) = frustum.enter(node, like8.like(end));
@@ -360,10 +360,10 @@ fn any<V: Lanes>(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>], like: V, 
     let mut end = t_max.greatest() * SLAB_PAD;
     let all = (1_u32 << rays.len().min(SIZE)) - 1;
     let mut found = 0_u32;
-    let mut stack: Stack<(f32, u32)> = Stack::new();
-    stack.push((0.0, 0));
-    while let Some((_, code)) = stack.pop() {
-        match Child::decode(code) {
+    let mut stack: Stack<u64> = Stack::new();
+    stack.push(key(0.0, 0));
+    while let Some(key) = stack.pop() {
+        match Child::decode(key as u32) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
                 let (near, met) = frustum.enter(node, like8.like(end));
@@ -417,7 +417,7 @@ fn push_ordered<V: Lanes>(
     node: &Node,
     near: F8,
     met: u32,
-    stack: &mut Stack<(f32, u32)>,
+    stack: &mut Stack<u64>,
     packet: &Packet<V>,
     end: V,
 ) {
@@ -431,7 +431,7 @@ fn push_ordered<V: Lanes>(
             continue;
         }
         prefetch(tree, node.children[slot]);
-        stack.insert((entries[slot], node.children[slot]), pushed);
+        stack.insert(key(entries[slot], node.children[slot]), pushed);
         pushed += 1;
     }
 }

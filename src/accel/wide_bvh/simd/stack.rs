@@ -42,13 +42,26 @@ impl<T: Copy> Stack<T> {
     }
 }
 
-impl<T: Copy> Stack<(f32, T)> {
-    /// Put one among the topmost `count`, which get nearer towards the top.
+/// What is to be visited as a number that is greater the farther it is: where the ray enters it, which is not less than 0, so
+/// that its bits are ordered as it is, above the code of the child.
+#[inline(always)]
+pub fn key(entry: f32, code: u32) -> u64 {
+    u64::from(entry.to_bits()) << 32 | u64::from(code)
+}
+
+/// Where the ray enters what a key is of.
+#[inline(always)]
+pub fn entry(key: u64) -> f32 {
+    f32::from_bits((key >> 32) as u32)
+}
+
+impl Stack<u64> {
+    /// Put a key among the topmost `count`, which get nearer towards the top.
     #[inline(always)]
-    pub fn insert(&mut self, entry: (f32, T), count: usize) {
-        self.push(entry);
+    pub fn insert(&mut self, key: u64, count: usize) {
+        self.push(key);
         let mut back = 0;
-        while back < count && self.below(back + 1).0 < self.below(back).0 {
+        while back < count && *self.below(back + 1) < *self.below(back) {
             let lower = *self.below(back + 1);
             *self.below(back + 1) = std::mem::replace(self.below(back), lower);
             back += 1;

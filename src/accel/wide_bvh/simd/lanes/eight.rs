@@ -1,0 +1,130 @@
+//! Eight floats in a register.
+
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
+
+use super::{F4, Lanes, operators, wide_mask};
+
+/// Eight floats.
+#[derive(Clone, Copy)]
+pub struct F8(pub(in crate::accel::wide_bvh::simd) __m256);
+
+/// Eight truth values.
+#[derive(Clone, Copy)]
+pub struct Mask8(__m256);
+
+operators!(F8, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps);
+wide_mask!(Mask8, _mm256_and_ps, _mm256_or_ps);
+
+impl Lanes for F8 {
+    const COUNT: usize = 8;
+    type Mask = Mask8;
+
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe { _mm256_set1_ps(x) })
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe { _mm256_loadu_ps(from) })
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f32]) {
+        assert!(to.len() >= Self::COUNT);
+        // SAFETY: there is a value of this type, and room.
+        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
+    }
+
+    #[inline(always)]
+    fn over(self, divisor: Self) -> Self {
+        // SAFETY: there is a value of this type; so below.
+        Self(unsafe { _mm256_div_ps(self.0, divisor.0) })
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> Mask8 {
+        // SAFETY: as above.
+        Mask8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn le(self, other: Self) -> Mask8 {
+        // SAFETY: as above.
+        Mask8(unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn eq(self, other: Self) -> Mask8 {
+        // SAFETY: as above.
+        Mask8(unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn or_else(self, mask: Mask8, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
+    }
+
+    #[inline(always)]
+    fn without(mask: Mask8, but: Mask8) -> Mask8 {
+        // SAFETY: as above.
+        Mask8(unsafe { _mm256_andnot_ps(but.0, mask.0) })
+    }
+
+    #[inline(always)]
+    fn bits(mask: Mask8) -> u32 {
+        // SAFETY: as above.
+        unsafe { _mm256_movemask_ps(mask.0) as u32 }
+    }
+
+    #[inline(always)]
+    fn mask(bits: u32, _like: Self) -> Mask8 {
+        // SAFETY: as above.
+        unsafe {
+            let own = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), own);
+            Mask8(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, own)))
+        }
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        // SAFETY: as above.
+        let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
+        F4(low).max(F4(high)).greatest()
+    }
+}
+
+impl F8 {
+    /// self · factor − less, rounded once.
+    ///
+    /// # Safety
+    /// The processor has fused products.
+    #[inline(always)]
+    pub unsafe fn times_less(self, factor: Self, less: Self) -> Self {
+        // SAFETY: there is a value of this type; fused products are the caller's.
+        Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, less.0) })
+    }
+}

@@ -1,0 +1,133 @@
+//! Two vectors side by side.
+
+use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
+
+use super::Lanes;
+
+/// Two vectors as one of twice as many floats.
+#[derive(Clone, Copy)]
+pub struct Pair<V>(V, V);
+
+impl<V: Lanes> Add for Pair<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+}
+
+impl<V: Lanes> Sub for Pair<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0 - other.0, self.1 - other.1)
+    }
+}
+
+impl<V: Lanes> Mul for Pair<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0 * other.0, self.1 * other.1)
+    }
+}
+
+impl<M: BitAnd<Output = M>> BitAnd for Pair<M> {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0, self.1 & other.1)
+    }
+}
+
+impl<M: BitOr<Output = M>> BitOr for Pair<M> {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0, self.1 | other.1)
+    }
+}
+
+impl<V: Lanes> Lanes for Pair<V> {
+    const COUNT: usize = 2 * V::COUNT;
+    type Mask = Pair<V::Mask>;
+
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        // SAFETY: the caller's.
+        unsafe { Self(V::splat(x), V::splat(x)) }
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: the caller's: there are twice as many.
+        unsafe { Self(V::load(from), V::load(from.add(V::COUNT))) }
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f32]) {
+        let (low, high) = to.split_at_mut(V::COUNT);
+        self.0.store(low);
+        self.1.store(high);
+    }
+
+    #[inline(always)]
+    fn over(self, divisor: Self) -> Self {
+        Self(self.0.over(divisor.0), self.1.over(divisor.1))
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0), self.1.min(other.1))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0), self.1.max(other.1))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> Self::Mask {
+        Pair(self.0.lt(other.0), self.1.lt(other.1))
+    }
+
+    #[inline(always)]
+    fn le(self, other: Self) -> Self::Mask {
+        Pair(self.0.le(other.0), self.1.le(other.1))
+    }
+
+    #[inline(always)]
+    fn eq(self, other: Self) -> Self::Mask {
+        Pair(self.0.eq(other.0), self.1.eq(other.1))
+    }
+
+    #[inline(always)]
+    fn or_else(self, mask: Self::Mask, other: Self) -> Self {
+        Self(self.0.or_else(mask.0, other.0), self.1.or_else(mask.1, other.1))
+    }
+
+    #[inline(always)]
+    fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask {
+        Pair(V::without(mask.0, but.0), V::without(mask.1, but.1))
+    }
+
+    #[inline(always)]
+    fn bits(mask: Self::Mask) -> u32 {
+        V::bits(mask.0) | V::bits(mask.1) << V::COUNT
+    }
+
+    #[inline(always)]
+    fn mask(bits: u32, like: Self) -> Self::Mask {
+        Pair(V::mask(bits, like.0), V::mask(bits >> V::COUNT, like.1))
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        self.0.max(self.1).greatest()
+    }
+}

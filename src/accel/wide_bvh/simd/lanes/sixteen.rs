@@ -1,0 +1,125 @@
+//! Sixteen floats in a register.
+
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
+
+use super::{Lanes, operators};
+
+/// Sixteen floats in one register.
+#[derive(Clone, Copy)]
+pub struct F16(pub(in crate::accel::wide_bvh::simd) __m512);
+
+/// Sixteen truth values, a bit each.
+#[derive(Clone, Copy)]
+pub struct Mask16(u16);
+
+operators!(F16, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps);
+
+impl BitAnd for Mask16 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+impl BitOr for Mask16 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl Lanes for F16 {
+    const COUNT: usize = 16;
+    type Mask = Mask16;
+
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe { _mm512_set1_ps(x) })
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe { _mm512_loadu_ps(from) })
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f32]) {
+        assert!(to.len() >= Self::COUNT);
+        // SAFETY: there is a value of this type, and room.
+        unsafe { _mm512_storeu_ps(to.as_mut_ptr(), self.0) }
+    }
+
+    #[inline(always)]
+    fn over(self, divisor: Self) -> Self {
+        // SAFETY: there is a value of this type; so below.
+        Self(unsafe { _mm512_div_ps(self.0, divisor.0) })
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_min_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_max_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_abs_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> Mask16 {
+        // SAFETY: as above.
+        Mask16(unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn le(self, other: Self) -> Mask16 {
+        // SAFETY: as above.
+        Mask16(unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn eq(self, other: Self) -> Mask16 {
+        // SAFETY: as above.
+        Mask16(unsafe { _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn or_else(self, mask: Mask16, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_mask_blend_ps(mask.0, other.0, self.0) })
+    }
+
+    #[inline(always)]
+    fn without(mask: Mask16, but: Mask16) -> Mask16 {
+        Mask16(mask.0 & !but.0)
+    }
+
+    #[inline(always)]
+    fn bits(mask: Mask16) -> u32 {
+        u32::from(mask.0)
+    }
+
+    #[inline(always)]
+    fn mask(bits: u32, _like: Self) -> Mask16 {
+        Mask16(bits as u16)
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        // SAFETY: as above.
+        unsafe { _mm512_reduce_max_ps(self.0) }
+    }
+}

@@ -1,0 +1,170 @@
+//! A ray in all lanes of vectors, made ready without a branch: random rays have random signs.
+
+use std::arch::x86_64::*;
+
+use super::lanes::{F4, F8, Lanes};
+use super::triangle::{self, Hits};
+use crate::accel::wide_bvh::node::{Node, TrianglePack};
+use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
+use crate::geometry::{Aabb, Ray};
+use crate::math::Vec3;
+
+/// Least speed along an axis, as a part of the greatest.
+const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
+
+/// A ray ready for the boxes of nodes and the triangles of packs.
+pub struct Lines {
+    /// t for each unit along an axis.
+    to_near: [F8; 3],
+    /// The same, padded: a far plane is never met too early.
+    to_far: [F8; 3],
+    /// Origins for near and far planes, a margin apart, in units of t.
+    from_near: [F8; 3],
+    from_far: [F8; 3],
+    /// Rows of a node that are near along each axis.
+    near: [usize; 3],
+    /// Along the axes of the sheared ray.
+    origin: [F4; 3],
+    shear: [F4; 3],
+    axes: [usize; 3],
+    slender: F4,
+}
+
+/// The axes of a sheared ray by which of x > y, x > z, y > z hold for the sizes of its direction, and which of x, y, z
+/// go down: see `ShearedRay::new`.
+const AXES: [[i32; 4]; 64] = {
+    let mut table = [[0; 4]; 64];
+    let mut case = 0;
+    while case < 64 {
+        let (x_over_y, x_over_z, y_over_z) = (case & 1 != 0, case & 2 != 0, case & 4 != 0);
+        let z = if x_over_y {
+            if x_over_z { 0 } else { 2 }
+        } else if y_over_z {
+            1
+        } else {
+            2
+        };
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        table[case] = if case & 8 << z != 0 { [y, x, z, z] } else { [x, y, z, z] };
+        case += 1;
+    }
+    table
+};
+
+/// The three as lanes.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn vector(v: Vec3) -> __m128 {
+    _mm_setr_ps(v.x, v.y, v.z, 0.0)
+}
+
+/// The greatest of three lanes that are not negative, in all four.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn greatest(v: __m128) -> __m128 {
+    let v = _mm_max_ps(v, _mm_permute_ps::<0b11_01_00_10>(v));
+    _mm_permute_ps::<0>(_mm_max_ps(v, _mm_permute_ps::<0b01>(v)))
+}
+
+/// Each of three lanes in all of eight.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn in_eight(v: __m128) -> [F8; 3] {
+    let [x, y, z] = in_four(v);
+    [F8(_mm256_broadcastss_ps(x.0)), F8(_mm256_broadcastss_ps(y.0)), F8(_mm256_broadcastss_ps(z.0))]
+}
+
+/// Each of three lanes in all of four.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn in_four(v: __m128) -> [F4; 3] {
+    [F4(_mm_permute_ps::<0x00>(v)), F4(_mm_permute_ps::<0x55>(v)), F4(_mm_permute_ps::<0xaa>(v))]
+}
+
+impl Lines {
+    /// Make it ready for triangles in `whole`.
+    #[target_feature(enable = "avx2,fma")]
+    #[inline]
+    pub fn new(ray: &Ray, whole: &Aabb) -> Self {
+        let (origin, direction) = (vector(ray.origin), vector(ray.direction));
+        let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
+        // How far the boxes must reach beyond their triangles, `triangle_margin`, and what fused products may be off more.
+        let below = _mm_and_ps(_mm_sub_ps(vector(whole.min), origin), unsigned);
+        let above = _mm_and_ps(_mm_sub_ps(vector(whole.max), origin), unsigned);
+        let farthest = greatest(_mm_max_ps(below, above));
+        let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
+        let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
+        // Boxes. Where the ray hardly moves along an axis it may as well move a little more: less than a margin all the way
+        // through the boxes. The inverse stays finite so.
+        let size = _mm_and_ps(direction, unsigned);
+        let least = _mm_mul_ps(greatest(size), _mm_set1_ps(LEAST_PART));
+        let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
+        let inverse = _mm_div_ps(_mm_set1_ps(1.0), moving);
+        let is_down = _mm_cmplt_ps(inverse, _mm_setzero_ps());
+        let (before, after) = (_mm_sub_ps(origin, reach), _mm_add_ps(origin, reach));
+        let padded = _mm_mul_ps(inverse, _mm_set1_ps(FAR_PAD));
+        let downs = _mm_movemask_ps(is_down) as usize;
+        // Triangles.
+        let larger = _mm_cmplt_ps(_mm_permute_ps::<0b10_10_01>(size), _mm_permute_ps::<0b01_00_00>(size));
+        let signs = _mm_movemask_ps(_mm_cmplt_ps(direction, _mm_setzero_ps())) as usize;
+        let axes = &AXES[(_mm_movemask_ps(larger) as usize & 7) | (signs & 7) << 3];
+        // SAFETY: four numbers.
+        let places = unsafe { _mm_loadu_si128(axes.as_ptr().cast()) };
+        let scale = _mm_permute_ps::<0xaa>(_mm_permutevar_ps(inverse, places));
+        let shear = _mm_mul_ps(_mm_permutevar_ps(direction, places), scale);
+        let [shear_x, shear_y, _] = in_four(shear);
+        Self {
+            from_near: in_eight(_mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down))),
+            from_far: in_eight(_mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down))),
+            to_near: in_eight(inverse),
+            to_far: in_eight(padded),
+            near: [downs & 1, 2 + (downs >> 1 & 1), 4 + (downs >> 2 & 1)],
+            origin: in_four(_mm_permutevar_ps(origin, places)),
+            shear: [shear_x, shear_y, F4(scale)],
+            axes: [axes[0] as usize, axes[1] as usize, axes[2] as usize],
+            slender: triangle::slender(F4(farthest)),
+        }
+    }
+
+    /// Where the ray enters the eight boxes, and a bit for each that it meets before `end`. A distance that is NaN leaves the
+    /// interval as it is, which is what `SlabRay::enter` does.
+    #[inline(always)]
+    pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
+        let (mut near, mut far) = (end.like(0.0), end);
+        for axis in 0..3 {
+            // SAFETY: there is a value of the type; both are rows, of a pair that begins with an even one.
+            let (to_near, to_far) = unsafe {
+                let row = node.rows.as_ptr().add(self.near[axis]);
+                let other = node.rows.as_ptr().add(self.near[axis] ^ 1);
+                (
+                    F8::load(row.cast()).times_less(self.to_near[axis], self.from_near[axis]),
+                    F8::load(other.cast()).times_less(self.to_far[axis], self.from_far[axis]),
+                )
+            };
+            near = to_near.max(near);
+            far = to_far.min(far);
+        }
+        (near, F8::bits(near.le(far)))
+    }
+
+    /// Test the triangles of a pack.
+    #[inline(always)]
+    pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
+        let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
+        triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max), Some(self.slender))
+    }
+
+    /// The corners of which `row` is the first.
+    #[inline(always)]
+    fn corner(&self, pack: &TrianglePack, row: usize) -> [F4; 3] {
+        let z = self.row(pack, row, 2);
+        [self.row(pack, row, 0) - self.shear[0] * z, self.row(pack, row, 1) - self.shear[1] * z, z]
+    }
+
+    #[inline(always)]
+    fn row(&self, pack: &TrianglePack, row: usize, axis: usize) -> F4 {
+        // SAFETY: there is a value of the type; `row` is 0, 3 or 6 of 9, axes are less than 3.
+        let row = unsafe { F4::load(pack.rows.as_ptr().add(row + self.axes[axis]).cast()) };
+        row - self.origin[axis]
+    }
+}
