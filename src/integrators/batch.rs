@@ -90,8 +90,6 @@ pub struct Queues {
     pub shadows: Vec<ShadowRay>,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
-    /// Random numbers of a point's samples of one light.
-    pub numbers: Vec<[f32; 2]>,
 }
 
 impl Queues {

@@ -5,7 +5,6 @@ use super::batch::{PathRay, ShadowRay};
 use super::whitted::Wave;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::lanes::{LANES, Lanes};
 use crate::lights::{LightSample, SeenLight};
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
@@ -120,16 +119,8 @@ impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
     fn push_samples(&mut self, light: &SeenLight<'_>, number: u32) {
         let (settings, path) = (self.wave.tracer.settings, self.vertex.path);
         let numbers = self.sampler.get2_all(Purpose::at_vertex(path.path, number), settings.shadow_samples);
-        self.wave.numbers.clear();
-        self.wave.numbers.extend(numbers);
-        let count = self.wave.numbers.len();
-        let share = 1.0 / count as f32;
-        for start in (0..count).step_by(LANES) {
-            let used = (count - start).min(LANES);
-            let lane = |of: usize| -> Lanes {
-                std::array::from_fn(|i| self.wave.numbers[start + i.min(used - 1)][of])
-            };
-            let numbers = [lane(0), lane(1)];
+        let share = 1.0 / settings.shadow_samples as f32;
+        for (numbers, used) in numbers {
             light.samples(numbers, used, |sample| self.push(&sample, share));
         }
     }

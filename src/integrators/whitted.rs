@@ -25,9 +25,9 @@ pub fn trace(
     while !queues.rays.is_empty() {
         closest_hits(tracer, queues)?;
         queues.next.clear();
-        let Queues { rays, next, shadows, hits, numbers } = queues;
+        let Queues { rays, next, shadows, hits } = queues;
         shadows.clear();
-        let mut wave = Wave { tracer, depth, next, shadows, numbers, radiance, counters };
+        let mut wave = Wave { tracer, depth, next, shadows, radiance, counters };
         for (path, hit) in rays.iter().zip(hits.iter()) {
             match hit {
                 Some(hit) => wave.shade(*path, hit),
@@ -95,7 +95,6 @@ pub(super) struct Wave<'a> {
     pub(super) depth: u32,
     pub(super) next: &'a mut Vec<PathRay>,
     pub(super) shadows: &'a mut Vec<ShadowRay>,
-    pub(super) numbers: &'a mut Vec<[f32; 2]>,
     pub(super) radiance: &'a mut [Vec3],
     pub(super) counters: &'a mut RayCounters,
 }

@@ -1,12 +1,12 @@
 //! Shapes that emit.
 
-use super::lanes::Lanes;
 use super::rectangle::{QuadEmitter, SeenQuad};
 use super::round::RoundEmitter;
 use super::sphere::{SeenSphere, SphereEmitter};
 use super::triangles::TriangleEmitter;
 use super::{LightSample, Source};
 use crate::math::Vec3;
+use crate::math::lanes::Lanes;
 
 /// A shape that sends the same radiance everywhere from its front side.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,7 +90,7 @@ impl SeenLight<'_> {
         let each = (0..count).map(|i| [u[0][i], u[1][i]]);
         match shape {
             SeenShape::Quad(quad) => quad.samples(u, radiance, source).take(count).for_each(take),
-            SeenShape::Sphere(sphere) => each.for_each(|u| take(sphere.sample(u, radiance, source))),
+            SeenShape::Sphere(sphere) => sphere.samples(u, radiance, source).take(count).for_each(take),
             SeenShape::Triangles(triangles, point) => {
                 each.filter_map(|u| triangles.sample(*point, u, radiance, light.object)).for_each(take);
             }

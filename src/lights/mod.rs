@@ -1,7 +1,6 @@
 //! Lights: where light comes from, as seen from a point.
 
 pub mod emitter;
-pub mod lanes;
 pub mod point;
 pub mod rectangle;
 pub mod round;

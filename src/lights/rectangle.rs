@@ -2,8 +2,8 @@
 
 use std::f32::consts::PI;
 
-use super::lanes::{LANES, Lanes, map, sin_cos, zip};
 use super::{LightSample, Source};
+use crate::math::lanes::{LANES, Lanes, map, sin_cos, zip};
 use crate::math::{DVec3, Vec3};
 
 /// Below this solid angle in sr the sum of four angles has lost too many digits, and uniform over the area is as good.

@@ -4,7 +4,8 @@ use std::f32::consts::PI;
 
 use super::{LightSample, Source};
 use crate::math::frame::Frame;
-use crate::math::{DVec3, Vec2, Vec3};
+use crate::math::lanes::{LANES, Lanes, map, zip};
+use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
 /// A sphere that shines outwards.
@@ -55,15 +56,25 @@ pub struct SeenSphere {
 }
 
 impl SeenSphere {
-    /// Uniform over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exact for narrow cones too.
-    pub fn sample(&self, u: [f32; 2], radiance: Vec3, source: Source) -> LightSample {
+    /// Uniform over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exact for narrow cones too; one
+    /// for each lane.
+    pub fn samples(
+        &self,
+        u: [Lanes; 2],
+        radiance: Vec3,
+        source: Source,
+    ) -> impl Iterator<Item = LightSample> {
         let one_minus_cos_max = self.sin2_max / (1.0 + (1.0 - self.sin2_max).sqrt());
-        let local = warp::cone(Vec2::from_array(u), one_minus_cos_max);
-        let direction = self.frame.to_world(local);
+        let [x, y, z] = warp::cone(u, one_minus_cos_max);
         // The near root along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
-        let sin2 = local.truncate().length_squared();
-        let depth = (self.sin2_max - sin2).max(0.0).sqrt();
-        let target = self.point + direction * (self.distance * (local.z - depth));
-        LightSample { target, direction, weight: radiance * (2.0 * PI * one_minus_cos_max), source }
+        let sin2 = zip(x, y, |x, y| x * x + y * y);
+        let depth = map(sin2, |sin2| (self.sin2_max - sin2).max(0.0).sqrt());
+        let distance = zip(z, depth, |z, depth| self.distance * (z - depth));
+        let (frame, point) = (self.frame, self.point);
+        let weight = radiance * (2.0 * PI * one_minus_cos_max);
+        (0..LANES).map(move |i| {
+            let direction = frame.to_world(Vec3::new(x[i], y[i], z[i]));
+            LightSample { target: point + direction * distance[i], direction, weight, source }
+        })
     }
 }

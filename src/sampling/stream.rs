@@ -2,6 +2,7 @@
 //! (Burley, *Practical Hash-based Owen Scrambling*, JCGT 2020).
 
 use crate::math::Vec2;
+use crate::math::lanes::{LANES, Lanes};
 
 /// Length of the library's sequences.
 const SEQUENCE_LENGTH: u32 = 1 << 16;
@@ -42,12 +43,11 @@ impl PixelSampler {
     }
 
     /// Two numbers in [0, 1) for each of `n` repetitions of one decision, well distributed over repetitions and samples
-    /// together.
-    pub fn get2_all(&self, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> + use<> {
+    /// together: some at a time, with how many of the lanes count.
+    pub fn get2_all(&self, purpose: Purpose, n: u32) -> impl Iterator<Item = ([Lanes; 2], usize)> + use<> {
         let (seed, first) = (mix(self.seed ^ purpose.0), u64::from(self.sample) * u64::from(n));
-        (first..first + u64::from(n)).map(move |index| {
-            let round = (index >> 32) as u32;
-            scrambled(index as u32, seed ^ mix(round))
+        (0..n).step_by(LANES).map(move |start| {
+            (scrambled_from(first + u64::from(start), seed), LANES.min((n - start) as usize))
         })
     }
 
@@ -58,15 +58,32 @@ impl PixelSampler {
     }
 }
 
-/// A point of the first two dimensions of Sobol's sequence, its order and both coordinates scrambled.
-fn scrambled(index: u32, seed: u32) -> [f32; 2] {
-    let place = owen(index.reverse_bits(), seed).reverse_bits();
-    let unit = |bits: u32| (bits.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
-    [unit(owen(place, mix(seed ^ 0x68bc_21eb))), unit(owen(pascal(place), mix(seed ^ 0x02e5_be93)))]
+/// Points of the first two dimensions from number `first` on; every 2³² of them are scrambled anew.
+fn scrambled_from(first: u64, seed: u32) -> [Lanes; 2] {
+    let [round, last_round] = [first, first + LANES as u64 - 1].map(|index| (index >> 32) as u32);
+    let start = first as u32;
+    let indices = std::array::from_fn(|i| start.wrapping_add(i as u32));
+    let points = scrambled(indices, seed ^ mix(round));
+    if round == last_round {
+        return points;
+    }
+    let anew = scrambled(indices, seed ^ mix(last_round));
+    [0, 1].map(|of| std::array::from_fn(|i| if indices[i] < start { anew[of][i] } else { points[of][i] }))
+}
+
+/// Points of the first two dimensions of Sobol's sequence, their order and both coordinates scrambled.
+#[inline(always)]
+fn scrambled(indices: [u32; LANES], seed: u32) -> [Lanes; 2] {
+    let (x_seed, y_seed) = (mix(seed ^ 0x68bc_21eb), mix(seed ^ 0x02e5_be93));
+    let places = indices.map(|index| owen(index.reverse_bits(), seed).reverse_bits());
+    // Fewer than 2²⁴, which vectors convert as signed numbers.
+    let unit = |bits: u32| (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32);
+    [places.map(|place| unit(owen(place, x_seed))), places.map(|place| unit(owen(pascal(place), y_seed)))]
 }
 
 /// The second coordinate with its bits reversed: bit j is the sum of those bits k of the index for which C(k, j) is odd,
 /// which are the k that have every bit of j. That of the first coordinate is the index itself.
+#[inline(always)]
 fn pascal(mut bits: u32) -> u32 {
     for (shift, lacking) in
         [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)]
@@ -78,6 +95,7 @@ fn pascal(mut bits: u32) -> u32 {
 
 /// Owen scrambling of reversed bits by a hash in which each depends on lower ones only (Laine and Karras, *Stratified
 /// Sampling for Stochastic Transparency*, 2011; constants of Vegdahl, *Building a Better LK Hash*, 2021).
+#[inline(always)]
 fn owen(mut bits: u32, seed: u32) -> u32 {
     bits ^= bits.wrapping_mul(0x3d20_adea);
     bits = bits.wrapping_add(seed);
@@ -99,12 +117,34 @@ fn mix(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
+    fn points(sampler: &PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> {
+        let some = |([x, y], used): ([Lanes; 2], usize)| (0..used).map(move |i| [x[i], y[i]]);
+        sampler.get2_all(purpose, n).flat_map(some)
+    }
+
+    #[test]
+    fn repetitions_are_one_sequence_also_where_it_is_scrambled_anew() {
+        // Of three, five and one number, and over the end of 32 bits: the same points as one by one.
+        for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
+            let sampler = PixelSampler::new(2, 3, 4, sample);
+            let all: Vec<_> = points(&sampler, Purpose::CAMERA, n).collect();
+            assert_eq!(all.len(), n as usize);
+            let first = u64::from(sample) * u64::from(n);
+            for (i, point) in all.iter().enumerate() {
+                let index = first + i as u64;
+                let seed = mix(sampler.seed ^ Purpose::CAMERA.0) ^ mix((index >> 32) as u32);
+                let [x, y] = scrambled([index as u32; LANES], seed);
+                assert_eq!([x[0], y[0]], *point, "number {i} of sample {sample}");
+            }
+        }
+    }
+
     #[test]
     fn powers_of_two_are_stratified_and_pixels_differ() {
         // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
             let sampler = |sample| PixelSampler::new(3, 10, 20, sample);
-            let all = (0..64 / n).flat_map(|sample| sampler(sample).get2_all(Purpose::at_vertex(1, 2), n));
+            let all = (0..64 / n).flat_map(|sample| points(&sampler(sample), Purpose::at_vertex(1, 2), n));
             let points: Vec<[f32; 2]> = all.collect();
             for columns in [1_usize, 2, 4, 8, 16, 32, 64] {
                 let mut cells = [0_u32; 64];
@@ -137,7 +177,7 @@ mod tests {
         let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
         for pixel in 0..n {
             let sampler = PixelSampler::new(1, pixel % 200, pixel / 200, 7);
-            for [x, y] in sampler.get2_all(Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
+            for [x, y] in points(&sampler, Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
                 sums = [sums[0] + x, sums[1] + y];
                 product += (x - 0.5) * (y - 0.5) * 12.0;
             }

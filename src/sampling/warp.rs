@@ -2,6 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
+use crate::math::lanes::{Lanes, map, sin_cos, zip};
 use crate::math::{Vec2, Vec3};
 
 /// Uniform on the unit disk (Shirley and Chiu, *A Low Distortion Map Between Disk and Square*, 1997).
@@ -34,16 +35,18 @@ pub fn triangle(u: Vec2) -> Vec3 {
 
 /// Uniform over the solid angle of a cone about z, given 1 − cos of its half angle, which keeps its digits for
 /// narrow cones.
-pub fn cone(u: Vec2, one_minus_cos_max: f32) -> Vec3 {
-    let one_minus_cos = u.x * one_minus_cos_max;
-    let sin = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
-    Vec3::new(sin * cos_phi, sin * sin_phi, 1.0 - one_minus_cos)
+pub fn cone(u: [Lanes; 2], one_minus_cos_max: f32) -> [Lanes; 3] {
+    let one_minus_cos = map(u[0], |u| u * one_minus_cos_max);
+    let sin = map(one_minus_cos, |c| (c * (2.0 - c)).max(0.0).sqrt());
+    let (sin_phi, cos_phi) = sin_cos(map(u[1], |u| 2.0 * PI * u));
+    let across = |part| zip(sin, part, |sin, part| sin * part);
+    [across(cos_phi), across(sin_phi), map(one_minus_cos, |c| 1.0 - c)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::lanes::LANES;
 
     fn grid() -> impl Iterator<Item = Vec2> {
         (0..10_000).map(|i| Vec2::new((i % 100) as f32 + 0.5, (i / 100) as f32 + 0.5) / 100.0)
@@ -70,10 +73,12 @@ mod tests {
     #[test]
     fn the_cone_is_uniform_over_solid_angle_also_when_narrow() {
         for one_minus_cos in [2.0, 0.5, 1e-9] {
-            let z = grid().map(|u| 1.0 - f64::from(cone(u, one_minus_cos).z)).sum::<f64>() / 10_000.0;
-            let sin2 =
-                grid().map(|u| f64::from(cone(u, one_minus_cos).truncate().length_squared())).sum::<f64>()
-                    / 1e4;
+            let cone = |u: Vec2| {
+                let [x, y, z] = cone([[u.x; LANES], [u.y; LANES]], one_minus_cos);
+                Vec3::new(x[0], y[1], z[2])
+            };
+            let z = grid().map(|u| 1.0 - f64::from(cone(u).z)).sum::<f64>() / 10_000.0;
+            let sin2 = grid().map(|u| f64::from(cone(u).truncate().length_squared())).sum::<f64>() / 1e4;
             let c = f64::from(one_minus_cos);
             assert!(one_minus_cos < 1e-6 || (z / (c / 2.0) - 1.0).abs() < 1e-3);
             // ∫(2c − c²) over the cone.
