@@ -66,17 +66,53 @@ impl PathRay {
     }
 }
 
-/// A shadow ray with what it brings if nothing is in its way.
+/// Shadow rays that wait to be traced: segments from surfaces to lights, in packets that lie as they are traced.
+#[derive(Default)]
+pub struct ShadowQueue {
+    /// The segments.
+    pub rays: Vec<Ray>,
+    /// The light that each goes to, which may be hit.
+    pub sources: Vec<Source>,
+    /// What each brings if nothing is in its way.
+    pub arrivals: Vec<Arrival>,
+}
+
+/// What a shadow ray brings.
 #[derive(Clone, Copy, Debug)]
-pub struct ShadowRay {
-    /// Segment from a surface to a light.
-    pub ray: Ray,
-    /// The light that may be hit.
-    pub source: Source,
+pub struct Arrival {
     /// Radiance for the sample.
     pub contribution: Vec3,
     /// The sample.
     pub slot: u32,
+}
+
+impl ShadowQueue {
+    /// Rays from which on they are traced before more are made, while what they need is in the cache.
+    const FULL: usize = 1024;
+
+    /// How many wait.
+    pub fn len(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Whether they are to be traced now.
+    pub fn is_full(&self) -> bool {
+        self.len() >= Self::FULL
+    }
+
+    /// One more.
+    pub fn push(&mut self, ray: Ray, source: Source, arrival: Arrival) {
+        self.rays.push(ray);
+        self.sources.push(source);
+        self.arrivals.push(arrival);
+    }
+
+    /// Forget all.
+    pub fn clear(&mut self) {
+        self.rays.clear();
+        self.sources.clear();
+        self.arrivals.clear();
+    }
 }
 
 /// The memory of batches, used again by each.
@@ -86,8 +122,8 @@ pub struct Queues {
     pub rays: Vec<PathRay>,
     /// Rays of the next round.
     pub next: Vec<PathRay>,
-    /// Shadow rays of this round.
-    pub shadows: Vec<ShadowRay>,
+    /// Shadow rays of this round that are not traced yet.
+    pub shadows: ShadowQueue,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
 }
@@ -103,7 +139,7 @@ impl Queues {
 
     /// For the next tile of this thread, unless many lights made them very long.
     pub fn leave(self) {
-        if self.shadows.capacity() <= Self::MOST_SHADOWS {
+        if self.shadows.rays.capacity() <= Self::MOST_SHADOWS {
             QUEUES.set(self);
         }
     }

@@ -1,7 +1,7 @@
 //! Direct light at a Phong surface: every light with its own shadow rays.
 
 use super::View;
-use super::batch::{PathRay, ShadowRay};
+use super::batch::{Arrival, PathRay};
 use super::whitted::Wave;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
@@ -138,15 +138,15 @@ impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
             self.wave.radiance[slot as usize] += contribution;
         } else {
             let ray = Ray::segment(self.shadow_origin, sample.target);
-            self.wave.shadows.push(ShadowRay { ray, source: sample.source, contribution, slot });
+            self.wave.shadows.push(ray, sample.source, Arrival { contribution, slot });
         }
     }
 
     /// In the view of shadows contributions are parts of the whole that could arrive.
     fn finish(self) {
         if self.wave.tracer.settings.view == View::Shadow {
-            for shadow in &mut self.wave.shadows[self.first..] {
-                shadow.contribution /= self.total;
+            for arrival in &mut self.wave.shadows.arrivals[self.first..] {
+                arrival.contribution /= self.total;
             }
         }
     }

@@ -157,7 +157,7 @@ pub fn render_tile(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     let block = SampleBlock { tile, samples };
-    let mut radiance = vec![Vec3::ZERO; block.len()];
+    let (mut radiance, mut arrived) = (vec![Vec3::ZERO; block.len()], vec![Vec3::ZERO; block.len()]);
     let mut counters = RayCounters::default();
     let tracer = Tracer { world, settings, block: &block, token };
     let mut queues = Queues::of_thread();
@@ -168,9 +168,10 @@ pub fn render_tile(
         if settings.view.is_data() {
             views::shade(&tracer, &mut queues, &mut radiance, &mut counters)?;
         } else {
-            whitted::trace(&tracer, &mut queues, &mut radiance, &mut counters)?;
+            whitted::trace(&tracer, &mut queues, &mut radiance, &mut arrived, &mut counters)?;
         }
     }
     queues.leave();
+    radiance.iter_mut().zip(arrived).for_each(|(radiance, arrived)| *radiance += arrived);
     Ok((TileSamples { rect: block.tile, samples: block.samples.len() as u32, radiance }, counters))
 }

@@ -1,7 +1,7 @@
 //! Direct light by Phong, mirror, glass and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*,
 //! 1980), over queues instead of recursion.
 
-use super::batch::{PathRay, Queues, ShadowRay, Tracer};
+use super::batch::{PathRay, Queues, ShadowQueue, Tracer};
 use super::direct::{self, PhongVertex};
 use super::medium::Inside;
 use super::{POLL_INTERVAL, RayCounters, View, glass};
@@ -14,11 +14,13 @@ use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET};
 
-/// Follow the camera rays in the queue to the end and add what they see to their samples.
+/// Follow the camera rays in the queue to the end and add what they see to their samples: to `radiance` what nothing can stop, to
+/// `arrived` what shadow rays bring. Each is added up in the order of the paths, whenever the shadow rays are traced.
 pub fn trace(
     tracer: &Tracer<'_>,
     queues: &mut Queues,
     radiance: &mut [Vec3],
+    arrived: &mut [Vec3],
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
     let mut depth = 0;
@@ -33,8 +35,11 @@ pub fn trace(
                 Some(hit) => wave.shade(*path, hit),
                 None => wave.leave(path),
             }
+            if wave.shadows.is_full() {
+                wave.trace_shadows(arrived)?;
+            }
         }
-        trace_shadows(tracer, shadows, radiance, counters)?;
+        wave.trace_shadows(arrived)?;
         std::mem::swap(rays, next);
         depth += 1;
     }
@@ -48,44 +53,11 @@ pub fn closest_hits(tracer: &Tracer<'_>, queues: &mut Queues) -> Result<(), Canc
     for (paths, hits) in queues.rays.chunks(POLL_INTERVAL).zip(queues.hits.chunks_mut(POLL_INTERVAL)) {
         tracer.token.check()?;
         for (paths, hits) in paths.chunks(PACKET).zip(hits.chunks_mut(PACKET)) {
-            let mut rays = [paths[0].ray; PACKET];
-            rays.iter_mut().zip(paths).for_each(|(ray, path)| *ray = path.ray);
+            let rays: [Ray; PACKET] = std::array::from_fn(|lane| paths[lane.min(paths.len() - 1)].ray);
             tracer.world.geometry.closest_packet(&rays[..paths.len()], hits);
         }
     }
     Ok(())
-}
-
-/// Add the contributions that arrive, in the order of the queue.
-fn trace_shadows(
-    tracer: &Tracer<'_>,
-    shadows: &[ShadowRay],
-    radiance: &mut [Vec3],
-    counters: &mut RayCounters,
-) -> Result<(), Cancelled> {
-    for some in shadows.chunks(POLL_INTERVAL) {
-        tracer.token.check()?;
-        for some in some.chunks(PACKET) {
-            let occluded = if tracer.settings.shadows == Shadows::Off { 0 } else { occluded(tracer, some) };
-            for (lane, shadow) in some.iter().enumerate() {
-                if occluded & 1 << lane == 0 {
-                    radiance[shadow.slot as usize] += shadow.contribution;
-                }
-            }
-        }
-    }
-    counters.shadow_rays += shadows.len() as u64;
-    Ok(())
-}
-
-/// A bit for each of at most [`PACKET`] shadow rays that something is in the way of.
-fn occluded(tracer: &Tracer<'_>, shadows: &[ShadowRay]) -> u32 {
-    let mut rays = [shadows[0].ray; PACKET];
-    let mut sources = [shadows[0].source; PACKET];
-    for (lane, shadow) in shadows.iter().enumerate() {
-        (rays[lane], sources[lane]) = (shadow.ray, shadow.source);
-    }
-    tracer.world.geometry.occluded_packet(&rays[..shadows.len()], &sources[..shadows.len()])
 }
 
 /// One round of all rays of a batch.
@@ -94,7 +66,7 @@ pub(super) struct Wave<'a> {
     /// Scatterings before the hits of this round.
     pub(super) depth: u32,
     pub(super) next: &'a mut Vec<PathRay>,
-    pub(super) shadows: &'a mut Vec<ShadowRay>,
+    pub(super) shadows: &'a mut ShadowQueue,
     pub(super) radiance: &'a mut [Vec3],
     pub(super) counters: &'a mut RayCounters,
 }
@@ -102,6 +74,26 @@ pub(super) struct Wave<'a> {
 impl Wave<'_> {
     fn add(&mut self, slot: u32, radiance: Vec3) {
         self.radiance[slot as usize] += radiance;
+    }
+
+    /// Add what arrives by the shadow rays in the queue, in their order, and empty it.
+    fn trace_shadows(&mut self, arrived: &mut [Vec3]) -> Result<(), Cancelled> {
+        self.tracer.token.check()?;
+        let is_traced = self.tracer.settings.shadows != Shadows::Off;
+        let ShadowQueue { rays, sources, arrivals } = &*self.shadows;
+        let packets = rays.chunks(PACKET).zip(sources.chunks(PACKET)).zip(arrivals.chunks(PACKET));
+        for ((rays, sources), arrivals) in packets {
+            let geometry = &self.tracer.world.geometry;
+            let occluded = if is_traced { geometry.occluded_packet(rays, sources) } else { 0 };
+            for (lane, arrival) in arrivals.iter().enumerate() {
+                if occluded & 1 << lane == 0 {
+                    arrived[arrival.slot as usize] += arrival.contribution;
+                }
+            }
+        }
+        self.counters.shadow_rays += self.shadows.len() as u64;
+        self.shadows.clear();
+        Ok(())
     }
 
     /// Whether one more scattering is allowed.
