@@ -24,7 +24,7 @@ use std::time::Instant;
 
 use embree::{Embree, Scene};
 use glimt::accel::wide_bvh::{Instructions, Quality};
-use glimt::accel::{KdTree, PACKET, WideBvh};
+use glimt::accel::{KdTree, PACKET, WideBvh, ends};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -186,13 +186,13 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     let closest = |rays: &[Ray]| {
         let mut hits = [None; PACKET];
         let mut found = |some: &[Ray]| {
-            tree.closest_packet(some, &mut hits[..some.len()]);
+            tree.closest_packet(some, &ends(some), &mut hits[..some.len()]);
             hits[..some.len()].iter().flatten().count()
         };
         rays.chunks(PACKET).map(&mut found).sum()
     };
     let any = |rays: &[Ray]| {
-        let found = |some: &[Ray]| tree.any_packet(some, &[None; PACKET][..some.len()]).count_ones() as usize;
+        let found = |some: &[Ray]| tree.any_packet(some, &ends(some), &[]).count_ones() as usize;
         rays.chunks(PACKET).map(found).sum()
     };
     line("primary", "Mrays/s", chunks(&rays.primary, &closest), None);
@@ -265,15 +265,13 @@ fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
         let mut found = 0;
         let mut hits = [None; PACKET];
         for sixteen in rays.chunks(PACKET) {
-            tree.closest_packet(sixteen, &mut hits[..sixteen.len()]);
+            tree.closest_packet(sixteen, &ends(sixteen), &mut hits[..sixteen.len()]);
             found += hits.iter().filter(|hit| hit.is_some()).count();
         }
         found
     };
     let mut any = |rays: &[Ray]| {
-        let found = |sixteen: &[Ray]| {
-            tree.any_packet(sixteen, &[None; PACKET][..sixteen.len()]).count_ones() as usize
-        };
+        let found = |sixteen: &[Ray]| tree.any_packet(sixteen, &ends(sixteen), &[]).count_ones() as usize;
         rays.chunks(PACKET).map(found).sum()
     };
     println!("  {:?}, packets of {PACKET}", tree.instructions());

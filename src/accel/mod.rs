@@ -18,3 +18,11 @@ pub use wide_bvh::WideBvh;
 
 /// Rays that are traced together.
 pub const PACKET: usize = 16;
+
+/// Where each ray of a packet ends, in place of its own `t_max`; below 0 where there is none, or where it is not traced.
+pub type Ends = [f32; PACKET];
+
+/// The ends of at most [`PACKET`] rays.
+pub fn ends(rays: &[crate::geometry::Ray]) -> Ends {
+    std::array::from_fn(|lane| rays.get(lane).map_or(-1.0, |ray| ray.t_max))
+}

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{KdTree, WideBvh};
+use crate::accel::{Ends, KdTree, WideBvh};
 use crate::assets::LoadedMesh;
 use crate::assets::mesh::vertex_normals;
 use crate::control::{CancelToken, Cancelled};
@@ -102,25 +102,30 @@ impl MeshTree {
         }
     }
 
-    /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays.
-    pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<ShapeHit>]) {
+    /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays up to their ends.
+    pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
         match &self.tree {
-            Tree::Boxes(tree) => tree.closest_packet(rays, hits),
+            Tree::Boxes(tree) => tree.closest_packet(rays, ends, hits),
             Tree::Planes(tree) => {
-                for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = tree.closest(ray);
+                hits.fill(None);
+                for (lane, hit) in hits.iter_mut().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
+                    *hit = tree.closest(&Ray { t_max: ends[lane], ..rays[lane] });
                 }
             }
         }
     }
 
-    /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle but its own of `except`.
-    pub fn any_packet(&self, rays: &[Ray], except: &[Option<u32>]) -> u32 {
+    /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle up to its end but its own of `except`,
+    /// which may be empty.
+    pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
         match &self.tree {
-            Tree::Boxes(tree) => tree.any_packet(rays, except),
+            Tree::Boxes(tree) => tree.any_packet(rays, ends, except),
             Tree::Planes(tree) => {
-                let hits = rays.iter().zip(except).map(|(ray, &except)| tree.any(ray, except));
-                hits.enumerate().fold(0, |bits, (lane, hit)| bits | u32::from(hit) << lane)
+                let hit = |lane: usize| {
+                    let ray = Ray { t_max: ends[lane], ..rays[lane] };
+                    u32::from(tree.any(&ray, except.get(lane).copied().flatten())) << lane
+                };
+                (0..rays.len()).filter(|&lane| ends[lane] >= 0.0).map(hit).sum()
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::shape::{MeshInstance, Shape};
 use super::{Geometry, Hit};
-use crate::accel::PACKET;
+use crate::accel::{Ends, PACKET, ends};
 use crate::geometry::{Ray, RayF64};
 use crate::lights::Source;
 use crate::math::transform::Transform;
@@ -23,13 +23,9 @@ fn all(rays: &[Ray]) -> u32 {
     (1 << rays.len()) - 1
 }
 
-/// Where each ray ends; lanes without a ray have no length.
-fn ends(rays: &[Ray]) -> [f32; PACKET] {
-    let mut ends = [-1.0; PACKET];
-    for (end, ray) in ends.iter_mut().zip(rays) {
-        *end = ray.t_max;
-    }
-    ends
+/// The ends of the rays of `met`; the others end below 0.
+fn of_these(met: u32, ends: &Ends) -> Ends {
+    std::array::from_fn(|lane| if met & 1 << lane != 0 { ends[lane] } else { -1.0 })
 }
 
 impl Geometry {
@@ -37,22 +33,19 @@ impl Geometry {
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
         hits.fill(None);
-        let mut doubles = Doubles::new(rays);
-        let mut test = |id: u32, met: u32, ends: &mut [f32; PACKET]| {
+        let mut doubles = Doubles::default();
+        let mut test = |id: u32, met: u32, ends: &mut Ends| {
             let mut found = [None; PACKET];
             match &self.shapes()[id as usize] {
                 Shape::Mesh(mesh) => {
-                    let (local, lane_of, count) = local_rays(mesh, rays, met, ends);
-                    let mut of_mesh = [None; PACKET];
-                    mesh.tree.closest_packet(&local[..count], &mut of_mesh[..count]);
-                    for (hit, &lane) in of_mesh.into_iter().zip(&lane_of[..count]) {
-                        found[lane] = hit;
-                    }
+                    let found = &mut found[..rays.len()];
+                    let own_ends = of_these(met, ends);
+                    in_mesh(mesh, rays, met, |local| mesh.tree.closest_packet(local, &own_ends, found));
                 }
                 shape => {
                     for lane in lanes(met) {
                         let segment = Ray { t_max: ends[lane], ..rays[lane] };
-                        found[lane] = shape.closest(&segment, doubles.of(lane, segment.t_max));
+                        found[lane] = shape.closest(&segment, doubles.of(rays, lane, segment.t_max));
                     }
                 }
             }
@@ -74,26 +67,40 @@ impl Geometry {
     /// [`Geometry::occluded`] of at most [`PACKET`] segments, each with the light that it goes to: a bit for each that is.
     pub fn occluded_packet(&self, rays: &[Ray], sources: &[Source]) -> u32 {
         debug_assert!(rays.len() <= PACKET && rays.len() == sources.len());
-        let doubles = Doubles::new(rays);
+        let mut doubles = Doubles::default();
         let mut occluded = 0;
-        let mut test = |id: u32, met: u32, ends: &mut [f32; PACKET]| {
-            let own = |lane: usize| matches!(sources[lane], Source::Object(own) if own == id);
-            let met =
-                lanes(met & !occluded).filter(|&lane| !own(lane)).fold(0, |bits, lane| bits | 1 << lane);
-            let except = |lane: usize| match sources[lane] {
-                Source::Primitive(own, part) if own == id => Some(part),
+        let mut test = |id: u32, met: u32, ends: &mut Ends| {
+            let (mut own, mut has_own_parts) = (0, false);
+            for (lane, source) in sources.iter().enumerate() {
+                own |= u32::from(*source == Source::Object(id)) << lane;
+                has_own_parts |= matches!(source, Source::Primitive(object, _) if *object == id);
+            }
+            let met = met & !occluded & !own;
+            if met == 0 {
+                return;
+            }
+            let except = |lane: usize| match sources.get(lane) {
+                Some(Source::Primitive(object, part)) if *object == id => Some(*part),
                 _ => None,
             };
             let mut found = 0;
             match &self.shapes()[id as usize] {
                 Shape::Mesh(mesh) => {
-                    let (local, lane_of, count) = local_rays(mesh, rays, met, ends);
-                    let bits = mesh.tree.any_packet(&local[..count], &lane_of.map(except)[..count]);
-                    found |= lanes(bits).fold(0, |all, i| all | 1 << lane_of[i]);
+                    let own_ends = of_these(met, ends);
+                    let parts: [_; PACKET];
+                    let mut except_parts: &[Option<u32>] = &[];
+                    if has_own_parts {
+                        parts = std::array::from_fn(except);
+                        except_parts = &parts[..rays.len()];
+                    }
+                    in_mesh(mesh, rays, met, |local| {
+                        found = mesh.tree.any_packet(local, &own_ends, except_parts);
+                    });
                 }
                 shape => {
                     for lane in lanes(met) {
-                        let hit = shape.any(&rays[lane], &doubles.rays[lane], except(lane));
+                        let hit =
+                            shape.any(&rays[lane], doubles.of(rays, lane, rays[lane].t_max), except(lane));
                         found |= u32::from(hit) << lane;
                     }
                 }
@@ -110,47 +117,33 @@ impl Geometry {
     }
 }
 
-/// The rays of `met` in a mesh's coordinates, side by side, which lanes they came from, and how many they are.
+/// Those rays of a packet that are in `met` in a mesh's coordinates, the others as they are.
 #[inline]
-fn local_rays(
-    mesh: &MeshInstance,
-    rays: &[Ray],
-    met: u32,
-    ends: &[f32; PACKET],
-) -> ([Ray; PACKET], [usize; PACKET], usize) {
-    let mut local = [rays[0]; PACKET];
-    let mut lane_of = [0; PACKET];
-    let mut count = 0;
-    let is_placed = mesh.transform != Transform::IDENTITY;
-    for lane in lanes(met) {
-        local[count] = if is_placed { mesh.local_ray(&rays[lane]) } else { rays[lane] };
-        local[count].t_max = ends[lane];
-        lane_of[count] = lane;
-        count += 1;
+fn in_mesh(mesh: &MeshInstance, rays: &[Ray], met: u32, trace: impl FnOnce(&[Ray])) {
+    if mesh.transform == Transform::IDENTITY {
+        return trace(rays);
     }
-    (local, lane_of, count)
+    let mut local = [rays[0]; PACKET];
+    for lane in lanes(met) {
+        local[lane] = mesh.local_ray(&rays[lane]);
+    }
+    trace(&local[..rays.len()]);
 }
 
-/// The rays in double precision.
+/// The rays in double precision, where a shape asks for one.
+#[derive(Default)]
 struct Doubles {
-    rays: [RayF64; PACKET],
+    rays: Option<[RayF64; PACKET]>,
 }
 
 impl Doubles {
-    fn new(rays: &[Ray]) -> Self {
-        let first =
-            rays.first().map_or_else(|| Ray::new(crate::math::Vec3::ZERO, crate::math::Vec3::X), |ray| *ray);
-        let mut own = Self { rays: [first.to_f64(); PACKET] };
-        for (own, ray) in own.rays.iter_mut().zip(rays) {
-            *own = ray.to_f64();
-        }
-        own
-    }
-
     /// The ray of a lane up to `end`.
-    fn of(&mut self, lane: usize, end: f32) -> &RayF64 {
-        self.rays[lane].t_max = f64::from(end);
-        &self.rays[lane]
+    fn of(&mut self, rays: &[Ray], lane: usize, end: f32) -> &RayF64 {
+        let doubles = self
+            .rays
+            .get_or_insert_with(|| std::array::from_fn(|lane| rays[lane.min(rays.len() - 1)].to_f64()));
+        doubles[lane].t_max = f64::from(end);
+        &doubles[lane]
     }
 }
 

@@ -1,7 +1,7 @@
 //! The ray kernel: no leak between triangles, no speck on flat faces, the same bits by all instructions.
 
 use glimt::accel::wide_bvh::Instructions;
-use glimt::accel::{KdTree, PACKET, WideBvh};
+use glimt::accel::{KdTree, PACKET, WideBvh, ends};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -97,9 +97,9 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
         });
         if i % 2 == 0 {
             let mut hits = [None; PACKET];
-            tree.closest_packet(&packet, &mut hits);
+            tree.closest_packet(&packet, &ends(&packet), &mut hits);
             leaks += hits.iter().filter(|hit| hit.is_none()).count();
-            leaks += PACKET - tree.any_packet(&packet, &[None; PACKET]).count_ones() as usize;
+            leaks += PACKET - tree.any_packet(&packet, &ends(&packet), &[]).count_ones() as usize;
         } else {
             leaks += packet.iter().filter(|ray| tree.closest(ray).is_none() || !tree.any(ray, None)).count();
         }

@@ -4,7 +4,7 @@
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
 use super::{Bvh, Child, DEEP_STACK};
-use crate::accel::PACKET;
+use crate::accel::{Ends, PACKET};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Aabb, Ray};
 
@@ -29,7 +29,7 @@ impl SlabPacket {
 
     /// A bit for each ray that meets the box before its end, and where the first of them enters.
     #[inline(always)]
-    fn enter(&self, bounds: &Aabb, ends: &[f32; PACKET]) -> (u32, f32) {
+    fn enter(&self, bounds: &Aabb, ends: &Ends) -> (u32, f32) {
         let mut near = [0.0_f32; PACKET];
         let mut far = ends.map(|end| end * SLAB_PAD);
         for axis in 0..3 {
@@ -59,12 +59,7 @@ impl Bvh {
     /// against the rays whose bits are set in `met`, and shortens the ends of those that hit it; a ray that is
     /// done has an end below 0. Primitives at exactly a ray's end are still tested, so that the caller can
     /// break ties by id.
-    pub fn visit_packet(
-        &self,
-        rays: &[Ray],
-        ends: &mut [f32; PACKET],
-        mut test: impl FnMut(u32, u32, &mut [f32; PACKET]),
-    ) {
+    pub fn visit_packet(&self, rays: &[Ray], ends: &mut Ends, mut test: impl FnMut(u32, u32, &mut Ends)) {
         if self.nodes.is_empty() {
             return;
         }

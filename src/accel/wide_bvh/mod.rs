@@ -13,7 +13,7 @@ use crate::math::Vec3;
 
 pub use simd::Instructions;
 
-use crate::accel::PACKET;
+use crate::accel::{Ends, PACKET};
 
 use node::{Node, TrianglePack};
 
@@ -114,45 +114,41 @@ impl WideBvh {
         self.may_hit(ray) && simd::any(self, ray, except)
     }
 
-    /// [`WideBvh::closest`] of at most [`PACKET`] rays; faster where they go much the same way, as those of neighbouring
-    /// pixels do.
-    pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<ShapeHit>]) {
+    /// [`WideBvh::closest`] of at most [`PACKET`] rays up to their ends; faster where they go much the same way, as those of
+    /// neighbouring pixels do.
+    pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
-        if self.nodes.is_empty() {
-            return hits.fill(None);
-        }
-        if !simd::closest_packet(self, rays, hits) {
-            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest(ray));
+        hits.fill(None);
+        if !self.nodes.is_empty() && !simd::closest_packet(self, rays, ends, hits) {
+            for (lane, hit) in hits.iter_mut().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
+                *hit = self.closest(&Ray { t_max: ends[lane], ..rays[lane] });
+            }
         }
     }
 
-    /// [`WideBvh::any`] of at most [`PACKET`] rays: a bit for each that hits. `except` has one for each ray.
-    pub fn any_packet(&self, rays: &[Ray], except: &[Option<u32>]) -> u32 {
-        debug_assert!(rays.len() <= PACKET && rays.len() == except.len());
+    /// [`WideBvh::any`] of at most [`PACKET`] rays up to their ends: a bit for each that hits. `except` has one for each ray, or
+    /// is empty.
+    pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
+        debug_assert!(rays.len() <= PACKET && (except.is_empty() || rays.len() == except.len()));
         if self.nodes.is_empty() {
             return 0;
         }
-        if let Some(bits) = simd::any_packet(self, rays, except) {
+        if let Some(bits) = simd::any_packet(self, rays, ends, except) {
             return bits;
+        }
+        let alone = |lane: usize| {
+            let ray = Ray { t_max: ends[lane], ..rays[lane] };
+            u32::from(self.any(&ray, except.get(lane).copied().flatten())) << lane
+        };
+        if self.instructions == Instructions::Portable {
+            return (0..rays.len()).filter(|&lane| ends[lane] >= 0.0).map(alone).sum();
         }
         let mut bits = 0;
-        if self.instructions == Instructions::Portable {
-            for (lane, (ray, &except)) in rays.iter().zip(except).enumerate() {
-                bits |= u32::from(self.any(ray, except)) << lane;
-            }
-            return bits;
-        }
-        for_each_group(rays, |lanes| {
-            let count = lanes.len();
-            let (group, mut own) = (gathered(rays, lanes), [None; PACKET]);
-            own.iter_mut().zip(lanes).for_each(|(own, &lane)| *own = except[lane]);
+        for_each_group(rays, ends, |group, count| {
             let as_packet =
-                (count >= SMALL_GROUP).then(|| simd::any_packet(self, &group[..count], &own[..count]));
-            let hit = |i: usize| match as_packet.flatten() {
-                Some(found) => found & 1 << i != 0,
-                None => self.any(&group[i], own[i]),
-            };
-            lanes.iter().enumerate().for_each(|(i, lane)| bits |= u32::from(hit(i)) << lane);
+                (count >= SMALL_GROUP).then(|| simd::any_packet(self, rays, group, except)).flatten();
+            let one_by_one = || (0..rays.len()).filter(|&lane| group[lane] >= 0.0).map(alone).sum();
+            bits |= as_packet.unwrap_or_else(one_by_one);
         });
         bits
     }
@@ -212,8 +208,9 @@ impl WideBvh {
 /// Fewer shadow rays are faster one by one.
 const SMALL_GROUP: usize = 4;
 
-/// The lanes of those rays together that go to the same side along each axis, and furthest along the same one.
-fn for_each_group(rays: &[Ray], mut take: impl FnMut(&[usize])) {
+/// The ends of those rays together that go to the same side along each axis, and furthest along the same one, and how many
+/// they are; the others end below 0.
+fn for_each_group(rays: &[Ray], ends: &Ends, mut take: impl FnMut(&Ends, usize)) {
     let way = |ray: &Ray| {
         let [x, y, z] = ray.direction.to_array().map(f32::abs);
         let longest = if x > y && x > z {
@@ -223,39 +220,27 @@ fn for_each_group(rays: &[Ray], mut take: impl FnMut(&[usize])) {
         } else {
             2
         };
-        (ray.direction.cmplt(Vec3::ZERO).bitmask(), longest)
+        ray.direction.cmplt(Vec3::ZERO).bitmask() | longest << 3
     };
-    let mut left = (1_u32 << rays.len()) - 1;
-    while left != 0 {
-        let own = way(&rays[left.trailing_zeros() as usize]);
-        let (mut lanes, mut count) = ([0; PACKET], 0);
-        for (lane, ray) in rays.iter().enumerate() {
-            if left & 1 << lane != 0 && way(ray) == own {
-                lanes[count] = lane;
-                count += 1;
-                left &= !(1 << lane);
-            }
-        }
-        // A NaN is not even like itself.
-        if count == 0 {
-            lanes[0] = left.trailing_zeros() as usize;
-            count = 1;
-            left &= left - 1;
-        }
-        take(&lanes[..count]);
+    let mut ways = [u32::MAX; PACKET];
+    for (lane, ray) in rays.iter().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
+        ways[lane] = way(ray);
     }
-}
-
-/// The rays of some lanes.
-fn gathered(rays: &[Ray], lanes: &[usize]) -> [Ray; PACKET] {
-    let mut gathered = [rays[lanes[0]]; PACKET];
-    gathered.iter_mut().zip(lanes).for_each(|(own, &lane)| *own = rays[lane]);
-    gathered
+    while let Some(&own) = ways.iter().find(|&&way| way != u32::MAX) {
+        let (mut group, mut count) = ([-1.0; PACKET], 0);
+        for (lane, way) in ways.iter_mut().enumerate().filter(|(_, way)| **way == own) {
+            group[lane] = ends[lane];
+            count += 1;
+            *way = u32::MAX;
+        }
+        take(&group, count);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::ends;
     use crate::accel::pathological::{bits, brute, meshes, random, rays};
     use crate::geometry::watertight::ShearedRay;
 
@@ -322,7 +307,7 @@ mod tests {
                 tree = tree.with(instructions);
                 for rays in packets(mesh) {
                     let mut found = vec![None; rays.len()];
-                    tree.closest_packet(&rays, &mut found);
+                    tree.closest_packet(&rays, &ends(&rays), &mut found);
                     let expected: Vec<_> = rays.iter().map(|ray| brute(mesh, ray)).collect();
                     let bits = |hits: &[Option<ShapeHit>]| -> Vec<_> {
                         let bits = |hit: &ShapeHit| {
@@ -334,7 +319,7 @@ mod tests {
                     let except: Vec<_> = (0..rays.len())
                         .map(|i| expected[i].filter(|_| i % 3 == 0).map(|hit| hit.primitive))
                         .collect();
-                    let any = tree.any_packet(&rays, &except);
+                    let any = tree.any_packet(&rays, &ends(&rays), &except);
                     for (i, ray) in rays.iter().enumerate() {
                         let others = mesh.iter().zip(0..).filter(|&(_, id)| Some(id) != except[i]);
                         let sheared = ShearedRay::new(ray.origin, ray.direction);
@@ -364,12 +349,16 @@ mod tests {
             let tree = built(&mesh).with(instructions);
             let are_vectors = tree.instructions() != Instructions::Portable;
             let mut hits = [None; PACKET];
-            assert_eq!(simd::closest_packet(&tree, &rays, &mut hits), are_vectors, "{instructions:?}");
+            assert_eq!(
+                simd::closest_packet(&tree, &rays, &ends(&rays), &mut hits),
+                are_vectors,
+                "{instructions:?}"
+            );
             assert_eq!(hits.iter().flatten().count(), if are_vectors { PACKET } else { 0 });
             let all = (1 << PACKET) - 1;
-            assert_eq!(simd::any_packet(&tree, &rays, &[None; PACKET]), are_vectors.then_some(all));
-            assert!(!simd::closest_packet(&tree, &apart, &mut hits[..2]), "{instructions:?}");
-            assert_eq!(simd::any_packet(&tree, &apart, &[None; 2]), None, "{instructions:?}");
+            assert_eq!(simd::any_packet(&tree, &rays, &ends(&rays), &[]), are_vectors.then_some(all));
+            assert!(!simd::closest_packet(&tree, &apart, &ends(&apart), &mut hits[..2]), "{instructions:?}");
+            assert_eq!(simd::any_packet(&tree, &apart, &ends(&apart), &[]), None, "{instructions:?}");
         }
     }
 

@@ -26,6 +26,7 @@ mod triangle;
 use std::sync::LazyLock;
 
 use super::WideBvh;
+use crate::accel::Ends;
 use crate::geometry::{Ray, ShapeHit};
 
 /// Instructions to traverse with.
@@ -105,28 +106,28 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
 
 /// See [`WideBvh::closest_packet`]; the tree is not empty. Says whether it was done.
 #[allow(unsafe_code)]
-pub fn closest_packet(tree: &WideBvh, rays: &[Ray], hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx2 => unsafe { packet::closest_avx2(tree, rays, hits) },
+        Instructions::Avx2 => unsafe { packet::closest_avx2(tree, rays, ends, hits) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx512 => unsafe { packet::closest_avx512(tree, rays, hits) },
+        Instructions::Avx512 => unsafe { packet::closest_avx512(tree, rays, ends, hits) },
         _ => false,
     }
 }
 
 /// See [`WideBvh::any_packet`]; the tree is not empty. A bit for each ray that hits; none where it was not done.
 #[allow(unsafe_code)]
-pub fn any_packet(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>]) -> Option<u32> {
+pub fn any_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx2 => unsafe { packet::any_avx2(tree, rays, except) },
+        Instructions::Avx2 => unsafe { packet::any_avx2(tree, rays, ends, except) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx512 => unsafe { packet::any_avx512(tree, rays, except) },
+        Instructions::Avx512 => unsafe { packet::any_avx512(tree, rays, ends, except) },
         _ => None,
     }
 }

@@ -2,13 +2,13 @@
 //! (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005), what is left is tested for sixteen rays
 //! side by side.
 
-use super::super::WideBvh;
-use super::super::node::{Child, Node, PACK, TrianglePack};
 use super::lanes::{F8, F16, Lanes, Pair};
 use super::single::prefetch;
 use super::stack::{Stack, entry, key};
 use super::triangle;
-use crate::accel::PACKET as SIZE;
+use crate::accel::wide_bvh::WideBvh;
+use crate::accel::wide_bvh::node::{Child, Node, PACK, TrianglePack};
+use crate::accel::{Ends, PACKET as SIZE};
 use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
@@ -20,25 +20,45 @@ type Row = [f32; SIZE];
 struct Rows {
     origin: [Row; 3],
     direction: [Row; 3],
-    t_max: Row,
+    ends: Ends,
+    /// A bit for each ray that is traced.
+    traced: u32,
+    /// The first of them.
+    first: Ray,
+    /// The greatest margin that boxes need for any of them.
+    margin: f32,
 }
 
 impl Rows {
-    /// Lanes beyond the rays repeat the first, with no length.
+    /// Lanes without a ray, or with one that ends below 0, repeat the first; none where there is no ray.
     #[inline(always)]
-    fn new(rays: &[Ray], first: &Ray) -> Self {
-        let mut rows = Self { origin: [[0.0; SIZE]; 3], direction: [[0.0; SIZE]; 3], t_max: [-1.0; SIZE] };
+    fn new(tree: &WideBvh, rays: &[Ray], ends: &Ends) -> Option<Self> {
+        let count = rays.len().min(SIZE);
+        let mut traced = 0;
+        for (lane, &end) in ends.iter().enumerate().take(count) {
+            traced |= u32::from(end >= 0.0) << lane;
+        }
+        let first = *rays.get(traced.trailing_zeros() as usize)?;
+        let mut rows = Self {
+            origin: [[0.0; SIZE]; 3],
+            direction: [[0.0; SIZE]; 3],
+            ends: [-1.0; SIZE],
+            traced,
+            first,
+            margin: 0.0,
+        };
         for lane in 0..SIZE {
-            let ray = rays.get(lane).unwrap_or(first);
+            let is_traced = traced & 1 << lane != 0;
+            let ray = if is_traced { &rays[lane] } else { &first };
             for axis in 0..3 {
                 rows.origin[axis][lane] = ray.origin[axis];
                 rows.direction[axis][lane] = ray.direction[axis];
             }
-            if lane < rays.len() {
-                rows.t_max[lane] = ray.t_max;
-            }
+            rows.ends[lane] = if is_traced { ends[lane] } else { -1.0 };
+            let margin = triangle_margin(ray.origin, &tree.bounds);
+            rows.margin = if margin > rows.margin { margin } else { rows.margin };
         }
-        rows
+        Some(rows)
     }
 }
 
@@ -65,13 +85,13 @@ struct Frustum {
 
 impl Frustum {
     #[inline(always)]
-    fn new<V: Lanes>(rows: &Rows, packet: &Packet<V>, margin: f32, like: F8) -> Self {
+    fn new<V: Lanes>(rows: &Rows, packet: &Packet<V>, like: F8) -> Self {
         let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
         let mut inverse = [[like; 2]; 3];
         for axis in 0..3 {
             let ends = ends(&rows.origin[axis]);
             let negative = packet.near[axis] & 1;
-            let margin = if negative == 1 { -margin } else { margin };
+            let margin = if negative == 1 { -rows.margin } else { rows.margin };
             near_origin[axis] = like.like(ends[1 - negative] + margin);
             far_origin[axis] = like.like(ends[negative] - margin);
             let mut row = [0.0; SIZE];
@@ -98,17 +118,6 @@ impl Frustum {
     }
 }
 
-/// The greatest margin that boxes need for any of the rays.
-#[inline(always)]
-fn margin(tree: &WideBvh, rays: &[Ray]) -> f32 {
-    let mut greatest = 0.0;
-    for ray in rays {
-        let own = triangle_margin(ray.origin, &tree.bounds);
-        greatest = if own > greatest { own } else { greatest };
-    }
-    greatest
-}
-
 /// The rows in registers, ready for boxes and triangles.
 struct Packet<V: Lanes> {
     /// Origins for near and far planes, a margin apart.
@@ -127,8 +136,8 @@ struct Packet<V: Lanes> {
 impl<V: Lanes> Packet<V> {
     /// None where the rays do not go the same way: along each axis to the same side, the longest the same for all.
     #[inline(always)]
-    fn new(rows: &Rows, first: &Ray, margin: f32, like: V) -> Option<Self> {
-        let axes = ShearedRay::new(first.origin, first.direction).axes();
+    fn new(rows: &Rows, like: V) -> Option<Self> {
+        let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();
         let mut own = Self {
             near_origin: [like; 3],
             far_origin: [like; 3],
@@ -139,7 +148,7 @@ impl<V: Lanes> Packet<V> {
             near: [0; 3],
         };
         let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
-        let margin = like.like(margin);
+        let margin = like.like(rows.margin);
         let (zero, one) = (like.like(0.0), like.like(1.0));
         let all = V::bits(zero.eq(zero));
         for axis in 0..3 {
@@ -227,16 +236,15 @@ struct Nearest<V: Lanes> {
 fn closest<V: Lanes>(
     tree: &WideBvh,
     rays: &[Ray],
+    ends: &Ends,
     hits: &mut [Option<ShapeHit>],
     like: V,
     like8: F8,
 ) -> bool {
-    let Some(first) = rays.first() else { return false };
-    let rows = Rows::new(rays, first);
-    let margin = margin(tree, rays);
-    let Some(packet) = Packet::new(&rows, first, margin, like) else { return false };
-    let frustum = Frustum::new(&rows, &packet, margin, like8);
-    let t_max = like.gather(&rows.t_max);
+    let Some(rows) = Rows::new(tree, rays, ends) else { return true };
+    let Some(packet) = Packet::new(&rows, like) else { return false };
+    let frustum = Frustum::new(&rows, &packet, like8);
+    let t_max = like.gather(&rows.ends);
     let pad = like.like(SLAB_PAD);
     let none = like.like(f32::from_bits(u32::MAX));
     let mut best = Nearest { t: t_max, u: t_max, v: t_max, id: none, found: 0 };
@@ -349,16 +357,21 @@ impl<V: Lanes> Nearest<V> {
 
 /// See [`WideBvh::any_packet`]; none where the rays do not go the same way.
 #[inline(always)]
-fn any<V: Lanes>(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>], like: V, like8: F8) -> Option<u32> {
-    let first = rays.first()?;
-    let rows = Rows::new(rays, first);
-    let margin = margin(tree, rays);
-    let packet = Packet::new(&rows, first, margin, like)?;
-    let frustum = Frustum::new(&rows, &packet, margin, like8);
-    let mut t_max = like.gather(&rows.t_max);
+fn any<V: Lanes>(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &Ends,
+    except: &[Option<u32>],
+    like: V,
+    like8: F8,
+) -> Option<u32> {
+    let Some(rows) = Rows::new(tree, rays, ends) else { return Some(0) };
+    let packet = Packet::new(&rows, like)?;
+    let frustum = Frustum::new(&rows, &packet, like8);
+    let mut t_max = like.gather(&rows.ends);
     let pad = like.like(SLAB_PAD);
     let mut end = t_max.greatest() * SLAB_PAD;
-    let all = (1_u32 << rays.len().min(SIZE)) - 1;
+    let all = rows.traced;
     let mut found = 0_u32;
     let mut stack: Stack<u64> = Stack::new();
     stack.push(key(0.0, 0));
@@ -385,7 +398,7 @@ fn any<V: Lanes>(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>], like: V, 
                                 continue;
                             }
                             let sure = hits.hit & 1 << ray != 0;
-                            if sure || doubtful_hit(&rays[ray], pack, lane) {
+                            if sure || doubtful_hit(&Ray { t_max: ends[ray], ..rays[ray] }, pack, lane) {
                                 found |= 1 << ray;
                             }
                         }
@@ -438,32 +451,32 @@ fn push_ordered<V: Lanes>(
 
 /// [`closest`] by AVX2.
 #[target_feature(enable = "avx2")]
-pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function has the instructions.
     let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
-    closest(tree, rays, hits, like, like8)
+    closest(tree, rays, ends, hits, like, like8)
 }
 
 /// [`any`] by AVX2.
 #[target_feature(enable = "avx2")]
-pub fn any_avx2(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>]) -> Option<u32> {
+pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function has the instructions.
     let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
-    any(tree, rays, except, like, like8)
+    any(tree, rays, ends, except, like, like8)
 }
 
 /// [`closest`] by AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function has the instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
-    closest(tree, rays, hits, like, like8)
+    closest(tree, rays, ends, hits, like, like8)
 }
 
 /// [`any`] by AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn any_avx512(tree: &WideBvh, rays: &[Ray], except: &[Option<u32>]) -> Option<u32> {
+pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function has the instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
-    any(tree, rays, except, like, like8)
+    any(tree, rays, ends, except, like, like8)
 }
