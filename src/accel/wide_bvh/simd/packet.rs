@@ -373,14 +373,19 @@ fn any<V: Lanes>(
     let mut end = t_max.greatest() * SLAB_PAD;
     let all = rows.traced;
     let mut found = 0_u32;
-    let mut stack: Stack<u64> = Stack::new();
-    stack.push(key(0.0, 0));
-    while let Some(key) = stack.pop() {
-        match Child::decode(key as u32) {
+    let mut stack: Stack<u32> = Stack::new();
+    stack.push(0);
+    while let Some(code) = stack.pop() {
+        match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (near, met) = frustum.enter(node, like8.like(end));
-                push_ordered(tree, node, near, met, &mut stack, &packet, t_max * pad);
+                let (_, mut met) = frustum.enter(node, like8.like(end));
+                while met != 0 {
+                    let slot = met.trailing_zeros() as usize % 8;
+                    met &= met - 1;
+                    prefetch(tree, node.children[slot]);
+                    stack.push_if(node.children[slot], packet.meets(node, slot, t_max * pad));
+                }
             }
             Child::Leaf { first, count } => {
                 let before = found;

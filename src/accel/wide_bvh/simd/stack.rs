@@ -25,6 +25,13 @@ impl<T: Copy> Stack<T> {
         self.size += 1;
     }
 
+    /// Put one on top if it is wanted, without a branch.
+    #[inline(always)]
+    pub fn push_if(&mut self, entry: T, is_wanted: bool) {
+        self.entries[self.size].write(entry);
+        self.size += usize::from(is_wanted);
+    }
+
     /// Take the top one.
     #[inline(always)]
     pub fn pop(&mut self) -> Option<T> {
