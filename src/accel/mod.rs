@@ -12,17 +12,18 @@ mod pathological;
 #[cfg(test)]
 mod tests;
 
-pub use bvh::Bvh;
+pub use bvh::{AnyTest, Bvh, ClosestTest};
 pub use kd_tree::KdTree;
-pub use wide_bvh::WideBvh;
+pub use wide_bvh::{Instructions, Loops, WideBvh};
 
-/// Rays that are traced together.
-pub const PACKET: usize = 16;
-
-/// Where each ray of a packet ends, in place of its own `t_max`; below 0 where there is none, or where it is not traced.
-pub type Ends = [f32; PACKET];
+pub use crate::geometry::rows::{Ends, PACKET};
 
 /// The ends of at most [`PACKET`] rays.
+#[inline(always)]
 pub fn ends(rays: &[crate::geometry::Ray]) -> Ends {
-    std::array::from_fn(|lane| rays.get(lane).map_or(-1.0, |ray| ray.t_max))
+    let mut ends = [-1.0; PACKET];
+    for (end, ray) in ends.iter_mut().zip(rays) {
+        *end = ray.t_max;
+    }
+    ends
 }

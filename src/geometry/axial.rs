@@ -37,11 +37,13 @@ impl AxialFrame {
     }
 
     /// A point from the world.
+    #[inline(always)]
     pub fn local(&self, point: DVec3) -> DVec3 {
         self.axes.transpose() * (point - self.origin)
     }
 
     /// A ray's line from its point nearest to the origin.
+    #[inline(always)]
     pub fn line(&self, ray: &RayF64) -> Line {
         let origin = self.local(ray.origin);
         let direction = self.axes.transpose() * ray.direction;

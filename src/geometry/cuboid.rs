@@ -1,5 +1,6 @@
 //! Oriented boxes, in double precision.
 
+use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::surface::flat_axes;
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
@@ -49,6 +50,40 @@ impl Cuboid {
         [near, far]
             .into_iter()
             .find_map(|(t, face)| ray.accept(t).map(|t| ShapeHit { t, primitive: face, u: 0.0, v: 0.0 }))
+    }
+
+    /// [`Cuboid::intersect`] side by side.
+    #[inline(always)]
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+        let axes = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];
+        let half = self.half.to_array();
+        for lane in 0..PACKET {
+            let ray = rays.line(lane);
+            let from_center = ray.origin - self.center;
+            let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+            let (mut near_face, mut far_face) = (0, 0);
+            let mut is_beside = false;
+            for axis in 0..3 {
+                let (o, d, h) = (axes[axis].dot(from_center), axes[axis].dot(ray.direction), half[axis]);
+                let is_parallel = d == 0.0;
+                is_beside |= is_parallel & (o.abs() > h);
+                let (enter, leave) = ((-h.copysign(d) - o) / d, (h.copysign(d) - o) / d);
+                let positive = u32::from(d > 0.0);
+                let face = 2 * axis as u32;
+                let is_nearer = !is_parallel & (enter > near);
+                near = if is_nearer { enter } else { near };
+                near_face = if is_nearer { face + 1 - positive } else { near_face };
+                let is_sooner = !is_parallel & (leave < far);
+                far = if is_sooner { leave } else { far };
+                far_face = if is_sooner { face + positive } else { far_face };
+            }
+            let is_met = !is_beside & (near <= far);
+            let (enter, leave) = (accept(near, ends[lane]), accept(far, ends[lane]));
+            let is_inside = enter.is_nan();
+            let t = if is_inside { leave } else { enter };
+            hits.t[lane] = if is_met { t } else { f32::NAN };
+            hits.primitive[lane] = if is_inside { far_face } else { near_face };
+        }
     }
 
     /// The surface at a hit: the point is put onto the face.

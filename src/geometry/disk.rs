@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::axial::{AxialFrame, exact_t, hit};
+use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3};
 
@@ -27,6 +28,19 @@ impl Disk {
     /// The one root of the plane, inside the border; none for rays in the plane.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(hit)
+    }
+
+    /// [`Disk::intersect`] side by side.
+    #[inline(always)]
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+        let radius = self.radius * (1.0 + BORDER);
+        for lane in 0..PACKET {
+            let line = self.frame.line(&rays.line(lane));
+            let along = -line.foot.z / line.direction.z;
+            let across = (line.foot + line.direction * along).truncate().length();
+            let t = accept(line.start + along, ends[lane]);
+            hits.t[lane] = if across <= radius { t } else { f32::NAN };
+        }
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {

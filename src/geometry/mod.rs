@@ -13,6 +13,7 @@ pub mod mesh;
 pub mod parallelogram;
 pub mod plane;
 pub mod ray;
+pub mod rows;
 pub mod sphere;
 pub mod surface;
 pub mod torus;

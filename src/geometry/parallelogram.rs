@@ -1,5 +1,6 @@
 //! Quads: squares and any other parallelograms, in double precision.
 
+use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
@@ -47,6 +48,30 @@ impl Parallelogram {
         let (s, t) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
         let inside = |x: f64| (-BORDER..=1.0 + BORDER).contains(&x);
         (inside(s) && inside(t)).then(|| ShapeHit::at(accepted))
+    }
+
+    /// [`Parallelogram::intersect`] side by side.
+    #[inline(always)]
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+        let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], false);
+        for lane in 0..PACKET {
+            let ray = rays.line(lane);
+            above[lane] = self.normal.dot(self.corner - ray.origin);
+            along[lane] = self.normal.dot(ray.direction);
+            may_hit |= may_accept(above[lane], along[lane], ends[lane]);
+        }
+        if !may_hit {
+            return;
+        }
+        for lane in 0..PACKET {
+            let ray = rays.line(lane);
+            let t = above[lane] / along[lane];
+            let from_corner = ray.direction * t - (self.corner - ray.origin);
+            let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
+            let is_inside = (s >= -BORDER) & (s <= 1.0 + BORDER) & (r >= -BORDER) & (r <= 1.0 + BORDER);
+            let accepted = accept(t, ends[lane]);
+            hits.t[lane] = if is_inside { accepted } else { f32::NAN };
+        }
     }
 
     /// The surface at a hit.

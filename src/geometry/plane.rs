@@ -1,5 +1,6 @@
 //! Infinite planes, in double precision.
 
+use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface::flat_axes;
 use super::{RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
@@ -27,6 +28,26 @@ impl Plane {
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
         (t < f64::from(f32::MAX)).then(|| ray.accept(t)).flatten().map(ShapeHit::at)
+    }
+
+    /// [`Plane::intersect`] side by side.
+    #[inline(always)]
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+        let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], false);
+        for lane in 0..PACKET {
+            let ray = rays.line(lane);
+            above[lane] = self.normal.dot(self.point - ray.origin);
+            along[lane] = self.normal.dot(ray.direction);
+            may_hit |= may_accept(above[lane], along[lane], ends[lane]);
+        }
+        if !may_hit {
+            return;
+        }
+        for lane in 0..PACKET {
+            let t = above[lane] / along[lane];
+            let accepted = accept(t, ends[lane]);
+            hits.t[lane] = if t < f64::from(f32::MAX) { accepted } else { f32::NAN };
+        }
     }
 
     /// The surface at a hit; one texture tile per unit of length.

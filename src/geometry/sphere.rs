@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
@@ -33,6 +34,39 @@ impl Sphere {
         let (t0, t1) = (c / q, q / a);
         let (near, far) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
         ray.accept(near).or_else(|| ray.accept(far)).map(ShapeHit::at)
+    }
+
+    /// [`Sphere::intersect`] side by side.
+    #[inline(always)]
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+        let (mut discriminants, mut may_hit) = ([0.0; PACKET], false);
+        for lane in 0..PACKET {
+            let ray = rays.line(lane);
+            let to_origin = ray.origin - self.center;
+            let a = ray.direction.length_squared();
+            let b = -to_origin.dot(ray.direction);
+            let foot = to_origin + ray.direction * (b / a);
+            discriminants[lane] = self.radius * self.radius - foot.length_squared();
+            may_hit |= (discriminants[lane] >= 0.0) & (ends[lane] >= 0.0);
+        }
+        if !may_hit {
+            return;
+        }
+        for lane in 0..PACKET {
+            let ray = rays.line(lane);
+            let to_origin = ray.origin - self.center;
+            let a = ray.direction.length_squared();
+            let b = -to_origin.dot(ray.direction);
+            let distance = to_origin.length();
+            let c = (distance - self.radius) * (distance + self.radius);
+            let q = b + (a * discriminants[lane]).sqrt().copysign(b);
+            let (t0, t1) = (c / q, q / a);
+            let is_in_order = t0 < t1;
+            let near = accept(if is_in_order { t0 } else { t1 }, ends[lane]);
+            let far = accept(if is_in_order { t1 } else { t0 }, ends[lane]);
+            let t = if near.is_nan() { far } else { near };
+            hits.t[lane] = if discriminants[lane] >= 0.0 { t } else { f32::NAN };
+        }
     }
 
     /// The surface at a hit.

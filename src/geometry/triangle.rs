@@ -1,5 +1,6 @@
 //! Single triangles, in double precision.
 
+use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -28,6 +29,26 @@ impl Triangle {
         let normal = (b - a).cross(c - a);
         let t = ray.accept(normal.dot(a) / normal.dot(d))?;
         (sum != 0.0).then(|| ShapeHit { t, primitive: 0, u: (wb / sum) as f32, v: (wc / sum) as f32 })
+    }
+
+    /// [`Triangle::intersect`] side by side.
+    #[inline(always)]
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+        for lane in 0..PACKET {
+            let ray = rays.line(lane);
+            let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
+            let d = ray.direction;
+            let (wa, wb, wc) = (d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a)));
+            let is_left = (wa < 0.0) | (wb < 0.0) | (wc < 0.0);
+            let is_right = (wa > 0.0) | (wb > 0.0) | (wc > 0.0);
+            let sum = wa + wb + wc;
+            let normal = (b - a).cross(c - a);
+            let t = accept(normal.dot(a) / normal.dot(d), ends[lane]);
+            let is_met = !(is_left & is_right) & (sum != 0.0);
+            hits.t[lane] = if is_met { t } else { f32::NAN };
+            hits.u[lane] = (wb / sum) as f32;
+            hits.v[lane] = (wc / sum) as f32;
+        }
     }
 
     /// The surface at a hit; its texture coordinates are (0, 0), (1, 0), (0, 1) at the corners.

@@ -1,6 +1,6 @@
 //! All shapes under one tree; those without an end beside it.
 
-use crate::accel::Bvh;
+use crate::accel::{Bvh, Instructions};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint};
 use crate::lights::Source;
@@ -26,6 +26,7 @@ pub struct Geometry {
     unbounded: Vec<u32>,
     /// What it was built from, to know when it can serve again.
     described: Vec<description::Shape>,
+    instructions: Instructions,
 }
 
 impl Geometry {
@@ -42,7 +43,8 @@ impl Geometry {
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
-        Ok(Self { tree: Bvh::build(&boxes, token)?, shapes, unbounded, described })
+        let (tree, instructions) = (Bvh::build(&boxes, token)?, Instructions::best());
+        Ok(Self { shapes, tree, unbounded, described, instructions })
     }
 
     /// The shapes; objects are known by their index.
@@ -58,6 +60,18 @@ impl Geometry {
     /// The shapes that have none.
     pub(super) fn unbounded(&self) -> &[u32] {
         &self.unbounded
+    }
+
+    /// The same, with packets traced by other instructions.
+    #[cfg(test)]
+    pub(super) fn with(mut self, instructions: Instructions) -> Self {
+        self.instructions = instructions;
+        self
+    }
+
+    /// What packets are traced by.
+    pub(super) fn instructions(&self) -> Instructions {
+        self.instructions
     }
 
     /// Whether building from these would give the same.

@@ -8,6 +8,7 @@ mod lower;
 pub mod mesh_tree;
 mod packet;
 pub mod shape;
+mod side_by_side;
 pub mod textures;
 
 use std::collections::HashMap;

@@ -1,150 +1,178 @@
 //! Up to sixteen rays at once through a scene: what they hit is what each hits alone.
 
-use super::shape::{MeshInstance, Shape};
+use super::side_by_side;
 use super::{Geometry, Hit};
-use crate::accel::{Ends, PACKET, ends};
-use crate::geometry::{Ray, RayF64};
+use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET, ends};
+use crate::geometry::Ray;
+use crate::geometry::rows::{HitRows, RayRows};
 use crate::lights::Source;
-use crate::math::transform::Transform;
-
-/// Rays of a packet whose bits are set.
-fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = bits.trailing_zeros() as usize;
-        (bits != 0).then(|| {
-            bits &= bits - 1;
-            lane
-        })
-    })
-}
-
-/// Of the rays in a packet, a bit for each.
-fn all(rays: &[Ray]) -> u32 {
-    (1 << rays.len()) - 1
-}
-
-/// The ends of the rays of `met`; the others end below 0.
-fn of_these(met: u32, ends: &Ends) -> Ends {
-    std::array::from_fn(|lane| if met & 1 << lane != 0 { ends[lane] } else { -1.0 })
-}
 
 impl Geometry {
     /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
-        hits.fill(None);
-        let mut doubles = Doubles::default();
-        let mut test = |id: u32, met: u32, ends: &mut Ends| {
-            let mut found = [None; PACKET];
-            match &self.shapes()[id as usize] {
-                Shape::Mesh(mesh) => {
-                    let found = &mut found[..rays.len()];
-                    let own_ends = of_these(met, ends);
-                    in_mesh(mesh, rays, met, |local| mesh.tree.closest_packet(local, &own_ends, found));
-                }
-                shape => {
-                    for lane in lanes(met) {
-                        let segment = Ray { t_max: ends[lane], ..rays[lane] };
-                        found[lane] = shape.closest(&segment, doubles.of(rays, lane, segment.t_max));
-                    }
-                }
-            }
-            for lane in lanes(met) {
-                let Some(shape) = found[lane] else { continue };
-                if hits[lane].is_none_or(|best| (shape.t, id) < (best.shape.t, best.object)) {
-                    hits[lane] = Some(Hit { shape, object: id });
-                    ends[lane] = shape.t;
-                }
-            }
-        };
-        let mut ends = ends(rays);
-        for &id in self.unbounded() {
-            test(id, all(rays), &mut ends);
-        }
-        self.tree().visit_packet(rays, &mut ends, |id, met, ends| test(id, met & all(rays), ends));
+        self.instructions().run(Closest { geometry: self, rays, hits });
     }
 
     /// [`Geometry::occluded`] of at most [`PACKET`] segments, each with the light that it goes to: a bit for each that is.
     pub fn occluded_packet(&self, rays: &[Ray], sources: &[Source]) -> u32 {
         debug_assert!(rays.len() <= PACKET && rays.len() == sources.len());
-        let mut doubles = Doubles::default();
-        let mut occluded = 0;
-        let mut test = |id: u32, met: u32, ends: &mut Ends| {
-            let (mut own, mut has_own_parts) = (0, false);
-            for (lane, source) in sources.iter().enumerate() {
-                own |= u32::from(*source == Source::Object(id)) << lane;
-                has_own_parts |= matches!(source, Source::Primitive(object, _) if *object == id);
-            }
-            let met = met & !occluded & !own;
-            if met == 0 {
-                return;
-            }
-            let except = |lane: usize| match sources.get(lane) {
-                Some(Source::Primitive(object, part)) if *object == id => Some(*part),
-                _ => None,
-            };
-            let mut found = 0;
-            match &self.shapes()[id as usize] {
-                Shape::Mesh(mesh) => {
-                    let own_ends = of_these(met, ends);
-                    let parts: [_; PACKET];
-                    let mut except_parts: &[Option<u32>] = &[];
-                    if has_own_parts {
-                        parts = std::array::from_fn(except);
-                        except_parts = &parts[..rays.len()];
-                    }
-                    in_mesh(mesh, rays, met, |local| {
-                        found = mesh.tree.any_packet(local, &own_ends, except_parts);
-                    });
-                }
-                shape => {
-                    for lane in lanes(met) {
-                        let hit =
-                            shape.any(&rays[lane], doubles.of(rays, lane, rays[lane].t_max), except(lane));
-                        found |= u32::from(hit) << lane;
-                    }
-                }
-            }
-            occluded |= found;
-            lanes(found).for_each(|lane| ends[lane] = -1.0);
+        self.instructions().run(Occluded { geometry: self, rays, sources })
+    }
+}
+
+/// [`Geometry::closest_packet`].
+struct Closest<'a> {
+    geometry: &'a Geometry,
+    rays: &'a [Ray],
+    hits: &'a mut [Option<Hit>],
+}
+
+impl Loops for Closest<'_> {
+    type Done = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let rows = RayRows::new(self.rays);
+        let mut ends = ends(self.rays);
+        let mut nearest = Nearest {
+            geometry: self.geometry,
+            rays: self.rays,
+            rows: &rows,
+            hits: HitRows::none(),
+            object: [NONE; PACKET],
         };
-        let mut ends = ends(rays);
-        for &id in self.unbounded() {
-            test(id, all(rays), &mut ends);
+        self.geometry.tree().closest_packet(&rows, &mut ends, self.geometry.unbounded(), &mut nearest);
+        for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET) {
+            let object = nearest.object[lane];
+            *hit = nearest.hits.get(lane).map(|shape| Hit { shape, object });
         }
-        self.tree().visit_packet(rays, &mut ends, |id, met, ends| test(id, met & all(rays), ends));
-        occluded
     }
 }
 
-/// Those rays of a packet that are in `met` in a mesh's coordinates, the others as they are.
-#[inline]
-fn in_mesh(mesh: &MeshInstance, rays: &[Ray], met: u32, trace: impl FnOnce(&[Ray])) {
-    if mesh.transform == Transform::IDENTITY {
-        return trace(rays);
-    }
-    let mut local = [rays[0]; PACKET];
-    for lane in lanes(met) {
-        local[lane] = mesh.local_ray(&rays[lane]);
-    }
-    trace(&local[..rays.len()]);
+/// No object.
+const NONE: u32 = u32::MAX;
+
+/// The nearest hits so far, and of which objects they are.
+struct Nearest<'a> {
+    geometry: &'a Geometry,
+    rays: &'a [Ray],
+    rows: &'a RayRows,
+    hits: HitRows,
+    object: [u32; PACKET],
 }
 
-/// The rays in double precision, where a shape asks for one.
-#[derive(Default)]
-struct Doubles {
-    rays: Option<[RayF64; PACKET]>,
+impl ClosestTest for Nearest<'_> {
+    #[inline(always)]
+    fn test(&mut self, id: u32, met: u32, ends: &mut Ends) {
+        let shape = &self.geometry.shapes()[id as usize];
+        let mut found = HitRows::none();
+        side_by_side::closest(shape, self.rays, self.rows, met, &of_these(met, ends), &mut found);
+        for lane in 0..PACKET {
+            let t = found.t[lane];
+            let is_nearer = (t < ends[lane]) | ((t == ends[lane]) & (id < self.object[lane]));
+            ends[lane] = if is_nearer { t } else { ends[lane] };
+            self.hits.t[lane] = if is_nearer { t } else { self.hits.t[lane] };
+            self.object[lane] = if is_nearer { id } else { self.object[lane] };
+            let (primitive, own) = (found.primitive[lane], self.hits.primitive[lane]);
+            self.hits.primitive[lane] = if is_nearer { primitive } else { own };
+            self.hits.u[lane] = if is_nearer { found.u[lane] } else { self.hits.u[lane] };
+            self.hits.v[lane] = if is_nearer { found.v[lane] } else { self.hits.v[lane] };
+        }
+    }
 }
 
-impl Doubles {
-    /// The ray of a lane up to `end`.
-    fn of(&mut self, rays: &[Ray], lane: usize, end: f32) -> &RayF64 {
-        let doubles = self
-            .rays
-            .get_or_insert_with(|| std::array::from_fn(|lane| rays[lane.min(rays.len() - 1)].to_f64()));
-        doubles[lane].t_max = f64::from(end);
-        &doubles[lane]
+/// [`Geometry::occluded_packet`].
+struct Occluded<'a> {
+    geometry: &'a Geometry,
+    rays: &'a [Ray],
+    sources: &'a [Source],
+}
+
+impl Loops for Occluded<'_> {
+    type Done = u32;
+
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let rows = RayRows::new(self.rays);
+        let ends = ends(self.rays);
+        let mut blockers = Blockers {
+            geometry: self.geometry,
+            rays: self.rays,
+            rows: &rows,
+            sources: SourceRows::new(self.sources),
+        };
+        self.geometry.tree().any_packet(&rows, &ends, self.geometry.unbounded(), &mut blockers)
     }
+}
+
+/// Looks for what is in the way of shadow rays.
+struct Blockers<'a> {
+    geometry: &'a Geometry,
+    rays: &'a [Ray],
+    rows: &'a RayRows,
+    sources: SourceRows,
+}
+
+impl AnyTest for Blockers<'_> {
+    #[inline(always)]
+    fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32 {
+        let (whole, in_part) = self.sources.of(id);
+        let met = met & !whole;
+        if met == 0 {
+            return 0;
+        }
+        let shape = &self.geometry.shapes()[id as usize];
+        let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
+        side_by_side::any(shape, self.rays, self.rows, met, &of_these(met, ends), except)
+    }
+}
+
+/// The lights of shadow rays, [`Source`]s side by side.
+struct SourceRows {
+    object: [u32; PACKET],
+    part: [u32; PACKET],
+    /// Rays whose light is a part of an object.
+    in_part: u32,
+}
+
+impl SourceRows {
+    #[inline(always)]
+    fn new(sources: &[Source]) -> Self {
+        let mut own = Self { object: [NONE; PACKET], part: [0; PACKET], in_part: 0 };
+        for (lane, source) in sources.iter().enumerate().take(PACKET) {
+            match *source {
+                Source::Nothing => {}
+                Source::Object(object) => own.object[lane] = object,
+                Source::Primitive(object, part) => {
+                    (own.object[lane], own.part[lane]) = (object, part);
+                    own.in_part |= 1 << lane;
+                }
+            }
+        }
+        own
+    }
+
+    /// Rays to the whole of an object, and rays to a part of it.
+    #[inline(always)]
+    fn of(&self, id: u32) -> (u32, u32) {
+        let mut own = 0;
+        for lane in 0..PACKET {
+            let bit = 1 << lane;
+            own |= if self.object[lane] == id { bit } else { 0 };
+        }
+        (own & !self.in_part, own & self.in_part)
+    }
+}
+
+/// The ends of the rays of `met`; the others end below 0.
+#[inline(always)]
+fn of_these(met: u32, ends: &Ends) -> Ends {
+    let mut own = [-1.0; PACKET];
+    for lane in 0..PACKET {
+        own[lane] = if met & 1 << lane != 0 { ends[lane] } else { -1.0 };
+    }
+    own
 }
 
 #[cfg(test)]
@@ -152,14 +180,17 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::accel::Instructions;
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
+    use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
+    use crate::world::shape::{MeshInstance, Shape};
 
     /// Random numbers in [−1, 1).
     fn random(seed: u64) -> impl FnMut() -> f32 {
@@ -202,7 +233,9 @@ mod tests {
     #[test]
     fn a_packet_sees_what_its_rays_see_alone() {
         for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
-            assert_packets(&geometry(accel));
+            for instructions in Instructions::ALL {
+                assert_packets(&geometry(accel).with(instructions));
+            }
         }
     }
 

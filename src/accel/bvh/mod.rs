@@ -6,6 +6,8 @@ mod traverse;
 
 use crate::geometry::Aabb;
 
+pub use packet::{AnyTest, ClosestTest};
+
 /// Most primitives in a leaf that the surface area heuristic may make.
 const LEAF_SIZE: usize = 4;
 

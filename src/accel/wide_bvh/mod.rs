@@ -11,7 +11,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-pub use simd::Instructions;
+pub use simd::{Instructions, Loops};
 
 use crate::accel::{Ends, PACKET};
 

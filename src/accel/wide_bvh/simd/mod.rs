@@ -5,6 +5,8 @@
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod lanes;
+#[allow(unsafe_code)]
+mod loops;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod packet;
@@ -24,6 +26,8 @@ mod stack;
 mod triangle;
 
 use std::sync::LazyLock;
+
+pub use loops::Loops;
 
 use super::WideBvh;
 use crate::accel::Ends;
@@ -57,7 +61,8 @@ impl Instructions {
 
     /// These, or the best that the processor has where it has not got them.
     pub fn available(self) -> Self {
-        self.min(available())
+        static AVAILABLE: LazyLock<Instructions> = LazyLock::new(available);
+        self.min(*AVAILABLE)
     }
 }
 

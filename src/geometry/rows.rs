@@ -1,0 +1,106 @@
+//! Up to sixteen rays side by side, a row for each coordinate: what a shape tests in a loop without branches, which
+//! compilers turn into vector instructions. Every lane gets the bits that its ray gets alone.
+
+use super::{Ray, RayF64, ShapeHit};
+use crate::math::DVec3;
+
+/// Rays that are traced together.
+pub const PACKET: usize = 16;
+
+/// One number for each ray of a packet.
+pub type Row = [f32; PACKET];
+
+/// Where each ray of a packet ends, in place of its own `t_max`; below 0 where there is none, or where it is not traced.
+pub type Ends = Row;
+
+/// The rays of a packet; lanes without a ray are all 0, and have no end.
+#[derive(Clone, Debug)]
+pub struct RayRows {
+    /// Coordinates of where they start.
+    pub origin: [Row; 3],
+    /// Coordinates of where they go.
+    pub direction: [Row; 3],
+}
+
+impl RayRows {
+    /// At most [`PACKET`] rays.
+    #[inline(always)]
+    pub fn new(rays: &[Ray]) -> Self {
+        let mut own = Self { origin: [[0.0; PACKET]; 3], direction: [[0.0; PACKET]; 3] };
+        for (lane, ray) in rays.iter().enumerate().take(PACKET) {
+            let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+            for axis in 0..3 {
+                own.origin[axis][lane] = origin[axis];
+                own.direction[axis][lane] = direction[axis];
+            }
+        }
+        own
+    }
+
+    /// The ray in a lane in double precision, without an end.
+    #[inline(always)]
+    pub(super) fn line(&self, lane: usize) -> RayF64 {
+        let [ox, oy, oz] = &self.origin;
+        let [dx, dy, dz] = &self.direction;
+        RayF64 {
+            origin: DVec3::new(f64::from(ox[lane]), f64::from(oy[lane]), f64::from(oz[lane])),
+            direction: DVec3::new(f64::from(dx[lane]), f64::from(dy[lane]), f64::from(dz[lane])),
+            t_max: f64::INFINITY,
+        }
+    }
+}
+
+/// What the rays of a packet hit, [`ShapeHit`]s side by side.
+#[derive(Clone, Debug)]
+pub struct HitRows {
+    /// [`ShapeHit::t`]; NaN where nothing is hit.
+    pub t: Row,
+    /// [`ShapeHit::primitive`].
+    pub primitive: [u32; PACKET],
+    /// [`ShapeHit::u`].
+    pub u: Row,
+    /// [`ShapeHit::v`].
+    pub v: Row,
+}
+
+impl HitRows {
+    /// No hit.
+    #[inline(always)]
+    pub fn none() -> Self {
+        Self { t: [f32::NAN; PACKET], primitive: [0; PACKET], u: [0.0; PACKET], v: [0.0; PACKET] }
+    }
+
+    /// Write down a hit.
+    pub fn put(&mut self, lane: usize, hit: &ShapeHit) {
+        self.t[lane] = hit.t;
+        self.primitive[lane] = hit.primitive;
+        (self.u[lane], self.v[lane]) = (hit.u, hit.v);
+    }
+
+    /// What the ray in a lane hits.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Option<ShapeHit> {
+        let hit =
+            ShapeHit { t: self.t[lane], primitive: self.primitive[lane], u: self.u[lane], v: self.v[lane] };
+        (!hit.t.is_nan()).then_some(hit)
+    }
+}
+
+/// [`RayF64::accept`] without a branch: NaN in place of nothing.
+#[inline(always)]
+pub(super) fn accept(t: f64, end: f32) -> f32 {
+    let single = t as f32;
+    let is_on_it = (single > 0.0) & (single < f32::INFINITY) & (single <= end);
+    if is_on_it { single } else { f32::NAN }
+}
+
+/// Whether [`accept`] may take the quotient of `above` and `along`; where not, nobody need divide. The factor is more than
+/// rounding to `f32` makes of the quotient, the terms make up for what is too small for it.
+#[inline(always)]
+pub(super) fn may_accept(above: f64, along: f64, end: f32) -> bool {
+    let is_ahead = ((above > 0.0) & (along > 0.0)) | ((above < 0.0) & (along < 0.0));
+    let reach = along.abs() * ((f64::from(end) + f64::from(f32::MIN_POSITIVE)) * (1.0 + 1e-6)) + 1e-290;
+    // Not `<=`: an infinite end times 0 is NaN.
+    let is_beyond = above.abs() > reach;
+    is_ahead & !is_beyond
+}
