@@ -23,18 +23,28 @@ pub struct RayRows {
 }
 
 impl RayRows {
-    /// At most [`PACKET`] rays.
+    /// At most [`PACKET`] rays, and their ends.
     #[inline(always)]
-    pub fn new(rays: &[Ray]) -> Self {
-        let mut own = Self { origin: [[0.0; PACKET]; 3], direction: [[0.0; PACKET]; 3] };
-        for (lane, ray) in rays.iter().enumerate().take(PACKET) {
-            let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
-            for axis in 0..3 {
-                own.origin[axis][lane] = origin[axis];
-                own.direction[axis][lane] = direction[axis];
-            }
+    pub fn new(rays: &[Ray]) -> (Self, Ends) {
+        let mut rows = Self { origin: [[0.0; PACKET]; 3], direction: [[0.0; PACKET]; 3] };
+        let mut ends = [-1.0; PACKET];
+        // Compiled once for the full packets, whose loop has a known length.
+        match <&[Ray; PACKET]>::try_from(rays) {
+            Ok(full) => rows.fill(&mut ends, full),
+            Err(_) => rows.fill(&mut ends, rays),
         }
-        own
+        (rows, ends)
+    }
+
+    #[inline(always)]
+    fn fill(&mut self, ends: &mut Ends, rays: &[Ray]) {
+        for (lane, ray) in rays.iter().enumerate().take(PACKET) {
+            for axis in 0..3 {
+                self.origin[axis][lane] = ray.origin[axis];
+                self.direction[axis][lane] = ray.direction[axis];
+            }
+            ends[lane] = ray.t_max;
+        }
     }
 
     /// The ray in a lane in double precision, without an end.

@@ -2,7 +2,7 @@
 
 use super::side_by_side;
 use super::{Geometry, Hit};
-use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET, ends};
+use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::lights::Source;
@@ -33,8 +33,7 @@ impl Loops for Closest<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let rows = RayRows::new(self.rays);
-        let mut ends = ends(self.rays);
+        let (rows, mut ends) = RayRows::new(self.rays);
         let mut nearest = Nearest {
             geometry: self.geometry,
             rays: self.rays,
@@ -94,8 +93,7 @@ impl Loops for Occluded<'_> {
 
     #[inline(always)]
     fn run(self) -> u32 {
-        let rows = RayRows::new(self.rays);
-        let ends = ends(self.rays);
+        let (rows, ends) = RayRows::new(self.rays);
         let mut blockers = Blockers {
             geometry: self.geometry,
             rays: self.rays,

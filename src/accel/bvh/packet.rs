@@ -69,27 +69,31 @@ impl<'a> SlabPacket<'a> {
 }
 
 impl Stretches {
-    /// A bit for each ray that meets the box before its end.
-    #[inline(always)]
-    fn met(&self) -> u32 {
-        let mut met = 0;
-        for lane in 0..PACKET {
-            let bit = 1 << lane;
-            met |= if self.near[lane] <= self.far[lane] { bit } else { 0 };
-        }
-        met
-    }
-
-    /// Where the first of the rays that meet the box enters it.
+    /// Where the first of the rays that meet the box enters it. Bits of numbers from 0 on are ordered as these are, and take
+    /// no care for NaN.
     #[inline(always)]
     fn first(&self) -> f32 {
-        let mut first = f32::INFINITY;
+        let mut first = f32::INFINITY.to_bits();
         for lane in 0..PACKET {
-            let near = if self.near[lane] <= self.far[lane] { self.near[lane] } else { f32::INFINITY };
+            let (near, far) = (self.near[lane], self.far[lane]);
+            let near = if near <= far { near.to_bits() } else { f32::INFINITY.to_bits() };
             first = if near < first { near } else { first };
         }
-        first
+        f32::from_bits(first)
     }
+}
+
+/// A bit for each ray that meets the first box before its end, and for each that meets the second.
+#[inline(always)]
+fn met(left: &Stretches, right: &Stretches) -> [u32; 2] {
+    let mut met = 0_u32;
+    for lane in 0..PACKET {
+        let (left_bit, right_bit) = (1 << lane, 1 << (lane + 16));
+        let in_left = if left.near[lane] <= left.far[lane] { left_bit } else { 0 };
+        let in_right = if right.near[lane] <= right.far[lane] { right_bit } else { 0 };
+        met |= in_left | in_right;
+    }
+    [met & 0xffff, met >> 16]
 }
 
 /// A bit for each ray that is traced.
@@ -103,14 +107,15 @@ fn traced(ends: &Ends) -> u32 {
     bits
 }
 
-/// The end of the ray that goes on longest.
+/// The end of the ray that goes on longest; below 0 where no ray is traced. Bits are ordered as in [`Stretches::first`].
 #[inline(always)]
 fn greatest(ends: &Ends) -> f32 {
-    let mut greatest = -1.0;
+    let mut greatest = i32::MIN;
     for lane in 0..PACKET {
-        greatest = if ends[lane] > greatest { ends[lane] } else { greatest };
+        let end = ends[lane].to_bits() as i32;
+        greatest = if end > greatest { end } else { greatest };
     }
-    greatest
+    f32::from_bits(greatest as u32)
 }
 
 impl Bvh {
@@ -127,14 +132,14 @@ impl Bvh {
         let slabs = SlabPacket::new(rays);
         let mut stack = [(0.0_f32, 0_u32, Child::NONE); DEEP_STACK];
         let mut size = 0;
-        let (mut leaf, mut met) = (outside, traced(ends));
+        let (mut leaf, mut in_leaf) = (outside, traced(ends));
         if !self.nodes.is_empty() {
-            stack[0] = (0.0, met, Child { first: 0, count: 0 });
+            stack[0] = (0.0, in_leaf, Child { first: 0, count: 0 });
             size = 1;
         }
         loop {
             for &id in leaf {
-                closest.test(id, met, ends);
+                closest.test(id, in_leaf, ends);
             }
             let end = greatest(ends) * SLAB_PAD;
             loop {
@@ -148,20 +153,25 @@ impl Bvh {
                 }
                 if child.count > 0 {
                     leaf = &self.order[child.first as usize..(child.first + child.count) as usize];
-                    met = in_it;
+                    in_leaf = in_it;
                     break;
                 }
                 let node = &self.nodes[child.first as usize];
                 let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
-                let (left_met, right_met) = (left.met(), right.met());
+                let [left_met, right_met] = met(&left, &right);
+                if left_met == 0 || right_met == 0 {
+                    let side = usize::from(left_met == 0);
+                    stack[size] = (0.0, left_met | right_met, node.child[side]);
+                    size += usize::from(left_met | right_met != 0);
+                    continue;
+                }
                 let (left_first, right_first) = (left.first(), right.first());
+                let near = usize::from(right_first < left_first);
                 let children =
                     [(left_first, left_met, node.child[0]), (right_first, right_met, node.child[1])];
-                let near = usize::from(right_first < left_first);
                 stack[size] = children[1 - near];
-                size += usize::from(children[1 - near].1 != 0);
-                stack[size] = children[near];
-                size += usize::from(children[near].1 != 0);
+                stack[size + 1] = children[near];
+                size += 2;
             }
         }
     }
@@ -174,14 +184,14 @@ impl Bvh {
         let mut size = 0;
         let traced = traced(ends);
         let mut free = traced;
-        let (mut leaf, mut met) = (outside, traced);
+        let (mut leaf, mut in_leaf) = (outside, traced);
         if !self.nodes.is_empty() {
             stack[0] = (traced, Child { first: 0, count: 0 });
             size = 1;
         }
         loop {
             for &id in leaf {
-                let met = met & free;
+                let met = in_leaf & free;
                 if met != 0 {
                     free &= !any.test(id, met, ends);
                 }
@@ -194,17 +204,17 @@ impl Bvh {
                 let (in_it, child) = stack[size];
                 if child.count > 0 {
                     leaf = &self.order[child.first as usize..(child.first + child.count) as usize];
-                    met = in_it;
+                    in_leaf = in_it;
                     break;
                 }
                 if in_it & free == 0 {
                     continue;
                 }
                 let node = &self.nodes[child.first as usize];
-                for side in 0..2 {
-                    let met = slabs.enter(&node.bounds[side], ends).met() & free;
-                    stack[size] = (met, node.child[side]);
-                    size += usize::from(met != 0);
+                let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
+                for (met, child) in met(&left, &right).into_iter().zip(node.child) {
+                    stack[size] = (met & free, child);
+                    size += usize::from(met & free != 0);
                 }
             }
         }
