@@ -117,7 +117,7 @@ fn mix(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    fn points(sampler: &PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> {
+    fn points(sampler: &PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> + use<> {
         let some = |([x, y], used): ([Lanes; 2], usize)| (0..used).map(move |i| [x[i], y[i]]);
         sampler.get2_all(purpose, n).flat_map(some)
     }

@@ -181,7 +181,9 @@ mod tests {
     use crate::accel::Instructions;
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
+    use crate::geometry::cuboid::Cuboid;
     use crate::geometry::mesh::TriangleMesh;
+    use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
     use crate::math::transform::Transform;
@@ -199,7 +201,7 @@ mod tests {
         }
     }
 
-    /// Spheres in a grid, three instances of a fan of triangles, a floor.
+    /// Spheres, boxes and quads in a grid, three instances of a fan of triangles, a floor.
     fn geometry(accel: Accel) -> Geometry {
         let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO], ..TriangleMesh::default() };
         for i in 0..40_u32 {
@@ -213,7 +215,11 @@ mod tests {
         for i in 0..30 {
             let center = DVec3::new(f64::from(i % 5), f64::from(i / 5 % 3), f64::from(i / 15)) * 1.5
                 - DVec3::splat(2.0);
-            shapes.push(Shape::Sphere(Sphere { center, radius: 0.6 }));
+            shapes.push(match i % 3 {
+                0 => Shape::Box(Cuboid::new(center, DVec3::splat(0.9), DVec3::splat(f64::from(i)))),
+                1 => Shape::Quad(Parallelogram::new(center, DVec3::X, DVec3::new(0.0, 0.8, 0.4))),
+                _ => Shape::Sphere(Sphere { center, radius: 0.6 }),
+            });
         }
         for i in 0..3 {
             let at = DVec3::new(f64::from(i) - 1.0, f64::from(i) * 0.7, 0.3);

@@ -117,3 +117,7 @@ fn in_mesh(mesh: &MeshInstance, rays: &[Ray], met: u32, trace: impl FnOnce(&[Ray
     }
     trace(&local[..rays.len()]);
 }
+
+#[cfg(test)]
+#[path = "side_by_side_tests.rs"]
+mod tests;

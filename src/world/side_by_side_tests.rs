@@ -1,0 +1,168 @@
+//! Every shape against rays side by side, by every kind of instructions: the bits of the shape against each ray alone.
+
+use super::*;
+use crate::accel::{Instructions, Loops};
+use crate::geometry::ShapeHit;
+use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cylinder::Cylinder;
+use crate::geometry::disk::Disk;
+use crate::geometry::parallelogram::Parallelogram;
+use crate::geometry::plane::Plane;
+use crate::geometry::sphere::Sphere;
+use crate::geometry::triangle::Triangle;
+use crate::math::{DVec3, Vec3};
+
+/// Numbers as good as random.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, count: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % count
+    }
+
+    /// In [−1, 1).
+    fn number(&mut self) -> f32 {
+        self.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.number(), self.number(), self.number())
+    }
+
+    /// Corners, faces, nothing, and sizes that over- and underflow where they are multiplied.
+    fn hostile(&mut self) -> f32 {
+        const HOSTILE: [f32; 16] = [
+            0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -3.0, 1e-45, -1e-40, 1e-20, 1e-7, 1e10, -1e19, 3e38, -3e38,
+        ];
+        let count = if self.below(4) == 0 { 16 } else { 8 };
+        HOSTILE[self.below(count)]
+    }
+
+    fn hostile_vector(&mut self) -> Vec3 {
+        Vec3::new(self.hostile(), self.hostile(), self.hostile())
+    }
+
+    fn ray(&mut self, kind: usize, scale: f32) -> Ray {
+        match kind {
+            0 => Ray::new(self.hostile_vector(), self.hostile_vector()),
+            1 => Ray::new(self.hostile_vector() * scale, self.vector()),
+            2 => Ray::new(self.vector() * 0.5 * scale, self.vector()),
+            3 => Ray::segment(self.vector() * 4.0 * scale, self.vector() * scale),
+            _ => {
+                let from = self.vector() * 4.0 * scale;
+                Ray::new(from, self.vector() * scale - from)
+            }
+        }
+    }
+}
+
+/// One of each kind on the axes and one askew, of a size.
+fn shapes(scale: f64) -> Vec<Shape> {
+    let (center, askew) = (DVec3::new(0.3, -0.2, 0.1) * scale, DVec3::new(0.3, -0.7, 0.5));
+    let quad = |corner: DVec3, u: DVec3, v: DVec3| {
+        Shape::Quad(Parallelogram::new(corner * scale, u * scale, v * scale))
+    };
+    let triangle =
+        |a: DVec3, b: DVec3, c: DVec3| Shape::Triangle(Triangle { a: a * scale, b: b * scale, c: c * scale });
+    vec![
+        Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)),
+        Shape::Plane(Plane::new(center, askew)),
+        quad(DVec3::new(-1.0, 0.0, -1.0), DVec3::X * 2.0, DVec3::Z * 2.0),
+        quad(askew * -1.5, DVec3::new(2.0, 0.5, 0.1), DVec3::new(0.3, 1.0, 2.0)),
+        Shape::Sphere(Sphere { center: DVec3::ZERO, radius: scale }),
+        Shape::Sphere(Sphere { center, radius: 0.7 * scale }),
+        Shape::Box(Cuboid::new(DVec3::ZERO, DVec3::splat(2.0 * scale), DVec3::ZERO)),
+        Shape::Box(Cuboid::new(center, DVec3::new(0.5, 1.0, 1.5) * scale, DVec3::new(10.0, 20.0, 30.0))),
+        triangle(DVec3::ZERO, DVec3::X, DVec3::Y),
+        triangle(DVec3::new(-1.0, 0.1, -0.6), DVec3::new(1.0, 0.3, -0.9), DVec3::new(0.0, -0.2, 1.1)),
+        Shape::Disk(Disk::new(DVec3::ZERO, DVec3::Z, scale)),
+        Shape::Disk(Disk::new(center, askew, 0.8 * scale)),
+        Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Y * scale, 0.5 * scale, true)),
+    ]
+}
+
+/// What a packet hits, and which rays hit any part but one.
+struct Both<'a> {
+    shape: &'a Shape,
+    rays: &'a [Ray],
+    met: u32,
+    except: (u32, &'a [u32; PACKET]),
+}
+
+impl Loops for Both<'_> {
+    type Done = (HitRows, u32, u32);
+
+    #[inline(always)]
+    fn run(self) -> Self::Done {
+        let Self { shape, rays, met, except } = self;
+        let (rows, mut ends) = RayRows::new(rays);
+        for lane in 0..PACKET {
+            ends[lane] = if met & 1 << lane != 0 { ends[lane] } else { -1.0 };
+        }
+        let mut found = HitRows::none();
+        closest(shape, rays, &rows, met, &ends, &mut found);
+        let any_part = any(shape, rays, &rows, met, &ends, None);
+        (found, any_part, any(shape, rays, &rows, met, &ends, Some(except)))
+    }
+}
+
+/// Bits of a hit.
+fn bits(hit: ShapeHit) -> [u32; 4] {
+    [hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()]
+}
+
+/// Compare a packet with its rays alone; how many hit.
+fn assert_packet(shape: &Shape, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET])) -> usize {
+    let met = met & ((1 << rays.len()) - 1);
+    let alone = |lane: usize| {
+        let is_traced = rays.get(lane).is_some() && met & 1 << lane != 0;
+        is_traced.then(|| shape.closest(&rays[lane], &rays[lane].to_f64())).flatten()
+    };
+    let mut hits = 0;
+    for instructions in Instructions::ALL {
+        let (found, any_part, other_part) = instructions.run(Both { shape, rays, met, except });
+        hits = 0;
+        for lane in 0..PACKET {
+            let alone = alone(lane);
+            let what = || format!("{instructions:?}, {lane} of {rays:?} at {shape:?}");
+            assert_eq!(found.get(lane).map(bits), alone.map(bits), "{}", what());
+            assert_eq!(any_part & 1 << lane != 0, alone.is_some(), "{}", what());
+            let own = if except.0 & 1 << lane == 0 { None } else { Some(except.1[lane]) };
+            let other = alone.is_some_and(|hit| Some(hit.primitive) != own);
+            assert_eq!(other_part & 1 << lane != 0, other, "{}", what());
+            hits += usize::from(alone.is_some());
+        }
+    }
+    hits
+}
+
+#[test]
+fn rays_side_by_side_get_the_bits_that_they_get_alone() {
+    let mut random = Random(11);
+    for scale in [1.0_f32, 1e-18, 1e15] {
+        for shape in shapes(f64::from(scale)) {
+            let (mut hits, mut rays_in_all) = (0, 0);
+            for i in 0..2000 {
+                let kind = random.below(6);
+                let mut rays: Vec<_> =
+                    (0..=i % PACKET).map(|lane| random.ray(kind.min(lane + kind / 2), scale)).collect();
+                let met = [0xffff, random.below(1 << 16) as u32][random.below(2)];
+                let parts = std::array::from_fn(|_| random.below(6) as u32);
+                let except = (random.below(1 << 16) as u32, &parts);
+                hits += assert_packet(&shape, &rays, met, except);
+                // Ends at exactly the hit, next to it and near it.
+                let [before, at] = [f32::next_down as fn(f32) -> f32, |end| end];
+                let nudge = [before, at, f32::next_up, |end| end * 0.999_999, |end| end * 0.5][i % 5];
+                for ray in &mut rays {
+                    if let Some(hit) = shape.closest(ray, &ray.to_f64()) {
+                        ray.t_max = nudge(hit.t);
+                    }
+                }
+                assert_packet(&shape, &rays, met, except);
+                rays_in_all += rays.len();
+            }
+            assert!(hits > rays_in_all / 100 && hits < rays_in_all, "{hits} of {rays_in_all}: {shape:?}");
+        }
+    }
+}
