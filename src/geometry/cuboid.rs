@@ -1,6 +1,6 @@
 //! Oriented boxes, in double precision.
 
-use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
+use super::rows::{Ends, HitRows, RayRows, accept};
 use super::surface::flat_axes;
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
@@ -57,7 +57,7 @@ impl Cuboid {
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
         let axes = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];
         let half = self.half.to_array();
-        for lane in 0..PACKET {
+        for (lane, &end) in ends.iter().enumerate() {
             let ray = rays.line(lane);
             let from_center = ray.origin - self.center;
             let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -78,7 +78,7 @@ impl Cuboid {
                 far_face = if is_sooner { face + positive } else { far_face };
             }
             let is_met = !is_beside & (near <= far);
-            let (enter, leave) = (accept(near, ends[lane]), accept(far, ends[lane]));
+            let (enter, leave) = (accept(near, end), accept(far, end));
             let is_inside = enter.is_nan();
             let t = if is_inside { leave } else { enter };
             hits.t[lane] = if is_met { t } else { f32::NAN };

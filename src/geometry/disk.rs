@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::axial::{AxialFrame, exact_t, hit};
-use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
+use super::rows::{Ends, HitRows, RayRows, accept};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3};
 
@@ -34,11 +34,11 @@ impl Disk {
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
         let radius = self.radius * (1.0 + BORDER);
-        for lane in 0..PACKET {
+        for (lane, &end) in ends.iter().enumerate() {
             let line = self.frame.line(&rays.line(lane));
             let along = -line.foot.z / line.direction.z;
             let across = (line.foot + line.direction * along).truncate().length();
-            let t = accept(line.start + along, ends[lane]);
+            let t = accept(line.start + along, end);
             hits.t[lane] = if across <= radius { t } else { f32::NAN };
         }
     }

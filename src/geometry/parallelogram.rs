@@ -46,8 +46,7 @@ impl Parallelogram {
         let accepted = ray.accept(t)?;
         let from_corner = ray.direction * t - to_corner;
         let (s, t) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
-        let inside = |x: f64| (-BORDER..=1.0 + BORDER).contains(&x);
-        (inside(s) && inside(t)).then(|| ShapeHit::at(accepted))
+        (is_in_edge(s) && is_in_edge(t)).then(|| ShapeHit::at(accepted))
     }
 
     /// [`Parallelogram::intersect`] side by side.
@@ -68,7 +67,7 @@ impl Parallelogram {
             let t = above[lane] / along[lane];
             let from_corner = ray.direction * t - (self.corner - ray.origin);
             let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
-            let is_inside = (s >= -BORDER) & (s <= 1.0 + BORDER) & (r >= -BORDER) & (r <= 1.0 + BORDER);
+            let is_inside = is_in_edge(s) & is_in_edge(r);
             let accepted = accept(t, ends[lane]);
             hits.t[lane] = if is_inside { accepted } else { f32::NAN };
         }
@@ -94,6 +93,12 @@ impl Parallelogram {
     pub fn area(&self) -> f64 {
         self.normal.length()
     }
+}
+
+/// Whether a coordinate is between the edges, or on one.
+#[inline(always)]
+fn is_in_edge(x: f64) -> bool {
+    (-BORDER..=1.0 + BORDER).contains(&x)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Single triangles, in double precision.
 
-use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
+use super::rows::{Ends, HitRows, RayRows, accept};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -34,7 +34,7 @@ impl Triangle {
     /// [`Triangle::intersect`] side by side.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
-        for lane in 0..PACKET {
+        for (lane, &end) in ends.iter().enumerate() {
             let ray = rays.line(lane);
             let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
             let d = ray.direction;
@@ -43,7 +43,7 @@ impl Triangle {
             let is_right = (wa > 0.0) | (wb > 0.0) | (wc > 0.0);
             let sum = wa + wb + wc;
             let normal = (b - a).cross(c - a);
-            let t = accept(normal.dot(a) / normal.dot(d), ends[lane]);
+            let t = accept(normal.dot(a) / normal.dot(d), end);
             let is_met = !(is_left & is_right) & (sum != 0.0);
             hits.t[lane] = if is_met { t } else { f32::NAN };
             hits.u[lane] = (wb / sum) as f32;

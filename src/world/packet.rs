@@ -67,10 +67,10 @@ impl ClosestTest for Nearest<'_> {
         let shape = &self.geometry.shapes()[id as usize];
         let mut found = HitRows::none();
         side_by_side::closest(shape, self.rays, self.rows, met, &of_these(met, ends), &mut found);
-        for lane in 0..PACKET {
+        for (lane, end) in ends.iter_mut().enumerate() {
             let t = found.t[lane];
-            let is_nearer = (t < ends[lane]) | ((t == ends[lane]) & (id < self.object[lane]));
-            ends[lane] = if is_nearer { t } else { ends[lane] };
+            let is_nearer = (t < *end) | ((t == *end) & (id < self.object[lane]));
+            *end = if is_nearer { t } else { *end };
             self.hits.t[lane] = if is_nearer { t } else { self.hits.t[lane] };
             self.object[lane] = if is_nearer { id } else { self.object[lane] };
             let (primitive, own) = (found.primitive[lane], self.hits.primitive[lane]);

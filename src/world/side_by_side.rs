@@ -54,9 +54,9 @@ pub fn any(
         hit |= if found.t[lane].is_nan() { 0 } else { bit };
     }
     if let Some((own, parts)) = except {
-        for lane in 0..PACKET {
+        for (lane, &part) in parts.iter().enumerate() {
             let bit = own & 1 << lane;
-            hit &= if found.primitive[lane] == parts[lane] { !bit } else { !0 };
+            hit &= if found.primitive[lane] == part { !bit } else { !0 };
         }
     }
     hit

@@ -97,8 +97,8 @@ impl Loops for Both<'_> {
     fn run(self) -> Self::Done {
         let Self { shape, rays, met, except } = self;
         let (rows, mut ends) = RayRows::new(rays);
-        for lane in 0..PACKET {
-            ends[lane] = if met & 1 << lane != 0 { ends[lane] } else { -1.0 };
+        for (lane, end) in ends.iter_mut().enumerate() {
+            *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
         let mut found = HitRows::none();
         closest(shape, rays, &rows, met, &ends, &mut found);

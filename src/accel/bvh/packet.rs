@@ -37,11 +37,9 @@ struct Stretches {
 impl<'a> SlabPacket<'a> {
     #[inline(always)]
     fn new(rays: &'a RayRows) -> Self {
-        let mut inverse = [[0.0; PACKET]; 3];
-        for axis in 0..3 {
-            for lane in 0..PACKET {
-                inverse[axis][lane] = 1.0 / rays.direction[axis][lane];
-            }
+        let mut inverse = rays.direction;
+        for x in inverse.as_flattened_mut() {
+            *x = 1.0 / *x;
         }
         Self { origin: &rays.origin, inverse }
     }
@@ -50,8 +48,8 @@ impl<'a> SlabPacket<'a> {
     fn enter(&self, bounds: &Aabb, ends: &Ends) -> Stretches {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let mut stretches = Stretches { near: [0.0; PACKET], far: [0.0; PACKET] };
-        for lane in 0..PACKET {
-            let (mut near, mut far) = (0.0_f32, ends[lane] * SLAB_PAD);
+        for (lane, &end) in ends.iter().enumerate() {
+            let (mut near, mut far) = (0.0_f32, end * SLAB_PAD);
             for axis in 0..3 {
                 let (origin, inverse) = (self.origin[axis][lane], self.inverse[axis][lane]);
                 let a = (min[axis] - origin) * inverse;
@@ -100,9 +98,9 @@ fn met(left: &Stretches, right: &Stretches) -> [u32; 2] {
 #[inline(always)]
 fn traced(ends: &Ends) -> u32 {
     let mut bits = 0;
-    for lane in 0..PACKET {
+    for (lane, &end) in ends.iter().enumerate() {
         let bit = 1 << lane;
-        bits |= if ends[lane] >= 0.0 { bit } else { 0 };
+        bits |= if end >= 0.0 { bit } else { 0 };
     }
     bits
 }
@@ -111,8 +109,8 @@ fn traced(ends: &Ends) -> u32 {
 #[inline(always)]
 fn greatest(ends: &Ends) -> f32 {
     let mut greatest = i32::MIN;
-    for lane in 0..PACKET {
-        let end = ends[lane].to_bits() as i32;
+    for end in ends {
+        let end = end.to_bits() as i32;
         greatest = if end > greatest { end } else { greatest };
     }
     f32::from_bits(greatest as u32)
