@@ -75,10 +75,25 @@ fn scrambled_from(first: u64, seed: u32) -> [Lanes; 2] {
 #[inline(always)]
 fn scrambled(indices: [u32; LANES], seed: u32) -> [Lanes; 2] {
     let (x_seed, y_seed) = (mix(seed ^ 0x68bc_21eb), mix(seed ^ 0x02e5_be93));
-    let places = indices.map(|index| owen(index.reverse_bits(), seed).reverse_bits());
-    // Fewer than 2²⁴, which vectors convert as signed numbers.
-    let unit = |bits: u32| (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32);
-    [places.map(|place| unit(owen(place, x_seed))), places.map(|place| unit(owen(pascal(place), y_seed)))]
+    // One step for all lanes after the other: so they become vector instructions.
+    let mut places = indices;
+    for place in &mut places {
+        *place = owen(place.reverse_bits(), seed).reverse_bits();
+    }
+    let mut points = [[0.0; LANES]; 2];
+    for (x, &place) in points[0].iter_mut().zip(&places) {
+        *x = unit(owen(place, x_seed));
+    }
+    for (y, &place) in points[1].iter_mut().zip(&places) {
+        *y = unit(owen(pascal(place), y_seed));
+    }
+    points
+}
+
+/// The upper 24 of reversed bits as a part of 1; so few that vectors convert them as signed numbers.
+#[inline(always)]
+fn unit(bits: u32) -> f32 {
+    (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 
 /// The second coordinate with its bits reversed: bit j is the sum of those bits k of the index for which C(k, j) is odd,
