@@ -132,7 +132,7 @@ fn mix(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    fn points(sampler: &PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> {
+    fn points(sampler: PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> {
         let some = |([x, y], used): ([Lanes; 2], usize)| (0..used).map(move |i| [x[i], y[i]]);
         sampler.get2_all(purpose, n).flat_map(some)
     }
@@ -142,7 +142,7 @@ mod tests {
         // Of three, five and one number, and over the end of 32 bits: the same points as one by one.
         for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
             let sampler = PixelSampler::new(2, 3, 4, sample);
-            let all: Vec<_> = points(&sampler, Purpose::CAMERA, n).collect();
+            let all: Vec<_> = points(sampler, Purpose::CAMERA, n).collect();
             assert_eq!(all.len(), n as usize);
             let first = u64::from(sample) * u64::from(n);
             for (i, point) in all.iter().enumerate() {
@@ -159,7 +159,7 @@ mod tests {
         // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
             let sampler = |sample| PixelSampler::new(3, 10, 20, sample);
-            let all = (0..64 / n).flat_map(|sample| points(&sampler(sample), Purpose::at_vertex(1, 2), n));
+            let all = (0..64 / n).flat_map(|sample| points(sampler(sample), Purpose::at_vertex(1, 2), n));
             let points: Vec<[f32; 2]> = all.collect();
             for columns in [1_usize, 2, 4, 8, 16, 32, 64] {
                 let mut cells = [0_u32; 64];
@@ -192,7 +192,7 @@ mod tests {
         let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
         for pixel in 0..n {
             let sampler = PixelSampler::new(1, pixel % 200, pixel / 200, 7);
-            for [x, y] in points(&sampler, Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
+            for [x, y] in points(sampler, Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
                 sums = [sums[0] + x, sums[1] + y];
                 product += (x - 0.5) * (y - 0.5) * 12.0;
             }

@@ -132,9 +132,9 @@ impl<V: Lanes> Packet<V> {
             margin: 0.0,
         };
         let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
-        for axis in 0..3 {
-            origin[axis] = like.gather(&rows.origin[axis]);
-            own.origins[axis] = [origin[axis].least(), origin[axis].greatest()];
+        for (axis, origin) in origin.iter_mut().enumerate() {
+            *origin = like.gather(&rows.origin[axis]);
+            own.origins[axis] = [origin.least(), origin.greatest()];
         }
         let corner = |side: usize| Vec3::from_array(own.origins.map(|ends| ends[side]));
         own.margin = triangle_margin(corner(0), whole).max(triangle_margin(corner(1), whole));
