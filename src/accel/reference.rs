@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::wide_bvh::pages;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
@@ -85,8 +86,8 @@ impl Reference {
         corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
         token: &CancelToken,
     ) -> Result<Vec<Self>, Cancelled> {
-        let mut references: Vec<Self> =
-            (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect();
+        let mut references = pages::large(count as usize);
+        (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect_into_vec(&mut references);
         token.check()?;
         if !references.par_iter().all(Self::is_usable) {
             references.retain(Self::is_usable);
