@@ -28,7 +28,18 @@ struct Rows {
     first: Ray,
 }
 
+/// A bit for each lane.
+const ALL: u32 = (1 << SIZE) - 1;
+
 impl Rows {
+    #[inline(always)]
+    fn set(&mut self, lane: usize, ray: &Ray) {
+        for axis in 0..3 {
+            self.origin[axis][lane] = ray.origin[axis];
+            self.direction[axis][lane] = ray.direction[axis];
+        }
+    }
+
     /// Lanes without a ray, or with one that ends below 0, repeat the first; none where there is no ray.
     #[inline(always)]
     fn new(rays: &[Ray], ends: &Ends) -> Option<Self> {
@@ -37,17 +48,24 @@ impl Rows {
         for (lane, &end) in ends.iter().enumerate().take(count) {
             traced |= u32::from(end >= 0.0) << lane;
         }
-        let first = *rays.get(traced.trailing_zeros() as usize)?;
+        let first_lane = traced.trailing_zeros() as usize;
+        let first = *rays.get(first_lane)?;
         let mut rows =
             Self { origin: [[0.0; SIZE]; 3], direction: [[0.0; SIZE]; 3], ends: [-1.0; SIZE], traced, first };
-        for lane in 0..SIZE {
-            let is_traced = traced & 1 << lane != 0;
-            let ray = if is_traced { &rays[lane] } else { &first };
-            for axis in 0..3 {
-                rows.origin[axis][lane] = ray.origin[axis];
-                rows.direction[axis][lane] = ray.direction[axis];
+        match <&[Ray; SIZE]>::try_from(rays) {
+            Ok(rays) if traced == ALL => {
+                for (lane, ray) in rays.iter().enumerate() {
+                    rows.set(lane, ray);
+                }
+                rows.ends = *ends;
             }
-            rows.ends[lane] = if is_traced { ends[lane] } else { -1.0 };
+            _ => {
+                for lane in 0..SIZE {
+                    let is_traced = traced & 1 << lane != 0;
+                    rows.set(lane, &rays[if is_traced { lane } else { first_lane }]);
+                    rows.ends[lane] = if is_traced { ends[lane] } else { -1.0 };
+                }
+            }
         }
         Some(rows)
     }
