@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::wide_bvh::pages;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
@@ -86,8 +85,8 @@ impl Reference {
         corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
         token: &CancelToken,
     ) -> Result<Vec<Self>, Cancelled> {
-        let mut references = pages::large(count as usize);
-        (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect_into_vec(&mut references);
+        let mut references: Vec<Self> =
+            (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect();
         token.check()?;
         if !references.par_iter().all(Self::is_usable) {
             references.retain(Self::is_usable);

@@ -12,7 +12,6 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
 pub use simd::Instructions;
-pub(super) use simd::pages;
 
 use crate::accel::{Ends, PACKET};
 
