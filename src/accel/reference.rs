@@ -4,43 +4,69 @@ use rayon::prelude::*;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
+use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3, Vec4};
 
-/// A box; the last lanes mean nothing.
+/// A box; the last lanes mean nothing. The greatest corner is held with the other sign, so that boxes grow by minima alone.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
 pub struct Bounds {
     pub min: Vec4,
-    pub max: Vec4,
+    pub minus_max: Vec4,
 }
 
 impl Bounds {
-    pub const EMPTY: Self = Self { min: Vec4::INFINITY, max: Vec4::NEG_INFINITY };
+    pub const EMPTY: Self = Self { min: Vec4::INFINITY, minus_max: Vec4::INFINITY };
+
+    /// Between two corners.
+    #[inline(always)]
+    pub fn new(min: Vec4, max: Vec4) -> Self {
+        Self { min, minus_max: -max }
+    }
+
+    /// The greatest corner.
+    #[inline(always)]
+    pub fn max(&self) -> Vec4 {
+        -self.minus_max
+    }
+
+    /// From the least to the greatest corner.
+    #[inline(always)]
+    pub fn extent(&self) -> Vec4 {
+        self.max() - self.min
+    }
 
     #[inline(always)]
     pub fn grow(&mut self, other: &Self) {
         self.min = self.min.min(other.min);
-        self.max = self.max.max(other.max);
+        self.minus_max = self.minus_max.min(other.minus_max);
     }
 
     /// Half of the area of its surface.
     #[inline(always)]
     pub fn half_area(&self) -> f32 {
-        let e = self.max - self.min;
+        let e = self.extent();
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 
     pub fn aabb(&self) -> Aabb {
-        Aabb { min: self.min.truncate(), max: self.max.truncate() }
+        Aabb { min: self.min.truncate(), max: self.max().truncate() }
     }
 
     /// The parts below and above a plane.
     pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
         let (mut left, mut right) = (*self, *self);
-        left.max[axis] = at;
+        left.minus_max[axis] = -at;
         right.min[axis] = at;
         [left, right]
     }
 }
+
+/// Set in the numbers that references hold as the bits of floats: without it they would be denormal, which some processors are
+/// slow with.
+const NORMAL: u32 = 1 << 29;
+
+const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
 
 /// A triangle's number and the box around what of it is inside a cell.
 #[derive(Clone, Copy, Debug)]
@@ -74,22 +100,22 @@ impl Reference {
         // `min` and `max` drop a NaN: it is put back.
         let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
         let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
-        min.w = f32::from_bits(id);
-        Self { bounds: Bounds { min, max: a.max(b).max(c) } }
+        min.w = f32::from_bits(id | NORMAL);
+        Self { bounds: Bounds::new(min, a.max(b).max(c)) }
     }
 
     #[inline(always)]
     pub fn centroid(&self) -> Vec4 {
-        self.bounds.min * 0.5 + self.bounds.max * 0.5
+        self.bounds.min * 0.5 - self.bounds.minus_max * 0.5
     }
 
     pub fn id(&self) -> u32 {
-        self.bounds.min.w.to_bits()
+        self.bounds.min.w.to_bits() & !NORMAL
     }
 
     /// Whether it can be hit at all and its box has a size.
     fn is_usable(&self) -> bool {
-        (self.bounds.max - self.bounds.min).truncate().is_finite()
+        self.bounds.extent().truncate().is_finite()
     }
 
     /// What is in each half, by boxes that are as small as rounding outwards lets them be.
@@ -112,11 +138,11 @@ fn clipped(corners: [Vec3; 3], bounds: &Bounds) -> Bounds {
     let min = Vec3::new(down(inside_min.x), down(inside_min.y), down(inside_min.z));
     let max = Vec3::new(up(inside_max.x), up(inside_max.y), up(inside_max.z));
     let min = min.extend(bounds.min.w).max(bounds.min);
-    let max = max.extend(bounds.max.w).min(bounds.max);
+    let max = max.extend(0.0).min(bounds.max());
     if !min.truncate().cmple(max.truncate()).all() {
         return *bounds;
     }
-    let mut clipped = Bounds { min, max };
+    let mut clipped = Bounds::new(min, max);
     clipped.min.w = bounds.min.w;
     clipped
 }
@@ -214,9 +240,9 @@ mod tests {
         let corners = [Vec3::ZERO, Vec3::new(3.0, 1.0, 0.1), Vec3::new(3.0, 1.0, 0.7)];
         let [left, right] = Reference::new(0, corners).split(0, 1.0, corners);
         for (low, exact, high) in [
-            (right.bounds.min.y, 1.0 / 3.0, left.bounds.max.y),
+            (right.bounds.min.y, 1.0 / 3.0, left.bounds.max().y),
             (right.bounds.min.z, f64::from(0.1_f32) / 3.0, f32::INFINITY),
-            (f32::NEG_INFINITY, f64::from(0.7_f32) / 3.0, left.bounds.max.z),
+            (f32::NEG_INFINITY, f64::from(0.7_f32) / 3.0, left.bounds.max().z),
         ] {
             assert!(f64::from(low) <= exact && exact <= f64::from(high), "{low} {exact} {high}");
         }

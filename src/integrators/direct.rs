@@ -5,10 +5,11 @@ use super::batch::{Arrival, PathRay};
 use super::whitted::Wave;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::{LightSample, SeenLight};
+use crate::lights::{LightSamples, SeenLight, Source};
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::color::luminance;
+use crate::math::lanes::{Lanes, Lanes3, dot, lane};
 use crate::sampling::{PixelSampler, Purpose};
 use crate::scene::description::Shadows;
 
@@ -43,20 +44,36 @@ impl<'a> PhongVertex<'a> {
         Self { path, surface, bsdf, normal, smooth_normal, shading_normal, to_eye, bend }
     }
 
-    /// What a sample of a light brings unoccluded; 0 where the light is behind the smooth surface or its bent normal.
-    fn reflected(&self, sample: &LightSample, view: View) -> Vec3 {
-        let cosine = self.shading_normal.dot(sample.direction);
-        if !(cosine > 0.0) {
-            return Vec3::ZERO;
-        }
-        let arriving = sample.weight * (cosine * self.terminator(cosine, sample.direction));
-        let specular = || self.bsdf.specular_value(self.shading_normal, self.to_eye, sample.direction);
+    /// What the BSDF makes of light of this radiance by the view: the same in all directions, and where the mirrored direction
+    /// is the eye's.
+    fn parts(&self, radiance: Vec3, view: View) -> [Vec3; 2] {
+        let diffuse = || radiance * self.bsdf.diffuse_value();
+        let specular = || radiance * self.bsdf.specular_peak();
         match view {
-            View::Diffuse => arriving * self.bsdf.diffuse_value(),
-            View::Specular => arriving * specular(),
-            View::Shadow => Vec3::splat(luminance(arriving)),
-            _ => arriving * (self.bsdf.diffuse_value() + specular()),
+            View::Diffuse => [diffuse(), Vec3::ZERO],
+            View::Specular => [Vec3::ZERO, specular()],
+            View::Shadow => [Vec3::splat(luminance(radiance)), Vec3::ZERO],
+            _ => [diffuse(), specular()],
         }
+    }
+
+    /// Cosines at the surface for light from some directions, softened where bent normals leave the light; not above 0 where
+    /// the light is behind the smooth surface or its bent normal.
+    fn cosines(&self, directions: &Lanes3) -> Lanes {
+        let mut cosines = dot(directions, self.shading_normal);
+        if self.bend.is_some() {
+            for (i, cosine) in cosines.iter_mut().enumerate().filter(|(_, cosine)| **cosine > 0.0) {
+                *cosine *= self.terminator(*cosine, lane(directions, i));
+            }
+        }
+        cosines
+    }
+
+    /// Cosines between the mirrored directions and the one to the eye.
+    fn mirrored_cosines(&self, directions: &Lanes3) -> Lanes {
+        // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
+        let mirrored_eye = self.shading_normal * (2.0 * self.shading_normal.dot(self.to_eye)) - self.to_eye;
+        dot(directions, mirrored_eye)
     }
 
     /// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing
@@ -83,12 +100,12 @@ pub(super) fn light(wave: &mut Wave<'_>, vertex: &PhongVertex<'_>) {
     for (number, light) in (0_u32..).zip(&world.lights) {
         if settings.shadows == Shadows::Hard {
             if let Some(sample) = light.middle(vertex.surface.point) {
-                arrivals.push(&sample, 1.0);
+                arrivals.push(&sample.into(), 1.0);
             }
             continue;
         }
         match light.seen_from(vertex.surface.point) {
-            Some(SeenLight::Only(sample)) => arrivals.push(&sample, 1.0),
+            Some(SeenLight::Only(sample)) => arrivals.push(&sample.into(), 1.0),
             Some(seen) => arrivals.push_samples(&seen, number),
             None => {}
         }
@@ -121,24 +138,42 @@ impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
         let numbers = self.sampler.get2_all(Purpose::at_vertex(path.path, number), settings.shadow_samples);
         let share = 1.0 / settings.shadow_samples as f32;
         for (numbers, used) in numbers {
-            light.samples(numbers, used, |sample| self.push(&sample, share));
+            light.samples(numbers, used, |samples| self.push(samples, share));
         }
     }
 
-    /// One sample, which counts as this share of its light.
-    fn push(&mut self, sample: &LightSample, share: f32) {
+    /// Samples of one light, each of which counts as this share of it.
+    fn push(&mut self, samples: &LightSamples, share: f32) {
         let settings = self.wave.tracer.settings;
-        let value = self.vertex.reflected(sample, settings.view) * share;
-        if value == Vec3::ZERO {
-            return;
+        let [diffuse, specular] = self.vertex.parts(samples.radiance * share, settings.view);
+        let cosines = self.vertex.cosines(&samples.directions);
+        let mirrored = self.vertex.mirrored_cosines(&samples.directions);
+        for i in 0..samples.count {
+            let arriving = cosines[i] * samples.factors[i];
+            if !(arriving > 0.0) {
+                continue;
+            }
+            let mut value = diffuse;
+            if specular != Vec3::ZERO {
+                value += specular * self.vertex.bsdf.specular_part(mirrored[i]);
+            }
+            value *= arriving;
+            if value != Vec3::ZERO {
+                self.arrive(value, lane(&samples.targets, i), samples.source);
+            }
         }
+    }
+
+    /// What arrives from a place if nothing is in its way.
+    fn arrive(&mut self, value: Vec3, from: Vec3, source: Source) {
+        let settings = self.wave.tracer.settings;
         let (contribution, slot) = (value * self.vertex.path.throughput, self.vertex.path.slot);
         self.total += value.x;
         if settings.shadows == Shadows::Off && settings.view != View::Shadow {
             self.wave.radiance[slot as usize] += contribution;
         } else {
-            let ray = Ray::segment(self.shadow_origin, sample.target);
-            self.wave.shadows.push(ray, sample.source, Arrival { contribution, slot });
+            let ray = Ray::segment(self.shadow_origin, from);
+            self.wave.shadows.push(ray, source, Arrival { contribution, slot });
         }
     }
 

@@ -4,7 +4,7 @@ use super::rectangle::{QuadEmitter, SeenQuad};
 use super::round::RoundEmitter;
 use super::sphere::{SeenSphere, SphereEmitter};
 use super::triangles::TriangleEmitter;
-use super::{LightSample, Source};
+use super::{LightSample, LightSamples, Source};
 use crate::math::Vec3;
 use crate::math::lanes::Lanes;
 
@@ -81,21 +81,22 @@ pub enum SeenShape<'a> {
 impl SeenLight<'_> {
     /// Ways for light to arrive by the first numbers of each lane, which `take` gets in order; none where the part that was
     /// chosen sends nothing.
-    pub fn samples(&self, u: [Lanes; 2], count: usize, mut take: impl FnMut(LightSample)) {
+    pub fn samples(&self, u: [Lanes; 2], count: usize, mut take: impl FnMut(&LightSamples)) {
         let (light, shape) = match self {
-            Self::Only(sample) => return (0..count).for_each(|_| take(*sample)),
+            Self::Only(sample) => return (0..count).for_each(|_| take(&LightSamples::from(*sample))),
             Self::Area(light, shape) => (light, shape),
         };
         let (radiance, source) = (light.radiance, Source::Object(light.object));
         let each = (0..count).map(|i| [u[0][i], u[1][i]]);
+        let one = |sample: LightSample| take(&LightSamples::from(sample));
         match shape {
-            SeenShape::Quad(quad) => quad.samples(u, radiance, source).take(count).for_each(take),
-            SeenShape::Sphere(sphere) => sphere.samples(u, radiance, source).take(count).for_each(take),
+            SeenShape::Quad(quad) => take(&LightSamples { count, ..quad.samples(u, radiance, source) }),
+            SeenShape::Sphere(sphere) => take(&LightSamples { count, ..sphere.samples(u, radiance, source) }),
             SeenShape::Triangles(triangles, point) => {
-                each.filter_map(|u| triangles.sample(*point, u, radiance, light.object)).for_each(take);
+                each.filter_map(|u| triangles.sample(*point, u, radiance, light.object)).for_each(one);
             }
             SeenShape::Round(round, point) => {
-                each.filter_map(|u| round.sample(*point, u, radiance, light.object)).for_each(take);
+                each.filter_map(|u| round.sample(*point, u, radiance, light.object)).for_each(one);
             }
         }
     }

@@ -11,6 +11,7 @@ pub use emitter::{AreaLight, SeenLight};
 pub use point::PointLight;
 
 use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes, Lanes3};
 
 /// A light of any kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +34,36 @@ pub struct LightSample {
     pub weight: Vec3,
     /// What the shadow ray need not hit: the light itself.
     pub source: Source,
+}
+
+/// Ways for light to arrive at a point, some at a time: [`LightSample`] with a lane for each.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSamples {
+    /// Where it comes from, in world coordinates.
+    pub targets: Lanes3,
+    /// Unit directions to there.
+    pub directions: Lanes3,
+    /// Radiance, or of lights without extent irradiance at normal incidence.
+    pub radiance: Vec3,
+    /// What that is to be multiplied by: one over the densities of the directions, in sr.
+    pub factors: Lanes,
+    /// What the shadow rays need not hit.
+    pub source: Source,
+    /// How many lanes count.
+    pub count: usize,
+}
+
+impl From<LightSample> for LightSamples {
+    fn from(sample: LightSample) -> Self {
+        Self {
+            targets: sample.target.to_array().map(|x| [x; LANES]),
+            directions: sample.direction.to_array().map(|x| [x; LANES]),
+            radiance: sample.weight,
+            factors: [1.0; LANES],
+            source: sample.source,
+            count: 1,
+        }
+    }
 }
 
 /// The part of the scene that a light is.

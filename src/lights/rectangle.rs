@@ -2,8 +2,8 @@
 
 use std::f32::consts::PI;
 
-use super::{LightSample, Source};
-use crate::math::lanes::{LANES, Lanes, map, sin_cos, zip};
+use super::{LightSample, LightSamples, Source};
+use crate::math::lanes::{LANES, Lanes, Lanes3, dot, lane, map, sin_cos, zip};
 use crate::math::{DVec3, Vec3};
 
 /// Below this solid angle in sr the sum of four angles has lost too many digits, and uniform over the area is as good.
@@ -90,29 +90,29 @@ pub struct SeenQuad<'a> {
 
 impl SeenQuad<'_> {
     /// Uniform over the solid angle of a rectangle, over the area of another parallelogram; one for each lane.
-    pub fn samples(
-        &self,
-        u: [Lanes; 2],
-        radiance: Vec3,
-        source: Source,
-    ) -> impl Iterator<Item = LightSample> {
+    pub fn samples(&self, u: [Lanes; 2], radiance: Vec3, source: Source) -> LightSamples {
         let spherical = self.spherical.as_ref().zip(self.quad.rectangle.as_ref());
-        let ([x, y, z], nearness, solid_angle) = match spherical {
+        let (offsets, nearness, factors) = match spherical {
             Some((spherical, rectangle)) => {
-                let (offset, nearness) = spherical.directions(u, rectangle, self.quad.normal);
-                (offset, nearness, spherical.solid_angle)
+                let (offsets, nearness) = spherical.directions(u, rectangle, self.quad.normal);
+                (offsets, nearness, [spherical.solid_angle; LANES])
             }
-            None => (self.offsets(u), [0.0; LANES], 0.0),
+            None => self.by_area(u),
         };
-        let by_angle = spherical.is_some();
-        (0..LANES).map(move |i| {
-            let offset = Vec3::new(x[i], y[i], z[i]);
-            if !by_angle {
-                return self.quad.by_area(self.point, offset, radiance, source);
-            }
-            let (target, direction) = (self.point + offset, offset * nearness[i]);
-            LightSample { target, direction, weight: radiance * solid_angle, source }
-        })
+        let axis = |axis: usize| {
+            (map(offsets[axis], |x| self.point[axis] + x), zip(offsets[axis], nearness, |x, near| x * near))
+        };
+        let [x, y, z] = [axis(0), axis(1), axis(2)];
+        let (targets, directions) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
+        LightSamples { targets, directions, radiance, factors, source, count: LANES }
+    }
+
+    /// Points uniform over the area, from the point that sees them; one over their distances, and the area as solid angle.
+    fn by_area(&self, u: [Lanes; 2]) -> (Lanes3, Lanes, Lanes) {
+        let offsets = self.offsets(u);
+        let nearness: Lanes = std::array::from_fn(|i| 1.0 / lane(&offsets, i).length());
+        let height = map(dot(&offsets, self.quad.normal), |height| -height * self.quad.area);
+        (offsets, nearness, zip(height, nearness, |height, near| height * near * near * near))
     }
 
     /// Coordinates of points uniform over the area, from the point that sees them.

@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::{LightSample, Source};
+use super::{LightSample, LightSamples, Source};
 use crate::math::frame::Frame;
 use crate::math::lanes::{LANES, Lanes, map, zip};
 use crate::math::{DVec3, Vec3};
@@ -58,23 +58,22 @@ pub struct SeenSphere {
 impl SeenSphere {
     /// Uniform over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exact for narrow cones too; one
     /// for each lane.
-    pub fn samples(
-        &self,
-        u: [Lanes; 2],
-        radiance: Vec3,
-        source: Source,
-    ) -> impl Iterator<Item = LightSample> {
+    pub fn samples(&self, u: [Lanes; 2], radiance: Vec3, source: Source) -> LightSamples {
         let one_minus_cos_max = self.sin2_max / (1.0 + (1.0 - self.sin2_max).sqrt());
         let [x, y, z] = warp::cone(u, one_minus_cos_max);
         // The near root along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
         let sin2 = zip(x, y, |x, y| x * x + y * y);
         let depth = map(sin2, |sin2| (self.sin2_max - sin2).max(0.0).sqrt());
         let distance = zip(z, depth, |z, depth| self.distance * (z - depth));
-        let (frame, point) = (self.frame, self.point);
-        let weight = radiance * (2.0 * PI * one_minus_cos_max);
-        (0..LANES).map(move |i| {
-            let direction = frame.to_world(Vec3::new(x[i], y[i], z[i]));
-            LightSample { target: point + direction * distance[i], direction, weight, source }
-        })
+        let Frame { s, t, n } = self.frame;
+        let direction = |axis: usize| -> Lanes {
+            std::array::from_fn(|i| s[axis] * x[i] + t[axis] * y[i] + n[axis] * z[i])
+        };
+        let directions = [direction(0), direction(1), direction(2)];
+        let target =
+            |axis: usize| zip(directions[axis], distance, |d, distance| self.point[axis] + d * distance);
+        let targets = [target(0), target(1), target(2)];
+        let factors = [2.0 * PI * one_minus_cos_max; LANES];
+        LightSamples { targets, directions, radiance, factors, source, count: LANES }
     }
 }

@@ -62,8 +62,23 @@ impl PhongBsdf {
             return Vec3::ZERO;
         }
         let mirrored = normal * (2.0 * normal.dot(to_light)) - to_light;
-        let cosine = mirrored.dot(to_eye).clamp(0.0, 1.0);
-        self.specular * ((self.shininess + 2.0) / (2.0 * PI) * cosine.powf(self.shininess))
+        self.specular_peak() * self.specular_part(mirrored.dot(to_eye))
+    }
+
+    /// The glossy part of f in sr⁻¹ where the mirrored direction is the eye's.
+    pub fn specular_peak(&self) -> Vec3 {
+        self.specular * ((self.shininess + 2.0) / (2.0 * PI))
+    }
+
+    /// What part of that is left, by the cosine between the mirrored direction and the eye's.
+    pub fn specular_part(&self, cosine: f32) -> f32 {
+        if cosine > 0.0 {
+            cosine.min(1.0).powf(self.shininess)
+        } else if self.shininess == 0.0 {
+            1.0
+        } else {
+            0.0
+        }
     }
 
     /// Whether light that arrives can change anything.

@@ -3,6 +3,8 @@
 
 use std::f32::consts::FRAC_PI_2;
 
+use super::Vec3;
+
 /// Numbers at a time.
 pub const LANES: usize = 4;
 
@@ -19,6 +21,21 @@ pub fn map(x: Lanes, f: impl Fn(f32) -> f32) -> Lanes {
 #[inline(always)]
 pub fn zip(x: Lanes, y: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
     std::array::from_fn(|i| f(x[i], y[i]))
+}
+
+/// Vectors, by coordinate.
+pub type Lanes3 = [Lanes; 3];
+
+/// Dot products with one vector.
+#[inline(always)]
+pub fn dot(a: &Lanes3, b: Vec3) -> Lanes {
+    std::array::from_fn(|i| a[0][i] * b.x + a[1][i] * b.y + a[2][i] * b.z)
+}
+
+/// The vector of a lane.
+#[inline(always)]
+pub fn lane(vectors: &Lanes3, i: usize) -> Vec3 {
+    Vec3::new(vectors[0][i], vectors[1][i], vectors[2][i])
 }
 
 /// Sine and cosine of angles in [0, 2π], within 1.2e-7: the angle is taken to [−π/4, π/4] around a multiple of π/2, which is

@@ -75,10 +75,25 @@ fn scrambled_from(first: u64, seed: u32) -> [Lanes; 2] {
 #[inline(always)]
 fn scrambled(indices: [u32; LANES], seed: u32) -> [Lanes; 2] {
     let (x_seed, y_seed) = (mix(seed ^ 0x68bc_21eb), mix(seed ^ 0x02e5_be93));
-    let places = indices.map(|index| owen(index.reverse_bits(), seed).reverse_bits());
-    // Fewer than 2²⁴, which vectors convert as signed numbers.
-    let unit = |bits: u32| (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32);
-    [places.map(|place| unit(owen(place, x_seed))), places.map(|place| unit(owen(pascal(place), y_seed)))]
+    // One step for all lanes after the other: so they become vector instructions.
+    let mut places = indices;
+    for place in &mut places {
+        *place = owen(place.reverse_bits(), seed).reverse_bits();
+    }
+    let mut points = [[0.0; LANES]; 2];
+    for (x, &place) in points[0].iter_mut().zip(&places) {
+        *x = unit(owen(place, x_seed));
+    }
+    for (y, &place) in points[1].iter_mut().zip(&places) {
+        *y = unit(owen(pascal(place), y_seed));
+    }
+    points
+}
+
+/// The upper 24 of reversed bits as a part of 1; so few that vectors convert them as signed numbers.
+#[inline(always)]
+fn unit(bits: u32) -> f32 {
+    (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 
 /// The second coordinate with its bits reversed: bit j is the sum of those bits k of the index for which C(k, j) is odd,
@@ -117,7 +132,7 @@ fn mix(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    fn points(sampler: &PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> + use<> {
+    fn points(sampler: PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> {
         let some = |([x, y], used): ([Lanes; 2], usize)| (0..used).map(move |i| [x[i], y[i]]);
         sampler.get2_all(purpose, n).flat_map(some)
     }
@@ -127,7 +142,7 @@ mod tests {
         // Of three, five and one number, and over the end of 32 bits: the same points as one by one.
         for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
             let sampler = PixelSampler::new(2, 3, 4, sample);
-            let all: Vec<_> = points(&sampler, Purpose::CAMERA, n).collect();
+            let all: Vec<_> = points(sampler, Purpose::CAMERA, n).collect();
             assert_eq!(all.len(), n as usize);
             let first = u64::from(sample) * u64::from(n);
             for (i, point) in all.iter().enumerate() {
@@ -144,7 +159,7 @@ mod tests {
         // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
             let sampler = |sample| PixelSampler::new(3, 10, 20, sample);
-            let all = (0..64 / n).flat_map(|sample| points(&sampler(sample), Purpose::at_vertex(1, 2), n));
+            let all = (0..64 / n).flat_map(|sample| points(sampler(sample), Purpose::at_vertex(1, 2), n));
             let points: Vec<[f32; 2]> = all.collect();
             for columns in [1_usize, 2, 4, 8, 16, 32, 64] {
                 let mut cells = [0_u32; 64];
@@ -177,7 +192,7 @@ mod tests {
         let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
         for pixel in 0..n {
             let sampler = PixelSampler::new(1, pixel % 200, pixel / 200, 7);
-            for [x, y] in points(&sampler, Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
+            for [x, y] in points(sampler, Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
                 sums = [sums[0] + x, sums[1] + y];
                 product += (x - 0.5) * (y - 0.5) * 12.0;
             }

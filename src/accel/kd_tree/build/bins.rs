@@ -26,7 +26,7 @@ impl Histogram {
         let bin = |place: f32| (place as i32).clamp(0, BINS as i32 - 1) as usize;
         for reference in references {
             let low = (reference.bounds.min - start) * per_length;
-            let high = (reference.bounds.max - start) * per_length;
+            let high = (reference.bounds.max() - start) * per_length;
             for axis in 0..3 {
                 own.starts[axis][bin(low[axis])] += 1;
                 own.ends[axis][bin(high[axis])] += 1;
@@ -46,7 +46,7 @@ impl Histogram {
 
 /// The cheapest plane; none where a leaf is as cheap. `around` is the box around the references.
 pub fn cheapest(references: &[Reference], cell: &Bounds, around: &Bounds) -> Option<Plane> {
-    let extent = around.max - around.min;
+    let extent = around.max() - around.min;
     let scale = |length: f32| {
         let per_length = BINS as f32 / length;
         if length > 0.0 && per_length.is_finite() { per_length } else { 0.0 }
@@ -64,7 +64,7 @@ pub fn cheapest(references: &[Reference], cell: &Bounds, around: &Bounds) -> Opt
     for axis in 0..3 {
         search.along(axis, |across| {
             across.offer(around.min[axis], 0, count, 0);
-            across.offer(around.max[axis], count, 0, 0);
+            across.offer(around.max()[axis], count, 0, 0);
             let (mut left, mut right) = (0, count);
             for bin in 1..if per_length[axis] > 0.0 { BINS } else { 1 } {
                 left += histogram.starts[axis][bin - 1] as usize;

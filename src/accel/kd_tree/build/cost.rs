@@ -35,7 +35,7 @@ pub struct Search<'a> {
 impl<'a> Search<'a> {
     /// Only planes that make `count` triangles cheaper than a leaf of them count.
     pub fn new(cell: &'a Bounds, count: usize) -> Self {
-        let extent = (cell.max - cell.min).truncate();
+        let extent = (cell.max() - cell.min).truncate();
         let extent = extent.max(Vec3::splat(extent.max_element() * 1e-4)).to_array();
         let [x, y, z] = extent;
         let best = Plane { axis: LEAF, at: 0.0, planar_right: false, cost: count as f32 };
@@ -54,7 +54,7 @@ impl<'a> Search<'a> {
         let mut across = Across {
             axis,
             min: self.cell.min[axis],
-            max: self.cell.max[axis],
+            max: self.cell.max()[axis],
             face: u * v * self.inverse_area,
             per_length: (u + v) * self.inverse_area,
             best: self.best,

@@ -136,7 +136,7 @@ impl Cell {
         let mut around = [Bounds::EMPTY; 2];
         let (axis, at) = (plane.axis, plane.at);
         references.retain_mut(|reference| {
-            let (min, max) = (reference.bounds.min[axis], reference.bounds.max[axis]);
+            let (min, max) = (reference.bounds.min[axis], reference.bounds.max()[axis]);
             let (below, above) = (min < at, max > at);
             if below && above {
                 let [own, other] = reference.split(axis, at, corners(reference.id()));

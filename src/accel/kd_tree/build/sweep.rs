@@ -21,14 +21,14 @@ fn sweep(references: &[Reference], axis: usize, search: &mut Search<'_>) {
     let (mut starts, mut ends) = ([0.0_f32; SWEPT], [0.0_f32; SWEPT]);
     let mut has_planar = false;
     for (place, reference) in references.iter().take(SWEPT).enumerate() {
-        (starts[place], ends[place]) = (reference.bounds.min[axis], reference.bounds.max[axis]);
+        (starts[place], ends[place]) = (reference.bounds.min[axis], reference.bounds.max()[axis]);
         has_planar |= starts[place] == ends[place];
     }
     let (starts, ends) = (&mut starts[..count], &mut ends[..count]);
     sort(starts);
     sort(ends);
     let planar_at = |at: f32| {
-        let is_planar = |own: &&Reference| own.bounds.min[axis] == at && own.bounds.max[axis] == at;
+        let is_planar = |own: &&Reference| own.bounds.min[axis] == at && own.bounds.max()[axis] == at;
         if has_planar { references.iter().filter(is_planar).count() } else { 0 }
     };
     search.along(axis, |across| {

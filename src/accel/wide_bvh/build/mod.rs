@@ -5,7 +5,7 @@
 
 mod join;
 mod pieces;
-mod split;
+pub mod split;
 mod subtree;
 
 use rayon::prelude::*;

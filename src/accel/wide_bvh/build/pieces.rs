@@ -83,7 +83,7 @@ impl Grid {
     fn around(references: &[Reference]) -> Self {
         let mut all = Bounds::EMPTY;
         references.iter().for_each(|reference| all.grow(&reference.bounds));
-        Self { start: all.min.truncate(), extent: (all.max - all.min).truncate() }
+        Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 
     /// The coarsest plane that goes through a box, if any does.
@@ -93,12 +93,12 @@ impl Grid {
             let place = |x: f32| (x - self.start[axis]) / self.extent[axis] * cells;
             // A box that ends on a plane is below it.
             let first = place(bounds.min[axis]) as u32;
-            let last = (place(bounds.max[axis]).ceil() as u32).saturating_sub(1).max(first);
+            let last = (place(bounds.max()[axis]).ceil() as u32).saturating_sub(1).max(first);
             let level = (first ^ last).checked_ilog2()?;
             let at = self.start[axis] + self.extent[axis] * ((last >> level << level) as f32 / cells);
-            (bounds.min[axis] < at && at < bounds.max[axis]).then_some(Plane { axis, at, level })
+            (bounds.min[axis] < at && at < bounds.max()[axis]).then_some(Plane { axis, at, level })
         };
-        let length = |plane: &Plane| bounds.max[plane.axis] - bounds.min[plane.axis];
+        let length = |plane: &Plane| bounds.extent()[plane.axis];
         (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))
     }
 
@@ -117,7 +117,7 @@ impl Grid {
         let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
         let Some(Plane { axis, at, .. }) = plane else { return pieces.push(reference) };
         let halves = reference.split(axis, at, corners);
-        let [left, right] = halves.map(|half| (half.bounds.max - half.bounds.min).truncate().max_element());
+        let [left, right] = halves.map(|half| half.bounds.extent().truncate().max_element());
         let of_left = ((cuts - 1) as f32 * (left / (left + right)) + 0.5) as u32;
         self.cut(halves[0], of_left, corners, pieces);
         self.cut(halves[1], cuts - 1 - of_left.min(cuts - 1), corners, pieces);

@@ -5,10 +5,11 @@ use rayon::prelude::*;
 
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::node::{MOST_PACKS, PACK};
+use crate::accel::wide_bvh::simd;
 use crate::math::Vec4;
 
 /// Most bins along an axis.
-const BINS: usize = 32;
+pub const BINS: usize = 32;
 
 /// Most bins of segments of at most [`FEW`] references.
 const FEW_BINS: usize = 8;
@@ -81,7 +82,7 @@ impl Boxes {
     #[inline(always)]
     fn grow(&mut self, reference: &Reference, centroid: Vec4) {
         self.bounds.grow(&reference.bounds);
-        self.centroids.grow(&Bounds { min: centroid, max: centroid });
+        self.centroids.grow(&Bounds::new(centroid, centroid));
     }
 
     fn union(mut self, other: Self) -> Self {
@@ -126,18 +127,20 @@ fn blocks(count: u32) -> u32 {
 /// Which bin a centroid is in.
 #[derive(Clone, Copy, Debug)]
 pub struct Bins {
-    start: Vec4,
-    per_length: Vec4,
+    /// Where the first begins.
+    pub start: Vec4,
+    /// Bins for each unit of length; 0 along axes without extent.
+    pub per_length: Vec4,
     count: usize,
 }
 
 /// Added to a number from −½ to 2²², it leaves the nearest integer in the low bits.
-const ROUND: f32 = 12_582_912.0;
+pub const ROUND: f32 = 12_582_912.0;
 
 impl Bins {
     fn new(centroids: &Bounds, references: usize) -> Self {
         let count = BINS.min(4 + references / 8).max(if references > FEW { FEW_BINS } else { 0 });
-        let extent = centroids.max - centroids.min;
+        let extent = centroids.extent();
         let scale = |length: f32| {
             // A little less, so that the last centroid is in the last bin.
             let per_length = count as f32 * 0.999_99 / length;
@@ -161,9 +164,9 @@ impl Bins {
 }
 
 /// Boxes and counts of the bins of three axes.
-struct Histogram<const N: usize> {
-    bounds: [[Bounds; 3]; N],
-    counts: [[u32; 3]; N],
+pub struct Histogram<const N: usize> {
+    pub bounds: [[Bounds; 3]; N],
+    pub counts: [[u32; 3]; N],
 }
 
 /// The cheapest split.
@@ -177,15 +180,23 @@ struct Cheapest {
 }
 
 impl<const N: usize> Histogram<N> {
+    const EMPTY: Self = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 3]; N] };
+
     fn of(references: &[Reference], bins: &Bins) -> Self {
-        let mut own = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 3]; N] };
-        for reference in references {
-            for (axis, bin) in bins.of(reference).into_iter().enumerate() {
-                own.bounds[bin % N][axis].grow(&reference.bounds);
-                own.counts[bin % N][axis] += 1;
-            }
+        let mut own = Self::EMPTY;
+        if !simd::binning::count(references, bins, &mut own) {
+            own.count(references, bins);
         }
         own
+    }
+
+    fn count(&mut self, references: &[Reference], bins: &Bins) {
+        for reference in references {
+            for (axis, bin) in bins.of(reference).into_iter().enumerate() {
+                self.bounds[bin % N][axis].grow(&reference.bounds);
+                self.counts[bin % N][axis] += 1;
+            }
+        }
     }
 
     fn in_parallel(references: &[Reference], bins: &Bins) -> Self {
@@ -246,9 +257,9 @@ pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split)
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
             let (middle, [left, right]) = match axis {
-                0 => partition_by_plane::<0>(references, *bin, bins),
-                1 => partition_by_plane::<1>(references, *bin, bins),
-                _ => partition_by_plane::<2>(references, *bin, bins),
+                0 => partitioned::<0>(references, *bin, bins),
+                1 => partitioned::<1>(references, *bin, bins),
+                _ => partitioned::<2>(references, *bin, bins),
             };
             let boxes = |side: usize, centroids| Boxes { bounds: sides[side], centroids };
             (middle, boxes(0, left), boxes(1, right))
@@ -263,6 +274,17 @@ pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split)
     let (left_references, right_references) = references.split_at(middle);
     let left = Segment::new(left_references, left, level);
     (left, Segment::new(right_references, right, level))
+}
+
+fn partitioned<const AXIS: usize>(
+    references: &mut [Reference],
+    bin: usize,
+    bins: &Bins,
+) -> (usize, [Bounds; 2]) {
+    match simd::binning::partition::<AXIS>(references, bin, bins) {
+        Some(done) => done,
+        None => partition_by_plane::<AXIS>(references, bin, bins),
+    }
 }
 
 /// Those below a bin first: how many they are, and the boxes around the centroids of both sides. Nothing depends on a branch
@@ -286,10 +308,57 @@ fn partition_by_plane<const AXIS: usize>(
         let place =
             (Vec4::splat(centroid[AXIS]) - start) * per_length - Vec4::splat(0.5) + Vec4::splat(ROUND);
         let is_left = place.cmplt(first_right);
-        let on = |mask, otherwise| Vec4::select(mask, centroid, otherwise);
-        left.grow(&Bounds { min: on(is_left, Vec4::INFINITY), max: on(is_left, Vec4::NEG_INFINITY) });
-        right.grow(&Bounds { min: on(!is_left, Vec4::INFINITY), max: on(!is_left, Vec4::NEG_INFINITY) });
+        let on = |mask, centroid| Vec4::select(mask, centroid, Vec4::INFINITY);
+        left.grow(&Bounds { min: on(is_left, centroid), minus_max: on(is_left, -centroid) });
+        right.grow(&Bounds { min: on(!is_left, centroid), minus_max: on(!is_left, -centroid) });
         middle += usize::from(is_left.test(0));
     }
     (middle, [left, right])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::pathological::random;
+    use crate::math::Vec3;
+
+    fn references(count: u32) -> Vec<Reference> {
+        let mut next = random(5);
+        let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
+        let corners = |id: u32| {
+            let from = if id.is_multiple_of(7) { Vec3::ZERO } else { point(10.0) };
+            [from, from + point(0.3), from + point(0.1)]
+        };
+        (0..count).map(corners).enumerate().map(|(id, corners)| Reference::new(id as u32, corners)).collect()
+    }
+
+    fn bits(bounds: &Bounds) -> [u32; 6] {
+        let (min, max) = (bounds.min + Vec4::ZERO, bounds.max() + Vec4::ZERO);
+        [min.x, min.y, min.z, max.x, max.y, max.z].map(f32::to_bits)
+    }
+
+    #[test]
+    fn vectors_count_and_partition_as_plain_code_does() {
+        for count in [1, 2, 5, 33, 1000] {
+            let references = references(count);
+            let boxes = Boxes::around(&references);
+            let bins = Bins::new(&boxes.centroids, references.len());
+            let mut plain = Histogram::<BINS>::EMPTY;
+            plain.count(&references, &bins);
+            let own = Histogram::<BINS>::of(&references, &bins);
+            assert_eq!(own.counts, plain.counts);
+            for (own, plain) in own.bounds.iter().flatten().zip(plain.bounds.iter().flatten()) {
+                assert_eq!(bits(own), bits(plain));
+            }
+            for bin in 1..bins.count {
+                let (mut own, mut plain) = (references.clone(), references.clone());
+                let (own_middle, own_sides) = partitioned::<1>(&mut own, bin, &bins);
+                let (middle, sides) = partition_by_plane::<1>(&mut plain, bin, &bins);
+                assert_eq!(own_middle, middle);
+                let ids = |references: &[Reference]| references.iter().map(Reference::id).collect::<Vec<_>>();
+                assert_eq!(ids(&own), ids(&plain));
+                assert_eq!(own_sides.each_ref().map(bits), sides.each_ref().map(bits));
+            }
+        }
+    }
 }

@@ -2,6 +2,8 @@
 //!
 //! Every way gives the bits of [`portable`], which is plain Rust.
 
+#[allow(unsafe_code)]
+pub mod binning;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod lanes;

@@ -11,7 +11,8 @@ use crate::accel::wide_bvh::node::{Child, Node, PACK, TrianglePack};
 use crate::accel::{Ends, PACKET as SIZE};
 use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
 use crate::geometry::watertight::ShearedRay;
-use crate::geometry::{Ray, ShapeHit};
+use crate::geometry::{Aabb, Ray, ShapeHit};
+use crate::math::Vec3;
 
 /// Rows of a packet, one value for each ray.
 type Row = [f32; SIZE];
@@ -25,52 +26,49 @@ struct Rows {
     traced: u32,
     /// The first of them.
     first: Ray,
-    /// The greatest margin that boxes need for any of them.
-    margin: f32,
 }
 
+/// A bit for each lane.
+const ALL: u32 = (1 << SIZE) - 1;
+
 impl Rows {
+    #[inline(always)]
+    fn set(&mut self, lane: usize, ray: &Ray) {
+        for axis in 0..3 {
+            self.origin[axis][lane] = ray.origin[axis];
+            self.direction[axis][lane] = ray.direction[axis];
+        }
+    }
+
     /// Lanes without a ray, or with one that ends below 0, repeat the first; none where there is no ray.
     #[inline(always)]
-    fn new(tree: &WideBvh, rays: &[Ray], ends: &Ends) -> Option<Self> {
+    fn new(rays: &[Ray], ends: &Ends) -> Option<Self> {
         let count = rays.len().min(SIZE);
         let mut traced = 0;
         for (lane, &end) in ends.iter().enumerate().take(count) {
             traced |= u32::from(end >= 0.0) << lane;
         }
-        let first = *rays.get(traced.trailing_zeros() as usize)?;
-        let mut rows = Self {
-            origin: [[0.0; SIZE]; 3],
-            direction: [[0.0; SIZE]; 3],
-            ends: [-1.0; SIZE],
-            traced,
-            first,
-            margin: 0.0,
-        };
-        for lane in 0..SIZE {
-            let is_traced = traced & 1 << lane != 0;
-            let ray = if is_traced { &rays[lane] } else { &first };
-            for axis in 0..3 {
-                rows.origin[axis][lane] = ray.origin[axis];
-                rows.direction[axis][lane] = ray.direction[axis];
+        let first_lane = traced.trailing_zeros() as usize;
+        let first = *rays.get(first_lane)?;
+        let mut rows =
+            Self { origin: [[0.0; SIZE]; 3], direction: [[0.0; SIZE]; 3], ends: [-1.0; SIZE], traced, first };
+        match <&[Ray; SIZE]>::try_from(rays) {
+            Ok(rays) if traced == ALL => {
+                for (lane, ray) in rays.iter().enumerate() {
+                    rows.set(lane, ray);
+                }
+                rows.ends = *ends;
             }
-            rows.ends[lane] = if is_traced { ends[lane] } else { -1.0 };
-            let margin = triangle_margin(ray.origin, &tree.bounds);
-            rows.margin = if margin > rows.margin { margin } else { rows.margin };
+            _ => {
+                for lane in 0..SIZE {
+                    let is_traced = traced & 1 << lane != 0;
+                    rows.set(lane, &rays[if is_traced { lane } else { first_lane }]);
+                    rows.ends[lane] = if is_traced { ends[lane] } else { -1.0 };
+                }
+            }
         }
         Some(rows)
     }
-}
-
-/// The least and the greatest.
-#[inline(always)]
-fn ends(row: &Row) -> [f32; 2] {
-    let (mut least, mut greatest) = (row[0], row[0]);
-    for &x in row {
-        least = if x < least { x } else { least };
-        greatest = if x > greatest { x } else { greatest };
-    }
-    [least, greatest]
 }
 
 /// What holds for every ray of a packet, against eight boxes at a time. Subtraction and multiplication round monotonously, so
@@ -85,19 +83,17 @@ struct Frustum {
 
 impl Frustum {
     #[inline(always)]
-    fn new<V: Lanes>(rows: &Rows, packet: &Packet<V>, like: F8) -> Self {
+    fn new<V: Lanes>(packet: &Packet<V>, like: F8) -> Self {
         let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
         let mut inverse = [[like; 2]; 3];
         for axis in 0..3 {
-            let ends = ends(&rows.origin[axis]);
+            let ends = packet.origins[axis];
             let negative = packet.near[axis] & 1;
-            let margin = if negative == 1 { -rows.margin } else { rows.margin };
+            let margin = if negative == 1 { -packet.margin } else { packet.margin };
             near_origin[axis] = like.like(ends[1 - negative] + margin);
             far_origin[axis] = like.like(ends[negative] - margin);
-            let mut row = [0.0; SIZE];
-            packet.inverse[axis].store(&mut row);
-            let [least, greatest] = self::ends(&row);
-            inverse[axis] = [like.like(least), like.like(greatest)];
+            let row = packet.inverse[axis];
+            inverse[axis] = [like.like(row.least()), like.like(row.greatest())];
         }
         Self { near_origin, far_origin, inverse, near: packet.near }
     }
@@ -131,12 +127,16 @@ struct Packet<V: Lanes> {
     axes: [usize; 3],
     /// Rows of a node that are near.
     near: [usize; 3],
+    /// The least and the greatest origins along each axis.
+    origins: [[f32; 2]; 3],
+    /// The greatest margin that boxes need for any of the rays.
+    margin: f32,
 }
 
 impl<V: Lanes> Packet<V> {
     /// None where the rays do not go the same way: along each axis to the same side, the longest the same for all.
     #[inline(always)]
-    fn new(rows: &Rows, like: V) -> Option<Self> {
+    fn new(rows: &Rows, whole: &Aabb, like: V) -> Option<Self> {
         let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();
         let mut own = Self {
             near_origin: [like; 3],
@@ -146,13 +146,20 @@ impl<V: Lanes> Packet<V> {
             shear: [like; 3],
             axes,
             near: [0; 3],
+            origins: [[0.0; 2]; 3],
+            margin: 0.0,
         };
         let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
-        let margin = like.like(rows.margin);
+        for (axis, origin) in origin.iter_mut().enumerate() {
+            *origin = like.gather(&rows.origin[axis]);
+            own.origins[axis] = [origin.least(), origin.greatest()];
+        }
+        let corner = |side: usize| Vec3::from_array(own.origins.map(|ends| ends[side]));
+        own.margin = triangle_margin(corner(0), whole).max(triangle_margin(corner(1), whole));
+        let margin = like.like(own.margin);
         let (zero, one) = (like.like(0.0), like.like(1.0));
         let all = V::bits(zero.eq(zero));
         for axis in 0..3 {
-            origin[axis] = like.gather(&rows.origin[axis]);
             direction[axis] = like.gather(&rows.direction[axis]);
             size[axis] = direction[axis].abs();
             own.inverse[axis] = one.over(direction[axis]);
@@ -241,9 +248,9 @@ fn closest<V: Lanes>(
     like: V,
     like8: F8,
 ) -> bool {
-    let Some(rows) = Rows::new(tree, rays, ends) else { return true };
-    let Some(packet) = Packet::new(&rows, like) else { return false };
-    let frustum = Frustum::new(&rows, &packet, like8);
+    let Some(rows) = Rows::new(rays, ends) else { return true };
+    let Some(packet) = Packet::new(&rows, &tree.bounds, like) else { return false };
+    let frustum = Frustum::new(&packet, like8);
     let t_max = like.gather(&rows.ends);
     let pad = like.like(SLAB_PAD);
     let none = like.like(f32::from_bits(u32::MAX));
@@ -365,9 +372,9 @@ fn any<V: Lanes>(
     like: V,
     like8: F8,
 ) -> Option<u32> {
-    let Some(rows) = Rows::new(tree, rays, ends) else { return Some(0) };
-    let packet = Packet::new(&rows, like)?;
-    let frustum = Frustum::new(&rows, &packet, like8);
+    let Some(rows) = Rows::new(rays, ends) else { return Some(0) };
+    let packet = Packet::new(&rows, &tree.bounds, like)?;
+    let frustum = Frustum::new(&packet, like8);
     let mut t_max = like.gather(&rows.ends);
     let pad = like.like(SLAB_PAD);
     let mut end = t_max.greatest() * SLAB_PAD;

@@ -115,6 +115,13 @@ impl Lanes for F8 {
         let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
         F4(low).max(F4(high)).greatest()
     }
+
+    #[inline(always)]
+    fn least(self) -> f32 {
+        // SAFETY: as above.
+        let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
+        F4(low).min(F4(high)).least()
+    }
 }
 
 impl F8 {

@@ -114,4 +114,11 @@ impl Lanes for F4 {
         self.store(&mut lanes);
         lanes[0].max(lanes[1]).max(lanes[2].max(lanes[3]))
     }
+
+    #[inline(always)]
+    fn least(self) -> f32 {
+        let mut lanes = [0.0_f32; 4];
+        self.store(&mut lanes);
+        lanes[0].min(lanes[1]).min(lanes[2].min(lanes[3]))
+    }
 }

@@ -76,6 +76,8 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     fn mask(bits: u32, like: Self) -> Self::Mask;
     /// The greatest of all.
     fn greatest(self) -> f32;
+    /// The least of all.
+    fn least(self) -> f32;
 }
 
 /// Sums, differences and products of a type around a vector.

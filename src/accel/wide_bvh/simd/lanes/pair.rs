@@ -130,4 +130,9 @@ impl<V: Lanes> Lanes for Pair<V> {
     fn greatest(self) -> f32 {
         self.0.max(self.1).greatest()
     }
+
+    #[inline(always)]
+    fn least(self) -> f32 {
+        self.0.min(self.1).least()
+    }
 }

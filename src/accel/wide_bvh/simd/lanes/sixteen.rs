@@ -122,4 +122,10 @@ impl Lanes for F16 {
         // SAFETY: as above.
         unsafe { _mm512_reduce_max_ps(self.0) }
     }
+
+    #[inline(always)]
+    fn least(self) -> f32 {
+        // SAFETY: as above.
+        unsafe { _mm512_reduce_min_ps(self.0) }
+    }
 }

@@ -1,0 +1,132 @@
+//! The inner loops of building, a whole box in a register: what plain code does in `build::split`, to the same numbers.
+
+use super::Instructions;
+use crate::accel::reference::{Bounds, Reference};
+use crate::accel::wide_bvh::build::split::{Bins, Histogram};
+
+/// Put references into the bins of a histogram; false where the processor lacks the instructions and nothing was done.
+pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    if Instructions::best() >= Instructions::Avx2 {
+        // SAFETY: the processor has them.
+        unsafe { avx2::count(references, bins, into) };
+        return true;
+    }
+    let _ = (references, bins, into);
+    false
+}
+
+/// Those below a bin first: how many they are, and the boxes around the centroids of both sides; none where nothing was done.
+pub fn partition<const AXIS: usize>(
+    references: &mut [Reference],
+    bin: usize,
+    bins: &Bins,
+) -> Option<(usize, [Bounds; 2])> {
+    #[cfg(target_arch = "x86_64")]
+    if Instructions::best() >= Instructions::Avx2 {
+        // SAFETY: the processor has them.
+        return Some(unsafe { avx2::partition::<AXIS>(references, bin, bins) });
+    }
+    let _ = (references, bin, bins);
+    None
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use std::arch::x86_64::*;
+
+    use crate::accel::reference::{Bounds, Reference};
+    use crate::accel::wide_bvh::build::split::{BINS, Bins, Histogram, ROUND};
+    use crate::math::Vec4;
+
+    /// Both corners of a box.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn load(bounds: &Bounds) -> __m256 {
+        // SAFETY: eight floats, aligned as they are.
+        unsafe { _mm256_load_ps(std::ptr::from_ref(bounds).cast()) }
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn store(bounds: __m256, to: &mut Bounds) {
+        // SAFETY: room for eight floats, aligned as they are.
+        unsafe { _mm256_store_ps(std::ptr::from_mut(to).cast(), bounds) }
+    }
+
+    /// [`Reference::centroid`].
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn centroid(bounds: __m256) -> __m128 {
+        let halves = _mm256_mul_ps(bounds, _mm256_set1_ps(0.5));
+        _mm_sub_ps(_mm256_castps256_ps128(halves), _mm256_extractf128_ps::<1>(halves))
+    }
+
+    /// `Bins::place`.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn place(centroid: __m128, start: __m128, per_length: __m128) -> __m128 {
+        let place = _mm_mul_ps(_mm_sub_ps(centroid, start), per_length);
+        _mm_add_ps(_mm_sub_ps(place, _mm_set1_ps(0.5)), _mm_set1_ps(ROUND))
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) {
+        let (start, per_length) = (__m128::from(bins.start), __m128::from(bins.per_length));
+        for reference in references {
+            let bounds = load(&reference.bounds);
+            let places = _mm_castps_si128(place(centroid(bounds), start, per_length));
+            let places = [
+                _mm_extract_epi32::<0>(places),
+                _mm_extract_epi32::<1>(places),
+                _mm_extract_epi32::<2>(places),
+            ];
+            for (axis, place) in places.into_iter().enumerate() {
+                let bin = place as usize & (BINS - 1);
+                let own = &mut into.bounds[bin % N][axis];
+                store(_mm256_min_ps(load(own), bounds), own);
+                into.counts[bin % N][axis] += 1;
+            }
+        }
+    }
+
+    /// Without a branch that could be guessed wrongly: every reference changes places with the first on the right, which then
+    /// counts to the left or not.
+    #[target_feature(enable = "avx2")]
+    pub fn partition<const AXIS: usize>(
+        references: &mut [Reference],
+        bin: usize,
+        bins: &Bins,
+    ) -> (usize, [Bounds; 2]) {
+        let start = _mm_set1_ps(bins.start[AXIS]);
+        let per_length = _mm_set1_ps(bins.per_length[AXIS]);
+        let first_right = _mm_set1_ps(ROUND + bin as f32);
+        let nothing = _mm256_set1_ps(f32::INFINITY);
+        let minus_high = _mm256_setr_ps(0.0, 0.0, 0.0, 0.0, -0.0, -0.0, -0.0, -0.0);
+        let (mut left, mut right) = (nothing, nothing);
+        let mut middle = 0;
+        for i in 0..references.len() {
+            let bounds = load(&references[i].bounds);
+            let other = load(&references[middle].bounds);
+            store(other, &mut references[i].bounds);
+            store(bounds, &mut references[middle].bounds);
+            let centroid = centroid(bounds);
+            let along = match AXIS {
+                0 => _mm_permute_ps::<0x00>(centroid),
+                1 => _mm_permute_ps::<0x55>(centroid),
+                _ => _mm_permute_ps::<0xaa>(centroid),
+            };
+            let is_left = _mm_cmplt_ps(place(along, start, per_length), first_right);
+            let on_left = _mm256_set_m128(is_left, is_left);
+            let both = _mm256_xor_ps(_mm256_set_m128(centroid, centroid), minus_high);
+            left = _mm256_min_ps(_mm256_blendv_ps(nothing, both, on_left), left);
+            right = _mm256_min_ps(_mm256_blendv_ps(both, nothing, on_left), right);
+            middle += (_mm_movemask_ps(is_left) & 1) as usize;
+        }
+        let corners = |sides: __m256| Bounds {
+            min: Vec4::from(_mm256_castps256_ps128(sides)),
+            minus_max: Vec4::from(_mm256_extractf128_ps::<1>(sides)),
+        };
+        (middle, [corners(left), corners(right)])
+    }
+}
