@@ -8,7 +8,7 @@ use super::medium::Medium;
 use crate::control::CancelToken;
 use crate::film::Rect;
 use crate::geometry::Ray;
-use crate::lights::Source;
+use crate::lights::{LightSamples, Source};
 use crate::math::{DVec2, Vec2, Vec3};
 use crate::sampling::filter::Filter;
 use crate::sampling::{PixelSampler, Purpose, warp};
@@ -124,6 +124,8 @@ pub struct Queues {
     pub next: Vec<PathRay>,
     /// Shadow rays of this round that are not traced yet.
     pub shadows: ShadowQueue,
+    /// Samples of one light for one point.
+    pub samples: Vec<LightSamples>,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
 }

@@ -10,8 +10,9 @@ use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{Lanes, Lanes3, dot, lane};
-use crate::sampling::{PixelSampler, Purpose};
+use crate::sampling::{PixelSampler, Purpose, Repetitions};
 use crate::scene::description::Shadows;
+use crate::world::Loops;
 
 /// A point to be lit.
 pub(super) struct PhongVertex<'a> {
@@ -113,6 +114,24 @@ pub(super) fn light(wave: &mut Wave<'_>, vertex: &PhongVertex<'_>) {
     arrivals.finish();
 }
 
+/// Draws samples of a light.
+struct Draw<'a, 'l> {
+    light: &'a SeenLight<'l>,
+    numbers: Repetitions,
+    queue: &'a mut Vec<LightSamples>,
+}
+
+impl Loops for Draw<'_, '_> {
+    type Done = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (numbers, used) in self.numbers {
+            self.light.samples(numbers, used, self.queue);
+        }
+    }
+}
+
 /// Takes what arrives at a vertex to the queue of shadow rays.
 struct Arrivals<'a, 'w, 'v> {
     wave: &'a mut Wave<'w>,
@@ -137,9 +156,13 @@ impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
         let (settings, path) = (self.wave.tracer.settings, self.vertex.path);
         let numbers = self.sampler.get2_all(Purpose::at_vertex(path.path, number), settings.shadow_samples);
         let share = 1.0 / settings.shadow_samples as f32;
-        for (numbers, used) in numbers {
-            light.samples(numbers, used, |samples| self.push(samples, share));
+        let mut queue = std::mem::take(self.wave.samples);
+        queue.clear();
+        self.wave.tracer.world.geometry.instructions().run(Draw { light, numbers, queue: &mut queue });
+        for samples in &queue {
+            self.push(samples, share);
         }
+        *self.wave.samples = queue;
     }
 
     /// Samples of one light, each of which counts as this share of it.

@@ -8,6 +8,7 @@ use super::{POLL_INTERVAL, RayCounters, View, glass};
 use crate::control::Cancelled;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
+use crate::lights::LightSamples;
 use crate::materials::mirror::reflect;
 use crate::materials::{Material, Mirror, Phong};
 use crate::math::Vec3;
@@ -27,9 +28,9 @@ pub fn trace(
     while !queues.rays.is_empty() {
         closest_hits(tracer, queues)?;
         queues.next.clear();
-        let Queues { rays, next, shadows, hits } = queues;
+        let Queues { rays, next, shadows, hits, samples } = queues;
         shadows.clear();
-        let mut wave = Wave { tracer, depth, next, shadows, radiance, counters };
+        let mut wave = Wave { tracer, depth, next, shadows, samples, radiance, counters };
         for (path, hit) in rays.iter().zip(hits.iter()) {
             match hit {
                 Some(hit) => wave.shade(*path, hit),
@@ -67,6 +68,7 @@ pub(super) struct Wave<'a> {
     pub(super) depth: u32,
     pub(super) next: &'a mut Vec<PathRay>,
     pub(super) shadows: &'a mut ShadowQueue,
+    pub(super) samples: &'a mut Vec<LightSamples>,
     pub(super) radiance: &'a mut [Vec3],
     pub(super) counters: &'a mut RayCounters,
 }

@@ -79,25 +79,35 @@ pub enum SeenShape<'a> {
 }
 
 impl SeenLight<'_> {
-    /// Ways for light to arrive by the first numbers of each lane, which `take` gets in order; none where the part that was
+    /// Ways for light to arrive by the first numbers of each lane, put behind what is in the queue; none where the part that was
     /// chosen sends nothing.
-    pub fn samples(&self, u: [Lanes; 2], count: usize, mut take: impl FnMut(&LightSamples)) {
-        let (light, shape) = match self {
-            Self::Only(sample) => return (0..count).for_each(|_| take(&LightSamples::from(*sample))),
-            Self::Area(light, shape) => (light, shape),
-        };
-        let (radiance, source) = (light.radiance, Source::Object(light.object));
-        let each = (0..count).map(|i| [u[0][i], u[1][i]]);
-        let one = |sample: LightSample| take(&LightSamples::from(sample));
-        match shape {
-            SeenShape::Quad(quad) => take(&LightSamples { count, ..quad.samples(u, radiance, source) }),
-            SeenShape::Sphere(sphere) => take(&LightSamples { count, ..sphere.samples(u, radiance, source) }),
-            SeenShape::Triangles(triangles, point) => {
-                each.filter_map(|u| triangles.sample(*point, u, radiance, light.object)).for_each(one);
+    #[inline(always)]
+    pub fn samples(&self, u: [Lanes; 2], count: usize, queue: &mut Vec<LightSamples>) {
+        match self {
+            Self::Only(sample) => queue.extend((0..count).map(|_| LightSamples::from(*sample))),
+            Self::Area(light, SeenShape::Quad(quad)) => {
+                let all = quad.samples(u, light.radiance, Source::Object(light.object));
+                queue.push(LightSamples { count, ..all });
             }
-            SeenShape::Round(round, point) => {
-                each.filter_map(|u| round.sample(*point, u, radiance, light.object)).for_each(one);
+            Self::Area(light, SeenShape::Sphere(sphere)) => {
+                let all = sphere.samples(u, light.radiance, Source::Object(light.object));
+                queue.push(LightSamples { count, ..all });
+            }
+            Self::Area(light, shape) => {
+                queue.extend((0..count).filter_map(|i| light.sample(shape, [u[0][i], u[1][i]])));
             }
         }
+    }
+}
+
+impl AreaLight {
+    /// One sample of a shape of which the samples are made one by one.
+    fn sample(&self, shape: &SeenShape<'_>, u: [f32; 2]) -> Option<LightSamples> {
+        let sample = match shape {
+            SeenShape::Triangles(triangles, point) => triangles.sample(*point, u, self.radiance, self.object),
+            SeenShape::Round(round, point) => round.sample(*point, u, self.radiance, self.object),
+            SeenShape::Quad(_) | SeenShape::Sphere(_) => None,
+        };
+        sample.map(LightSamples::from)
     }
 }

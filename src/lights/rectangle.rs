@@ -90,6 +90,7 @@ pub struct SeenQuad<'a> {
 
 impl SeenQuad<'_> {
     /// Uniform over the solid angle of a rectangle, over the area of another parallelogram; one for each lane.
+    #[inline(always)]
     pub fn samples(&self, u: [Lanes; 2], radiance: Vec3, source: Source) -> LightSamples {
         let spherical = self.spherical.as_ref().zip(self.quad.rectangle.as_ref());
         let (offsets, nearness, factors) = match spherical {
@@ -108,6 +109,7 @@ impl SeenQuad<'_> {
     }
 
     /// Points uniform over the area, from the point that sees them; one over their distances, and the area as solid angle.
+    #[inline(always)]
     fn by_area(&self, u: [Lanes; 2]) -> (Lanes3, Lanes, Lanes) {
         let offsets = self.offsets(u);
         let nearness: Lanes = std::array::from_fn(|i| 1.0 / lane(&offsets, i).length());
@@ -116,6 +118,7 @@ impl SeenQuad<'_> {
     }
 
     /// Coordinates of points uniform over the area, from the point that sees them.
+    #[inline(always)]
     fn offsets(&self, u: [Lanes; 2]) -> [Lanes; 3] {
         let (quad, corner) = (self.quad, self.to_corner);
         [0, 1, 2].map(|axis| zip(u[0], u[1], |s, t| corner[axis] + quad.u[axis] * s + quad.v[axis] * t))
@@ -163,6 +166,7 @@ impl Rectangle {
 
 impl SphericalRectangle {
     /// Coordinates of points uniform over the solid angle, and one over their distances.
+    #[inline(always)]
     fn directions(&self, u: [Lanes; 2], rectangle: &Rectangle, normal: Vec3) -> ([Lanes; 3], Lanes) {
         let (x, y) = self.samples(u);
         let away = normal * self.z;
@@ -174,6 +178,7 @@ impl SphericalRectangle {
     }
 
     /// Coordinates of points of the rectangle along its sides, uniform over its solid angle.
+    #[inline(always)]
     fn samples(&self, u: [Lanes; 2]) -> (Lanes, Lanes) {
         // A slice of the sphere up to x takes its share of the solid angle.
         let (sin, cos) = sin_cos(map(u[0], |u| u * self.solid_angle + self.start));

@@ -58,6 +58,7 @@ pub struct SeenSphere {
 impl SeenSphere {
     /// Uniform over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exact for narrow cones too; one
     /// for each lane.
+    #[inline(always)]
     pub fn samples(&self, u: [Lanes; 2], radiance: Vec3, source: Source) -> LightSamples {
         let one_minus_cos_max = self.sin2_max / (1.0 + (1.0 - self.sin2_max).sqrt());
         let [x, y, z] = warp::cone(u, one_minus_cos_max);
@@ -66,13 +67,14 @@ impl SeenSphere {
         let depth = map(sin2, |sin2| (self.sin2_max - sin2).max(0.0).sqrt());
         let distance = zip(z, depth, |z, depth| self.distance * (z - depth));
         let Frame { s, t, n } = self.frame;
-        let direction = |axis: usize| -> Lanes {
-            std::array::from_fn(|i| s[axis] * x[i] + t[axis] * y[i] + n[axis] * z[i])
-        };
-        let directions = [direction(0), direction(1), direction(2)];
-        let target =
-            |axis: usize| zip(directions[axis], distance, |d, distance| self.point[axis] + d * distance);
-        let targets = [target(0), target(1), target(2)];
+        let (mut directions, mut targets) = ([x; 3], [x; 3]);
+        for axis in 0..3 {
+            for i in 0..LANES {
+                let direction = s[axis] * x[i] + t[axis] * y[i] + n[axis] * z[i];
+                directions[axis][i] = direction;
+                targets[axis][i] = self.point[axis] + direction * distance[i];
+            }
+        }
         let factors = [2.0 * PI * one_minus_cos_max; LANES];
         LightSamples { targets, directions, radiance, factors, source, count: LANES }
     }

@@ -14,13 +14,21 @@ pub type Lanes = [f32; LANES];
 /// A function of each lane's number.
 #[inline(always)]
 pub fn map(x: Lanes, f: impl Fn(f32) -> f32) -> Lanes {
-    x.map(f)
+    let mut values = x;
+    for value in &mut values {
+        *value = f(*value);
+    }
+    values
 }
 
 /// A function of each lane's two numbers.
 #[inline(always)]
 pub fn zip(x: Lanes, y: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
-    std::array::from_fn(|i| f(x[i], y[i]))
+    let mut values = x;
+    for (value, y) in values.iter_mut().zip(y) {
+        *value = f(*value, y);
+    }
+    values
 }
 
 /// Vectors, by coordinate.
@@ -29,7 +37,11 @@ pub type Lanes3 = [Lanes; 3];
 /// Dot products with one vector.
 #[inline(always)]
 pub fn dot(a: &Lanes3, b: Vec3) -> Lanes {
-    std::array::from_fn(|i| a[0][i] * b.x + a[1][i] * b.y + a[2][i] * b.z)
+    let mut products = a[0];
+    for (i, product) in products.iter_mut().enumerate() {
+        *product = *product * b.x + a[1][i] * b.y + a[2][i] * b.z;
+    }
+    products
 }
 
 /// The vector of a lane.
@@ -56,14 +68,19 @@ pub fn sin_cos(angle: Lanes) -> (Lanes, Lanes) {
         let z = r * r;
         1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5))
     });
-    let pick = |even: Lanes, odd: Lanes, negative: [f32; 2]| -> Lanes {
-        std::array::from_fn(|i| {
-            let k = quarters[i];
-            let size = if k == 1.0 || k == 3.0 { odd[i] } else { even[i] };
-            if k == negative[0] || k == negative[1] { -size } else { size }
-        })
-    };
-    (pick(sin, cos, [2.0, 3.0]), pick(cos, sin, [1.0, 2.0]))
+    (pick(quarters, sin, cos, [2.0, 3.0]), pick(quarters, cos, sin, [1.0, 2.0]))
+}
+
+/// Of two values the one for the quarter of each lane, with the other sign in two of the quarters.
+#[inline(always)]
+fn pick(quarters: Lanes, even: Lanes, odd: Lanes, negative: [f32; 2]) -> Lanes {
+    let mut values = even;
+    for (i, value) in values.iter_mut().enumerate() {
+        let k = quarters[i];
+        let size = if k == 1.0 || k == 3.0 { odd[i] } else { *value };
+        *value = if k == negative[0] || k == negative[1] { -size } else { size };
+    }
+    values
 }
 
 #[cfg(test)]

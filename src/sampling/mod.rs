@@ -5,4 +5,4 @@ pub mod filter;
 pub mod stream;
 pub mod warp;
 
-pub use stream::{PixelSampler, Purpose};
+pub use stream::{PixelSampler, Purpose, Repetitions};

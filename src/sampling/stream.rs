@@ -43,12 +43,10 @@ impl PixelSampler {
     }
 
     /// Two numbers in [0, 1) for each of `n` repetitions of one decision, well distributed over repetitions and samples
-    /// together: some at a time, with how many of the lanes count.
-    pub fn get2_all(&self, purpose: Purpose, n: u32) -> impl Iterator<Item = ([Lanes; 2], usize)> + use<> {
+    /// together.
+    pub fn get2_all(&self, purpose: Purpose, n: u32) -> Repetitions {
         let (seed, first) = (mix(self.seed ^ purpose.0), u64::from(self.sample) * u64::from(n));
-        (0..n).step_by(LANES).map(move |start| {
-            (scrambled_from(first + u64::from(start), seed), LANES.min((n - start) as usize))
-        })
+        Repetitions { seed, next: first, end: first + u64::from(n) }
     }
 
     /// Two numbers in [0, 1).
@@ -58,11 +56,39 @@ impl PixelSampler {
     }
 }
 
+/// Numbers for the repetitions of one decision, some at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct Repetitions {
+    seed: u32,
+    next: u64,
+    end: u64,
+}
+
+impl Iterator for Repetitions {
+    /// With how many of the lanes count.
+    type Item = ([Lanes; 2], usize);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.next >= self.end {
+            return None;
+        }
+        let used = (self.end - self.next).min(LANES as u64);
+        let points = scrambled_from(self.next, self.seed);
+        self.next += used;
+        Some((points, used as usize))
+    }
+}
+
 /// Points of the first two dimensions from number `first` on; every 2³² of them are scrambled anew.
+#[inline(always)]
 fn scrambled_from(first: u64, seed: u32) -> [Lanes; 2] {
     let [round, last_round] = [first, first + LANES as u64 - 1].map(|index| (index >> 32) as u32);
     let start = first as u32;
-    let indices = std::array::from_fn(|i| start.wrapping_add(i as u32));
+    let mut indices = [start; LANES];
+    for (i, index) in indices.iter_mut().enumerate() {
+        *index = index.wrapping_add(i as u32);
+    }
     let points = scrambled(indices, seed ^ mix(round));
     if round == last_round {
         return points;
@@ -120,6 +146,7 @@ fn owen(mut bits: u32, seed: u32) -> u32 {
 }
 
 /// A bijective hash of 32 bits (Wellons, *Prospecting for Hash Functions*, 2018, "lowbias32").
+#[inline(always)]
 fn mix(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);

@@ -35,6 +35,7 @@ pub fn triangle(u: Vec2) -> Vec3 {
 
 /// Uniform over the solid angle of a cone about z, given 1 − cos of its half angle, which keeps its digits for
 /// narrow cones.
+#[inline(always)]
 pub fn cone(u: [Lanes; 2], one_minus_cos_max: f32) -> [Lanes; 3] {
     let one_minus_cos = map(u[0], |u| u * one_minus_cos_max);
     let sin = map(one_minus_cos, |c| (c * (2.0 - c)).max(0.0).sqrt());

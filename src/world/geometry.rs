@@ -70,7 +70,7 @@ impl Geometry {
     }
 
     /// What packets are traced by.
-    pub(super) fn instructions(&self) -> Instructions {
+    pub fn instructions(&self) -> Instructions {
         self.instructions
     }
 

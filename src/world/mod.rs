@@ -14,7 +14,7 @@ pub mod textures;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::PACKET;
+pub use crate::accel::{Loops, PACKET};
 pub use camera::Camera;
 pub use geometry::{Geometry, Hit};
 pub use mesh_tree::MeshTree;
