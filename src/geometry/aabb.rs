@@ -5,6 +5,7 @@ use crate::math::{DVec3, Vec3};
 
 /// All points between two corners, the faces included. Empty where `min > max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Aabb {
     /// Least corner.
     pub min: Vec3,

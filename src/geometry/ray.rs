@@ -4,6 +4,7 @@ use crate::math::{DVec3, Vec3};
 
 /// The points `origin + t·direction` for t in (0, `t_max`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Ray {
     /// Where it starts.
     pub origin: Vec3,

@@ -7,7 +7,6 @@ use super::triangle::{self, Hits};
 use crate::accel::wide_bvh::node::{Node, TrianglePack};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
 use crate::geometry::{Aabb, Ray};
-use crate::math::Vec3;
 
 /// Least speed along an axis, as a part of the greatest.
 const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
@@ -51,11 +50,25 @@ const AXES: [[i32; 4]; 64] = {
     table
 };
 
-/// The three as lanes.
+/// Origin and direction, each with what lies behind it in the last lane.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn vector(v: Vec3) -> __m128 {
-    _mm_setr_ps(v.x, v.y, v.z, 0.0)
+fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
+    const _: () = assert!(size_of::<Ray>() == 28 && std::mem::offset_of!(Ray, direction) == 12);
+    let floats: *const f32 = std::ptr::from_ref(ray).cast();
+    // SAFETY: the first four and the last four of the seven floats of a ray.
+    unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(3))) }
+}
+
+/// Both corners, each with something in the last lane.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn corners(bounds: &Aabb) -> (__m128, __m128) {
+    const _: () = assert!(size_of::<Aabb>() == 24 && std::mem::offset_of!(Aabb, max) == 12);
+    let floats: *const f32 = std::ptr::from_ref(bounds).cast();
+    // SAFETY: the first four and the last four of the six floats of a box.
+    let (min, max) = unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(2))) };
+    (min, _mm_permute_ps::<0b00_11_10_01>(max))
 }
 
 /// The greatest of three lanes that are not negative, in all four.
@@ -86,11 +99,12 @@ impl Lines {
     #[target_feature(enable = "avx2,fma")]
     #[inline]
     pub fn new(ray: &Ray, whole: &Aabb) -> Self {
-        let (origin, direction) = (vector(ray.origin), vector(ray.direction));
+        let (origin, direction) = origin_and_direction(ray);
+        let (min, max) = corners(whole);
         let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
         // How far the boxes must reach beyond their triangles, `triangle_margin`, and what fused products may be off more.
-        let below = _mm_and_ps(_mm_sub_ps(vector(whole.min), origin), unsigned);
-        let above = _mm_and_ps(_mm_sub_ps(vector(whole.max), origin), unsigned);
+        let below = _mm_and_ps(_mm_sub_ps(min, origin), unsigned);
+        let above = _mm_and_ps(_mm_sub_ps(max, origin), unsigned);
         let farthest = greatest(_mm_max_ps(below, above));
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
