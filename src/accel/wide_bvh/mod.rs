@@ -106,12 +106,12 @@ impl WideBvh {
 
     /// The nearest hit; of hits at one distance the triangle of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
-        if self.may_hit(ray) { simd::closest(self, ray) } else { None }
+        if self.nodes.is_empty() { None } else { simd::closest(self, ray) }
     }
 
     /// Whether the ray hits any triangle but `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
-        self.may_hit(ray) && simd::any(self, ray, except)
+        !self.nodes.is_empty() && simd::any(self, ray, except)
     }
 
     /// [`WideBvh::closest`] of at most [`PACKET`] rays up to their ends; faster where they go much the same way, as those of
@@ -151,12 +151,6 @@ impl WideBvh {
             bits |= as_packet.unwrap_or_else(one_by_one);
         });
         bits
-    }
-
-    /// A ray that is not finite, or goes nowhere, hits nothing; to the box tests it would be in every box.
-    fn may_hit(&self, ray: &Ray) -> bool {
-        let is_finite = ray.origin.is_finite() && ray.direction.is_finite();
-        !self.nodes.is_empty() && is_finite && ray.direction != Vec3::ZERO
     }
 
     /// Walks the tree and says what is wrong with it.

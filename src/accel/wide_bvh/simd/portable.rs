@@ -7,8 +7,16 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 
+/// A ray that is not finite, or goes nowhere, hits nothing; to the box tests it would be in every box.
+fn may_hit(ray: &Ray) -> bool {
+    ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != Vec3::ZERO
+}
+
 /// Nearest first, by a stack in memory of its own.
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
+    if !may_hit(ray) {
+        return None;
+    }
     let (slabs, sheared) = (
         SlabRay::for_triangles(ray.origin, ray.direction, &tree.bounds),
         ShearedRay::new(ray.origin, ray.direction),
@@ -41,6 +49,9 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 
 /// In any order, until one is hit.
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
+    if !may_hit(ray) {
+        return false;
+    }
     let (slabs, sheared) = (
         SlabRay::for_triangles(ray.origin, ray.direction, &tree.bounds),
         ShearedRay::new(ray.origin, ray.direction),

@@ -60,6 +60,21 @@ fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
     unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(3))) }
 }
 
+/// Whether the ray is finite and goes somewhere.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+pub fn may_hit(ray: &Ray) -> bool {
+    let (origin, direction) = origin_and_direction(ray);
+    let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
+    let (origin, direction) = (_mm_and_ps(origin, unsigned), _mm_and_ps(direction, unsigned));
+    let finite = _mm_and_ps(
+        _mm_cmplt_ps(origin, _mm_set1_ps(f32::INFINITY)),
+        _mm_cmplt_ps(direction, _mm_set1_ps(f32::INFINITY)),
+    );
+    let goes = _mm_cmplt_ps(_mm_setzero_ps(), direction);
+    _mm_movemask_ps(finite) & 0b111 == 0b111 && _mm_movemask_ps(goes) & 0b111 != 0
+}
+
 /// Both corners, each with something in the last lane.
 #[target_feature(enable = "avx2,fma")]
 #[inline]

@@ -4,7 +4,7 @@ use std::arch::x86_64::*;
 
 use super::lanes::{F4, F8, Lanes};
 use super::portable::nearer;
-use super::ray::Lines;
+use super::ray::{Lines, may_hit};
 use super::stack::{Stack, entry, key};
 use super::triangle::Hits;
 use crate::accel::wide_bvh::WideBvh;
@@ -16,6 +16,9 @@ use crate::geometry::{Ray, ShapeHit};
 /// See [`WideBvh::closest`].
 #[target_feature(enable = "avx2,fma")]
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
+    if !may_hit(ray) {
+        return None;
+    }
     // SAFETY: this function has the instructions.
     let like8 = unsafe { F8::splat(0.0) };
     let lines = Lines::new(ray, &tree.bounds);
@@ -142,6 +145,9 @@ fn is_hit(pack: &TrianglePack, lane: usize, ray: &Ray) -> bool {
 /// See [`WideBvh::any`].
 #[target_feature(enable = "avx2,fma")]
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
+    if !may_hit(ray) {
+        return false;
+    }
     // SAFETY: this function has the instructions.
     let like8 = unsafe { F8::splat(0.0) };
     let lines = Lines::new(ray, &tree.bounds);
