@@ -55,7 +55,8 @@ impl Bvh {
         let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
         let tree = build_subtree(&mut references, &mut nodes, Start { place: 0, node: 0, depth: 0 }, token)?;
         if tree.root.count > 0 {
-            nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root, Child::NONE] };
+            // The other side is never met, but by rays that are not finite, whose way ends there too.
+            nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
         Ok(Self { nodes, order, bounds: tree.bounds, depth: tree.depth.max(1) })

@@ -74,7 +74,7 @@ impl Bvh {
         while let Some((index, outer)) = pending.pop() {
             let node = &self.nodes[index as usize];
             for (child, bounds) in node.child.iter().zip(node.bounds) {
-                if *child == Child::NONE {
+                if bounds.is_empty() {
                     continue;
                 }
                 if bounds.union(outer) != outer {

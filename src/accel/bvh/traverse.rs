@@ -164,4 +164,22 @@ mod tests {
             assert_eq!(any, best.is_some());
         }
     }
+
+    #[test]
+    fn a_ray_of_no_number_comes_to_an_end() {
+        for count in 1..4 {
+            let at = |i: usize| Vec3::splat(i as f32 * 3.0);
+            let boxes: Vec<_> = (0..count).map(|i| Aabb { min: at(i), max: at(i) + Vec3::ONE }).collect();
+            let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+            let nan = Ray { t_max: f32::NAN, ..Ray::new(Vec3::NAN, Vec3::NAN) };
+            for ray in [nan, Ray { t_max: f32::INFINITY, ..nan }, Ray::new(Vec3::ZERO, Vec3::NAN)] {
+                let mut tests = 0;
+                tree.closest(&ray, |_, _| {
+                    tests += 1;
+                    None
+                });
+                assert!(tests <= 2 * count && !tree.any(&ray, |_| false), "{tests} tests of {count} boxes");
+            }
+        }
+    }
 }

@@ -28,7 +28,7 @@ const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Node {
-    /// Rows: least x, greatest x, least y, greatest y, least z, greatest z. Empty boxes are ∞ … −∞ and never met.
+    /// Rows: least x, greatest x, least y, greatest y, least z, greatest z. Empty boxes are ∞ … −∞, met by no finite arithmetic.
     pub rows: [[f32; WIDTH]; 6],
     /// See [`Child`].
     pub children: [u32; WIDTH],
