@@ -46,11 +46,6 @@ impl ShearedRay {
         self.axes
     }
 
-    /// What is taken from x and y for each unit of z, and t for each unit of z.
-    pub fn shear(&self) -> Vec3 {
-        self.shear
-    }
-
     /// The hit at a t in (0, `t_max`], from either side. A t within the test's own error of 0 is none
     /// (*Physically Based Rendering*, 4th ed., section 6.8.7).
     #[inline(always)]

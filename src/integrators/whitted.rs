@@ -80,11 +80,13 @@ impl Wave<'_> {
 
     /// Add what arrives by the shadow rays in the queue, in their order, and empty it.
     fn trace_shadows(&mut self, arrived: &mut [Vec3]) -> Result<(), Cancelled> {
-        self.tracer.token.check()?;
         let is_traced = self.tracer.settings.shadows != Shadows::Off;
         let ShadowQueue { rays, sources, arrivals } = &*self.shadows;
         let packets = rays.chunks(PACKET).zip(sources.chunks(PACKET)).zip(arrivals.chunks(PACKET));
-        for ((rays, sources), arrivals) in packets {
+        for (number, ((rays, sources), arrivals)) in packets.enumerate() {
+            if number.is_multiple_of(POLL_INTERVAL / PACKET) {
+                self.tracer.token.check()?;
+            }
             let geometry = &self.tracer.world.geometry;
             let occluded = if is_traced { geometry.occluded_packet(rays, sources) } else { 0 };
             for (lane, arrival) in arrivals.iter().enumerate() {

@@ -357,6 +357,27 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_ray_far_out_meets_what_it_hits_though_numbers_overflow() {
+        let (at, size) = (Vec3::new(1e8, 0.0, 0.0), 96.0);
+        let mesh = [[
+            at + Vec3::new(-size, -size, size),
+            at + Vec3::new(size, -size, size),
+            at + Vec3::new(0.0, size, size),
+        ]];
+        let tree = built(&mesh);
+        for direction in [Vec3::Z, Vec3::Z * 1e-20, Vec3::new(-0.0, 0.0, 1e-20), Vec3::Z * 1e-30] {
+            let ray = Ray::new(at, direction);
+            let expected = brute(&mesh, &ray);
+            for instructions in Instructions::ALL {
+                let tree = tree.clone().with(instructions);
+                assert_eq!(bits(tree.closest(&ray)), bits(expected), "{instructions:?}, {direction:?}");
+                assert_eq!(tree.any(&ray, None), expected.is_some(), "{instructions:?}, {direction:?}");
+            }
+        }
+        assert!(brute(&mesh, &Ray::new(at, Vec3::Z * 1e-20)).is_some());
+    }
+
+    #[test]
     fn any_hit_leaves_one_triangle_out() {
         let mesh = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
         let tree = built(&mesh);

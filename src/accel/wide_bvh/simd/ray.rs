@@ -86,6 +86,14 @@ fn corners(bounds: &Aabb) -> (__m128, __m128) {
     (min, _mm_permute_ps::<0b00_11_10_01>(max))
 }
 
+/// Where numbers are ∞ or −∞.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn overflows(v: __m128) -> __m128 {
+    let unsigned = _mm_and_ps(v, _mm_castsi128_ps(_mm_set1_epi32(i32::MAX)));
+    _mm_cmpeq_ps(unsigned, _mm_set1_ps(f32::INFINITY))
+}
+
 /// The greatest of three lanes that are not negative, in all four.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
@@ -124,7 +132,7 @@ impl Lines {
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
         // Boxes. Where the ray hardly moves along an axis it may as well move a little more: less than a margin all the way
-        // through the boxes. The inverse stays finite so.
+        // through the boxes. The inverse of all but the slowest rays stays finite so.
         let size = _mm_and_ps(direction, unsigned);
         let least = _mm_mul_ps(greatest(size), _mm_set1_ps(LEAST_PART));
         let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
@@ -142,9 +150,13 @@ impl Lines {
         let scale = _mm_permute_ps::<0xaa>(_mm_permutevar_ps(inverse, places));
         let shear = _mm_mul_ps(_mm_permutevar_ps(direction, places), scale);
         let [shear_x, shear_y, _] = in_four(shear);
+        // An axis along which the numbers overflow bounds nothing.
+        let (endless, minus_endless) = (_mm_set1_ps(f32::INFINITY), _mm_set1_ps(f32::NEG_INFINITY));
+        let from_near = _mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down));
+        let from_far = _mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down));
         Self {
-            from_near: in_eight(_mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down))),
-            from_far: in_eight(_mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down))),
+            from_near: in_eight(_mm_blendv_ps(from_near, endless, overflows(from_near))),
+            from_far: in_eight(_mm_blendv_ps(from_far, minus_endless, overflows(from_far))),
             to_near: in_eight(inverse),
             to_far: in_eight(padded),
             near: [downs & 1, 2 + (downs >> 1 & 1), 4 + (downs >> 2 & 1)],
