@@ -8,6 +8,7 @@ mod extremes;
 mod hostile;
 mod house;
 mod kernel;
+mod mutation;
 mod once;
 mod options;
 mod output;
