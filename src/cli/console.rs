@@ -43,6 +43,11 @@ impl Console {
         let _ = writeln!(std::io::stdout().lock(), "{}", visible(text));
     }
 
+    /// A text of our own on stdout, as it is.
+    pub(super) fn text(&self, text: &str) {
+        let _ = std::io::stdout().lock().write_all(text.as_bytes());
+    }
+
     /// `error: …` on stderr.
     pub(super) fn fail(&self, exit: Exit, message: &str) -> Exit {
         self.say(&format!("error: {message}"));
