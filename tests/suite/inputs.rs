@@ -26,7 +26,11 @@ fn studio() -> Desk {
         desk.write(name, PHOTOGRAPH);
     }
     desk.write("camera.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 1\nf 40 4 3\n");
-    desk.write("deep/one.obj", "mtllib one.mtl gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+    desk.write(
+        "deep/one.obj",
+        "mtllib one.mtl materials.json gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n",
+    );
+    desk.write("deep/materials.json", "newmtl other\n");
     desk.write("deep/one.mtl", "newmtl m\nmap_Kd wood.ppm\nnorm bumps.ppm\nmap_d alpha.ppm\n");
     desk
 }
@@ -144,8 +148,10 @@ fn every_kind_of_input_stays() {
         ("scene.toml", "the scene file"),
         ("camera.txt", "orbiter"),
         ("deep/one.obj", "mesh"),
-        ("deep/one.mtl", "one.obj"),
-        ("deep/wood.ppm", "one.obj"),
+        ("deep/materials.json", "one.obj"),
+        // Seen to be no report before the mesh is read.
+        ("deep/one.mtl", "no report"),
+        ("deep/wood.ppm", "no report"),
         // Not there yet, and read as soon as it is.
         ("deep/gone.mtl", "one.obj"),
     ] {

@@ -55,9 +55,9 @@ fn a_conflict_is_said_before_the_work_and_the_picture_shown_all_the_same() {
 #[test]
 fn a_material_file_is_known_before_the_render() {
     let mut bench = Bench::new(SCENE);
-    bench.write("one.mtl", "newmtl a\nmap_d alpha.ppm\n");
-    bench.write("one.obj", &format!("mtllib one.mtl\n{OBJ}"));
-    for (name, role) in [("one.mtl", "a material file"), ("alpha.ppm", "a picture")] {
+    bench.write("mtl.json", "newmtl a\nmap_d alpha.ppm\n");
+    bench.write("one.obj", &format!("mtllib mtl.json\n{OBJ}"));
+    for (name, role) in [("mtl.json", "a material file"), ("alpha.ppm", "a picture")] {
         bench.overrides.report = Some(bench.path(name));
         let of = bench.send();
         let events = bench.until_end(of);
