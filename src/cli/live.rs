@@ -1,6 +1,5 @@
 //! The terminal UI: worker, watcher and front end wired together.
 
-use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
@@ -8,7 +7,6 @@ use super::args;
 use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
-use super::report;
 use crate::pipeline::protocol::{Event, Failure};
 use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
@@ -37,8 +35,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     .map_err(no_thread)?;
     let (forward, events) = channel();
     let from_worker = std::mem::replace(&mut worker.events, channel().1);
-    let report = order.report.clone();
-    let tap = move || tap(&from_worker, report.as_deref(), &watcher, |event| forward.send(event).is_ok());
+    let tap = move || tap(&from_worker, &watcher, |event| forward.send(event).is_ok());
     std::thread::Builder::new().name("glimt-events".to_owned()).spawn(tap).map_err(no_thread)?;
     let remote = worker.remote();
     let outcome = tui::run(Options {
@@ -62,16 +59,11 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// Hand events on, and see to files and reports on the way.
-fn tap(events: &Receiver<Event>, report: Option<&Path>, watcher: &Watcher, forward: impl Fn(Event) -> bool) {
+/// Hand events on, and see on the way to what is watched.
+fn tap(events: &Receiver<Event>, watcher: &Watcher, forward: impl Fn(Event) -> bool) {
     for mut event in events {
         match &mut event {
             Event::Files { files, .. } => watcher.set_files(files.clone()),
-            Event::Done { report: made, generation, .. } => {
-                if let Some(Err(message)) = report.map(|path| report::write(path, made)) {
-                    forward(Event::WriteFailed { generation: *generation, message });
-                }
-            }
             Event::Failed { failure: Failure::Scene(all), .. } => all.iter_mut().for_each(await_scene),
             _ => {}
         }

@@ -176,7 +176,9 @@ fn a_write_that_is_still_postponed_at_the_end_is_known() {
     let generation = 1;
     let written = |generation| protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 };
     let failed = protocol::Event::WriteFailed { generation, message: "full".to_owned() };
-    for (outcome, is_left) in [(None, true), (Some(written(generation)), false), (Some(failed), false)] {
+    let refused = protocol::Event::Refused { generation, conflicts: Vec::new() };
+    let ends = [written(generation), failed, refused].map(|event| (Some(event), false));
+    for (outcome, is_left) in std::iter::once((None, true)).chain(ends) {
         let mut desk = Desk::new();
         desk.press('w');
         assert!(!desk.state.is_write_postponed, "the worker may write it at once");

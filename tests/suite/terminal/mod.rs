@@ -2,6 +2,7 @@
 
 mod endings;
 mod keys;
+mod outputs;
 mod pty;
 
 use std::fs;

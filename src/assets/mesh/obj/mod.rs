@@ -37,7 +37,7 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         };
         return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
     };
-    let Found { materials: known, mut warnings, missing, files } = libraries.found.into_inner();
+    let Found { materials: known, mut warnings, missing, files, pictures } = libraries.found.into_inner();
     let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
         found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
     });
@@ -45,7 +45,7 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         let unknown = survey.used_materials.iter().filter(|name| !known.contains_key(*name));
         warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
     }
-    let mut parsed = Parsed { materials, warnings, companions: files, ..Parsed::default() };
+    let mut parsed = Parsed { materials, warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
     assemble(source, parsed)
 }
