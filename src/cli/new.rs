@@ -1,4 +1,4 @@
-//! `glimt new`: a scene to start from.
+//! `glimt new`: a scene to start from, as a file or on stdout.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -10,6 +10,10 @@ use crate::output::{FileIdentity, OutputError};
 use crate::scene::starter;
 
 pub(super) fn run(file: &Path, console: &Console) -> Exit {
+    if file == Path::new("-") {
+        console.text(starter());
+        return Exit::DONE;
+    }
     let name = file.display();
     match create(file, starter().as_bytes()) {
         Ok(()) => {

@@ -39,12 +39,28 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     })));
     let mut reporter = progress::reporter(order.progress, console);
     let mut deadline = Deadline::default();
-    let exit = follow(&worker, order, console, &mut *reporter, || {
+    let mut written = Vec::new();
+    let exit = follow(&worker, order, console, &mut *reporter, &mut written, || {
         ended.by().is_some() && deadline.is_over(Instant::now())
     });
     reporter.end();
+    if !reporter.says_diagnostics()
+        && let Some(signal) = ended.by().and_then(signals::name)
+    {
+        console.say(&format!("ended by {signal}: {}", outcome(exit, &written)));
+    }
     worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
+}
+
+/// What there is when a signal ends the program.
+fn outcome(exit: Exit, written: &[PathBuf]) -> String {
+    let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
+    match names.as_slice() {
+        [] => "no picture was written".to_owned(),
+        _ if exit == Exit::DONE => "everything was written before".to_owned(),
+        names => format!("only {} was written", names.join(", ")),
+    }
 }
 
 /// When the program ends whatever the worker is at: [`PATIENCE`] after it was first asked for.
@@ -68,9 +84,9 @@ fn follow(
     order: &Order,
     console: &Console,
     reporter: &mut dyn Reporter,
+    written: &mut Vec<PathBuf>,
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
-    let mut written: Vec<PathBuf> = Vec::new();
     let mut unwritten: Option<String> = None;
     let mut idle: Vec<Diagnostic> = Vec::new();
     loop {
@@ -97,7 +113,7 @@ fn follow(
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(&report, &written, unwritten.as_deref(), console, reporter);
+                return done(&report, written, unwritten.as_deref(), console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();

@@ -9,6 +9,7 @@ mod hostile;
 mod house;
 mod inputs;
 mod kernel;
+mod mutation;
 mod once;
 mod options;
 mod output;
