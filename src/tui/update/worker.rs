@@ -8,10 +8,6 @@ use crate::tui::event::{Effect, Written};
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
-    // The order to write outlives its request: whichever carries it out has done so.
-    if matches!(event, Event::Written { .. } | Event::WriteFailed { .. } | Event::Refused { .. }) {
-        state.is_write_postponed = false;
-    }
     if generation(&event) != state.generation {
         return Vec::new();
     }
@@ -39,7 +35,6 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::WritePostponed { .. } => {
-            state.is_write_postponed = true;
             say(state, "the image is written as soon as every pixel has a sample");
         }
         Event::Done { report, warnings, unchanged, .. } => done(state, report, warnings, unchanged),
