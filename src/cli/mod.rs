@@ -11,7 +11,6 @@ mod lower;
 mod new;
 mod once;
 mod progress;
-mod report;
 mod signals;
 
 use std::ffi::OsString;

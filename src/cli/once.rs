@@ -8,9 +8,7 @@ use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
-use super::report;
 use super::signals;
-use crate::output::check_place;
 use crate::pipeline::protocol::{Command, Effective, Event, Failure, Report, Request, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::{Handle, start};
@@ -22,9 +20,6 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(50);
 
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
-    if let Some(Err(error)) = order.report.as_deref().map(check_place) {
-        return console.fail(Exit::FAILED, &error.to_string());
-    }
     let worker = match start() {
         Ok(worker) => worker,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")),
@@ -92,6 +87,7 @@ fn follow(
     written: &mut Vec<PathBuf>,
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
+    let mut unwritten: Option<String> = None;
     let mut idle: Vec<Diagnostic> = Vec::new();
     loop {
         if is_over() {
@@ -110,12 +106,14 @@ fn follow(
         reporter.event(&event);
         match event {
             Event::Written { path, .. } => written.push(path),
+            // A picture that cannot be written fails the request: this is the report.
+            Event::WriteFailed { message, .. } => unwritten = Some(message),
             Event::Done { report, warnings, .. } => {
                 reporter.end();
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(order, &report, written, console, reporter);
+                return done(&report, written, unwritten.as_deref(), console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
@@ -149,18 +147,19 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
 }
 
 fn done(
-    order: &Order,
     report: &Report,
     written: &[PathBuf],
+    unwritten: Option<&str>,
     console: &Console,
     reporter: &dyn Reporter,
 ) -> Exit {
     if reporter.says_results() {
         written.iter().for_each(|path| console.say(&wrote(path, report)));
     }
-    match order.report.as_deref().map(|path| report::write(path, report)) {
-        Some(Err(message)) => console.fail(Exit::FAILED, &message),
-        _ => Exit::DONE,
+    match unwritten {
+        Some(_) if reporter.says_diagnostics() => Exit::FAILED,
+        Some(message) => console.fail(Exit::FAILED, message),
+        None => Exit::DONE,
     }
 }
 

@@ -7,6 +7,7 @@ mod desk;
 mod extremes;
 mod hostile;
 mod house;
+mod inputs;
 mod kernel;
 mod mutation;
 mod once;

@@ -1,6 +1,6 @@
 //! MTL by `tobj`, with the checks that it leaves to its caller.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::assets::read::{self, Watch};
 use crate::assets::{AssetError, FileMaterial};
@@ -98,6 +98,31 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
     }
 }
 
+/// The files of all maps of a material, also of those that nothing looks up.
+pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
+    let known = [
+        &found.ambient_texture,
+        &found.diffuse_texture,
+        &found.specular_texture,
+        &found.normal_texture,
+        &found.shininess_texture,
+        &found.dissolve_texture,
+    ];
+    let is_map =
+        |key: &str| key.starts_with("map_") || ["norm", "bump", "disp", "decal", "refl"].contains(&key);
+    let others = found.unknown_param.iter().filter(|(key, _)| is_map(key)).map(|(_, value)| value);
+    let mut names: Vec<String> = known
+        .into_iter()
+        .flatten()
+        .chain(others)
+        .flat_map(|text| cut_at_comments(text))
+        .filter_map(file_name)
+        .collect();
+    names.sort();
+    names.dedup();
+    names.into_iter().map(|name| folder.join(name)).collect()
+}
+
 /// Negative components are 0.
 fn color(found: Option<[f32; 3]>, otherwise: f32) -> Vec3 {
     found.map_or(Vec3::splat(otherwise), |numbers| Vec3::from_array(numbers).max(Vec3::ZERO))
@@ -131,7 +156,6 @@ fn file_name(statement: &str) -> Option<String> {
 mod tests {
     use super::*;
     use crate::control::{CancelToken, unwatched};
-    use std::path::PathBuf;
 
     fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
         let folder = tempfile::tempdir().expect("a folder");
@@ -164,6 +188,22 @@ mod tests {
         };
         assert_eq!(materials[0], expected);
         assert_eq!(materials[1].diffuse, Vec3::splat(0.6));
+    }
+
+    #[test]
+    fn the_pictures_of_all_maps_are_known() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.mtl");
+        let maps =
+            ["map_Ka", "map_Kd", "map_Ks", "map_Ns", "map_d", "map_Bump", "norm", "map_Ke", "disp", "decal"];
+        let statements = maps.map(|map| format!("{map} {map}.png\n")).concat();
+        std::fs::write(&path, format!("newmtl a\n{statements}refl -type sphere map_Kd.png\n"))
+            .expect("written");
+        let token = CancelToken::new();
+        let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+        let mut expected = maps.map(|map| PathBuf::from(format!("models/{map}.png")));
+        expected.sort();
+        assert_eq!(pictures(&found[0], Path::new("models")), expected);
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub(super) struct Found {
     pub(super) missing: bool,
     /// Files that were read or looked for.
     pub(super) files: Vec<PathBuf>,
+    /// Pictures that they name.
+    pub(super) pictures: Vec<PathBuf>,
 }
 
 impl Libraries<'_> {
@@ -71,7 +73,9 @@ impl Libraries<'_> {
             Ok(materials) => {
                 let folder = path.parent().unwrap_or(Path::new(""));
                 let known = materials.iter().map(|found| (found.name.clone(), mtl::material(found, folder)));
-                self.found.borrow_mut().materials.extend(known);
+                let mut found = self.found.borrow_mut();
+                found.materials.extend(known);
+                found.pictures.extend(materials.iter().flat_map(|material| mtl::pictures(material, folder)));
                 Ok(materials)
             }
             Err(error @ AssetError::Unreadable { .. }) => {

@@ -38,7 +38,8 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         };
         return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
     };
-    let Found { materials: known, resolved, mut warnings, missing, files } = libraries.found.into_inner();
+    let Found { materials: known, resolved, mut warnings, missing, files, pictures } =
+        libraries.found.into_inner();
     let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
         found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
     });
@@ -46,7 +47,7 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         let unknown = used.difference(&resolved);
         warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
     }
-    let mut parsed = Parsed { materials, warnings, companions: files, ..Parsed::default() };
+    let mut parsed = Parsed { materials, warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
     assemble(source, parsed)
 }
