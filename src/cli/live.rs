@@ -64,7 +64,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
             // It ends with the worker; a panic of it has nothing more to say.
             let _ = tap.join();
         }
-        console.say(&writes.said());
+        writes.said().iter().for_each(|line| console.say(line));
     }
     outcome.map(|ended| Exit(ended.status.0)).map_err(|error| {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
@@ -93,12 +93,13 @@ impl Writes {
         }
     }
 
-    fn said(&self) -> String {
+    /// A line for each picture.
+    fn said(&self) -> Vec<String> {
         let lines = self.lines();
         if lines.is_empty() {
-            "the image was not written: glimt was ended first".to_owned()
+            vec!["the image was not written: glimt was ended first".to_owned()]
         } else {
-            lines.join("\n")
+            lines.clone()
         }
     }
 }
