@@ -4,7 +4,7 @@
 //! glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints medians and maxima in
 //! milliseconds: from before the file is written, or the key pressed, until the terminal has read the first bytes
 //! that change the picture. `settled`: nothing is rendering when the file is saved; `busy`: the picture before it still is.
-//! `cancel`: from a newer request until the worker takes it up, whatever it was doing.
+//! Another build of the program may be named by `GLIMT`. `cancel`: from a newer request until the worker takes it up, whatever it was doing.
 
 #![allow(clippy::print_stdout)]
 

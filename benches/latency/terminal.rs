@@ -36,7 +36,8 @@ impl Terminal {
     pub fn open(folder: &Path, arguments: &[&str], columns: u16, rows: u16) -> Outcome<Self> {
         let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
         let pair = native_pty_system().openpty(size)?;
-        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_glimt"));
+        let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
+        let mut command = CommandBuilder::new(program);
         command.args(arguments);
         command.cwd(folder);
         for name in ["NO_COLOR", "TMUX", "TERM_PROGRAM"] {

@@ -3,6 +3,7 @@
 mod endings;
 mod keys;
 mod pty;
+mod saving;
 
 use std::fs;
 
