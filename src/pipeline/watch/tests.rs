@@ -287,7 +287,7 @@ fn a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until
 
 #[test]
 fn a_file_that_comes_in_two_pieces_settles_after_the_second() {
-    let scratch = Scratch::with(false, Waits { settle: 20 * Waits::default().settle, ..Waits::default() });
+    let scratch = Scratch::with(false, Waits { settle: 5 * Waits::default().settle, ..Waits::default() });
     fs::write(scratch.path("a.toml"), "half").expect("written");
     assert!(matches!(scratch.next(), News::Changed(_)));
     std::thread::sleep(Duration::from_millis(200));
