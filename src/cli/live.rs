@@ -28,10 +28,10 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
 fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
     let mut worker = start().map_err(no_thread)?;
-    let (sender, changes) = channel();
-    let watcher = Watcher::start(order.poll, worker.contents(), move |changed| {
-        // A front end that is gone wants no changes.
-        let _ = sender.send(changed);
+    let (sender, news) = channel();
+    let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
+        // A front end that is gone wants no news.
+        let _ = sender.send(said);
     })
     .map_err(no_thread)?;
     let (forward, events) = channel();
@@ -56,7 +56,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         }),
         events,
         previews: worker.previews.clone(),
-        changes,
+        news,
     });
     let has_ended = worker.finish(PATIENCE);
     if outcome.as_ref().is_ok_and(|ended| ended.is_write_unanswered) {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::input::Answer;
-use super::options::Changed;
+use super::options::{Changed, News};
 use crate::film::Picture;
 use crate::pipeline::protocol;
 
@@ -28,6 +28,8 @@ pub(super) enum Event {
     Picture { generation: u64, picture: Arc<Picture> },
     /// A file that the scene depends on was written.
     Changed(Changed),
+    /// Nobody is writing the files that were said to have changed.
+    Settled,
     /// A signal, or what amounts to one.
     Signal(Signal),
     /// A frame with the picture of this generation is on the screen.
@@ -38,6 +40,16 @@ pub(super) enum Event {
     NoShell,
     /// A source of events ended.
     Lost(Source),
+}
+
+impl Event {
+    /// What the watcher says.
+    pub(super) fn of_watcher(news: News) -> Self {
+        match news {
+            News::Changed(changed) => Self::Changed(changed),
+            News::Settled => Self::Settled,
+        }
+    }
 }
 
 /// A key with its modifiers.

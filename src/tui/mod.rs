@@ -25,5 +25,5 @@ mod fixtures;
 mod tests;
 
 pub use color::ColorChoice;
-pub use options::{Changed, Ended, ExitStatus, Options, PreviewChoice, TuiError};
+pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};
 pub use run::run;

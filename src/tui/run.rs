@@ -41,7 +41,7 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
         depth,
     };
     forward("worker-events", options.events, &sender, Event::Worker, Source::Worker)?;
-    forward("changes", options.changes, &sender, Event::Changed, Source::Watcher)?;
+    forward("news", options.news, &sender, Event::of_watcher, Source::Watcher)?;
     input::start(&sender).map_err(failed("read keys from"))?;
 
     let ui = Ui {
@@ -267,10 +267,10 @@ mod tests {
     fn a_source_that_ends_is_reported_after_its_messages() {
         let (from, receiver) = mpsc::channel();
         let (sender, events) = mpsc::channel();
-        forward("test", receiver, &sender, Event::Changed, Source::Watcher).expect("a thread");
-        from.send(super::super::Changed { noticed: Instant::now() }).expect("a receiver");
+        forward("test", receiver, &sender, Event::of_watcher, Source::Watcher).expect("a thread");
+        from.send(super::super::News::Settled).expect("a receiver");
         drop(from);
-        assert!(matches!(events.recv(), Ok(Event::Changed(_))));
+        assert!(matches!(events.recv(), Ok(Event::Settled)));
         assert!(matches!(events.recv(), Ok(Event::Lost(Source::Watcher))));
     }
 }

@@ -37,6 +37,8 @@ pub(super) enum Activity {
     Running { since: Instant },
     /// Finished.
     Done,
+    /// Could not be done, perhaps because the file is not whole yet.
+    Waiting,
     /// Could not be done.
     Broken,
     /// Stopped.
@@ -136,7 +138,13 @@ pub(super) struct State {
 
     /// None while the file is whole.
     pub problems: Option<Problems>,
+    /// What is wrong with a file that may still be being written.
+    pub held: Option<Vec<Diagnostic>>,
+    /// Whether nobody is writing the files.
+    pub is_settled: bool,
     pub warnings: Vec<Diagnostic>,
+    /// Whether they are those of the newest request.
+    pub are_warnings_known: bool,
     pub pane: Pane,
     pub help: bool,
     pub message: Option<String>,
@@ -179,7 +187,10 @@ impl State {
             written: Vec::new(),
             picture: None,
             problems: None,
+            held: None,
+            is_settled: true,
             warnings: Vec::new(),
+            are_warnings_known: false,
             pane: Pane::default(),
             help: false,
             message: None,

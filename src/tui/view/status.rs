@@ -29,6 +29,7 @@ fn activity(state: &State) -> (&'static str, Tone) {
         _ if state.paused => ("paused", Tone::Warning),
         Activity::Running { .. } => ("rendering", Tone::Strong),
         Activity::Done => ("done", Tone::Good),
+        Activity::Waiting => ("waiting for the file", Tone::Warning),
         Activity::Broken if !state.pane.open => ("broken (e shows why)", Tone::Error),
         Activity::Broken => ("broken", Tone::Error),
         Activity::Cancelled => ("stopped", Tone::Warning),
@@ -50,7 +51,8 @@ pub(super) fn bar(state: &State, area: Rect, buffer: &mut Buffer) {
         return;
     }
     let gauge = gauge(fraction, usize::from(room), state.preview == PreviewKind::Ascii);
-    let tone = if state.activity == Activity::Broken { Tone::Faint } else { Tone::Good };
+    let tone =
+        if matches!(state.activity, Activity::Broken | Activity::Waiting) { Tone::Faint } else { Tone::Good };
     put(
         buffer,
         area,
@@ -70,7 +72,9 @@ fn bar_words(state: &State) -> String {
                 words.push("unchanged".to_owned());
             }
         }
-        (Activity::Broken | Activity::Cancelled, _) => words.push(activity(state).0.to_owned()),
+        (Activity::Waiting | Activity::Broken | Activity::Cancelled, _) => {
+            words.push(activity(state).0.to_owned())
+        }
         (Activity::Running { .. }, Some(progress)) => {
             words.push(format!("{}%", percent(progress.fraction)));
             words.push(format!("samples {}/{}", progress.samples, progress.total_samples));

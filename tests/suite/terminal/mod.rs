@@ -5,6 +5,7 @@ mod input;
 mod keys;
 mod outputs;
 mod pty;
+mod saving;
 
 use std::fs;
 

@@ -285,6 +285,10 @@ impl Colors {
         self.red + self.green + self.blue
     }
 
+    pub fn is_most(&self, name: &str) -> bool {
+        self.most() == Some(name)
+    }
+
     /// The colour of nearly all of them, if they are enough for a picture.
     fn most(&self) -> Option<&'static str> {
         let total = self.total();
