@@ -9,6 +9,7 @@ mod color;
 mod event;
 mod keymap;
 mod options;
+pub mod paint;
 mod run;
 mod signals;
 mod state;
@@ -23,6 +24,6 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
-pub use color::ColorChoice;
+pub use color::{ColorChoice, ColorDepth};
 pub use options::{Changed, Ended, ExitStatus, Options, PreviewChoice, TuiError};
 pub use run::run;
