@@ -10,6 +10,7 @@ mod event;
 mod input;
 mod keymap;
 mod options;
+pub mod paint;
 mod run;
 mod signals;
 mod state;
@@ -24,6 +25,6 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
-pub use color::ColorChoice;
+pub use color::{ColorChoice, ColorDepth};
 pub use options::{Changed, Ended, ExitStatus, Options, PreviewChoice, TuiError};
 pub use run::run;
