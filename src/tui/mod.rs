@@ -6,9 +6,11 @@
 
 mod action;
 mod color;
+mod display;
 mod event;
 mod input;
 mod keymap;
+mod line;
 mod options;
 pub mod paint;
 mod run;
@@ -17,6 +19,7 @@ mod state;
 mod terminal;
 mod update;
 mod view;
+mod writer;
 
 #[cfg(test)]
 mod by_hand;

@@ -4,6 +4,8 @@ mod endings;
 mod input;
 mod keys;
 mod pty;
+mod relay;
+mod thin_line;
 
 use std::fs;
 
