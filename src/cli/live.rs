@@ -1,6 +1,5 @@
 //! The terminal UI: worker, watcher and front end wired together.
 
-use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -9,7 +8,6 @@ use super::args;
 use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
-use super::report;
 use crate::pipeline::protocol::{Command, Event, Failure};
 use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
@@ -38,12 +36,9 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     .map_err(no_thread)?;
     let (forward, events) = channel();
     let from_worker = std::mem::replace(&mut worker.events, channel().1);
-    let report = order.report.clone();
     let writes = Writes::default();
     let heard = writes.clone();
-    let tap = move || {
-        tap(&from_worker, report.as_deref(), &watcher, &heard, |event| forward.send(event).is_ok());
-    };
+    let tap = move || tap(&from_worker, &watcher, &heard, |event| forward.send(event).is_ok());
     let tap = std::thread::Builder::new().name("glimt-events".to_owned()).spawn(tap).map_err(no_thread)?;
     let remote = worker.remote();
     let asked = writes.clone();
@@ -90,6 +85,10 @@ impl Writes {
         match event {
             Event::Written { path, .. } => self.lines().push(format!("wrote {}", path.display())),
             Event::WriteFailed { message, .. } => self.lines().push(format!("error: {message}")),
+            Event::Refused { conflicts, .. } => {
+                let lines = conflicts.iter().map(|conflict| format!("error: {}", conflict.message));
+                self.lines().extend(lines);
+            }
             _ => {}
         }
     }
@@ -104,14 +103,8 @@ impl Writes {
     }
 }
 
-/// Hand events on, and see to files, reports and pictures on the way.
-fn tap(
-    events: &Receiver<Event>,
-    report: Option<&Path>,
-    watcher: &Watcher,
-    writes: &Writes,
-    forward: impl Fn(Event) -> bool,
-) {
+/// Hand events on, and see on the way to what is watched and to what is written.
+fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: impl Fn(Event) -> bool) {
     let mut is_heard = true;
     for mut event in events {
         writes.hear(&event);
@@ -121,11 +114,6 @@ fn tap(
         }
         match &mut event {
             Event::Files { files, .. } => watcher.set_files(files.clone()),
-            Event::Done { report: made, generation, .. } => {
-                if let Some(Err(message)) = report.map(|path| report::write(path, made)) {
-                    forward(Event::WriteFailed { generation: *generation, message });
-                }
-            }
             Event::Failed { failure: Failure::Scene(all), .. } => all.iter_mut().for_each(await_scene),
             _ => {}
         }

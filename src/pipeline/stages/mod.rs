@@ -83,6 +83,8 @@ pub(super) struct Findings {
     /// Everything that was read or tried.
     pub(super) files: Vec<FileRead>,
     pub(super) errors: Vec<Diagnostic>,
+    /// Why nothing is written, as it was found last.
+    pub(super) conflicts: Vec<Diagnostic>,
     pub(super) warnings: Vec<Diagnostic>,
 }
 

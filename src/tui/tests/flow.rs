@@ -178,10 +178,10 @@ fn whether_the_person_knows_what_came_of_a_write_is_known_at_the_end() {
     let generation = 1;
     let written = |generation| protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 };
     let failed = protocol::Event::WriteFailed { generation, message: "full".to_owned() };
+    let refused = protocol::Event::Refused { generation, conflicts: Vec::new() };
     let postponed = protocol::Event::WritePostponed { generation };
-    for (outcome, is_open) in
-        [(None, true), (Some(postponed), true), (Some(written(generation)), false), (Some(failed), false)]
-    {
+    let ends = [written(generation), failed, refused].map(|event| (Some(event), false));
+    for (outcome, is_open) in [(None, true), (Some(postponed), true)].into_iter().chain(ends) {
         let mut desk = Desk::new();
         assert!(!desk.state.asked_to_write);
         desk.press('w');

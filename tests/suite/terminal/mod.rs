@@ -3,6 +3,7 @@
 mod endings;
 mod input;
 mod keys;
+mod outputs;
 mod pty;
 mod relay;
 mod thin_line;
