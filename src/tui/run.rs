@@ -306,6 +306,8 @@ impl Ui {
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         view::draw(&self.state, &mut buffer);
         let is_new = self.note_picture();
+        // It is all there, and no better one has come since.
+        self.drawn.is_first &= is_new || !self.display.is_complete();
         self.display.aim(&buffer, Layout::of(&self.state).preview, self.fidelity(), is_new);
         None
     }
