@@ -1,6 +1,7 @@
 //! One request from the scene file to pictures on disk: the stages in their order, and all that is kept between
 //! requests.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -370,11 +371,8 @@ impl Engine {
 
     fn say_files(&self, findings: &Findings, sink: &Sink) {
         let mut files = findings.files.clone();
-        for asset in &self.assets {
-            if files.iter().all(|file| file.path != asset.path) {
-                files.push(asset.clone());
-            }
-        }
+        let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
+        files.extend(self.assets.iter().filter(|asset| !known.contains(asset.path.as_path())).cloned());
         sink.files(files);
     }
 
