@@ -35,6 +35,8 @@ pub(super) struct Display {
     frame: Option<usize>,
     /// Of the last picture.
     report: Option<FrameReport>,
+    /// Whether that is news.
+    is_reported: bool,
 }
 
 impl Display {
@@ -48,6 +50,7 @@ impl Display {
             is_complete: true,
             frame: None,
             report: None,
+            is_reported: true,
         };
         display.restart(now);
         display
@@ -93,6 +96,7 @@ impl Display {
         self.is_complete = true;
         if let Some(bytes) = self.frame.take() {
             self.report = Some(FrameReport { bytes, round_trip: self.line.round_trip() });
+            self.is_reported = false;
         }
     }
 
@@ -141,9 +145,14 @@ impl Display {
         if self.is_complete { None } else { self.line.wake(now) }
     }
 
-    /// The report on the last picture, once.
+    /// The report on the last picture, once, and again when the terminal's first answer came after it.
     pub(super) fn take_report(&mut self) -> Option<FrameReport> {
-        self.report.take()
+        let report = self.report.as_mut()?;
+        if report.round_trip.is_none() && self.line.round_trip().is_some() {
+            report.round_trip = self.line.round_trip();
+            self.is_reported = false;
+        }
+        (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
     }
 
     /// How long to wait for answers that would else be typed into the shell; none: nothing is owed.

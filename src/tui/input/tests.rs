@@ -137,7 +137,13 @@ fn an_escape_character_is_the_key_when_nothing_follows() {
 
 #[test]
 fn what_follows_an_escape_character_late_is_still_its_sequence() {
-    for (rest, input) in [(&b"[0n"[..], READY), (b"[A", special(KeyCode::Up))] {
+    for (rest, input) in [
+        (&b"[0n"[..], READY),
+        (b"[A", special(KeyCode::Up)),
+        (b"[?62;22c", Input::Answer(Answer::Attributes)),
+        (b"[?2026;2$y", Input::Answer(Answer::Synchronized { is_known: true })),
+        (b"[24;80R", Input::Answer(Answer::Other)),
+    ] {
         let mut bench = Bench::new();
         bench.read(b"\x1b");
         assert_eq!(bench.wait(400), [ESC]);

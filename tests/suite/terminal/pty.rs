@@ -271,12 +271,12 @@ impl Terminal {
     /// Waits for the end; gives the exit code after checking that the terminal is as it was before.
     #[track_caller]
     pub fn end(self) -> u32 {
-        self.end_saying().0
+        self.end_saying("")
     }
 
-    /// The same, with what is on the screen then.
+    /// The same, with one of these words, `|` between them, on the screen then.
     #[track_caller]
-    pub fn end_saying(mut self) -> (u32, String) {
+    pub fn end_saying(mut self, words: &str) -> u32 {
         let code = self.code();
         self.wait("the screen from before, with a cursor", |screen| {
             !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
@@ -287,7 +287,8 @@ impl Terminal {
         {
             assert_ne!(modes & flag.bits(), 0, "{name} is off");
         }
-        (code, self.text())
+        self.wait(words, |screen| words.split('|').any(|word| screen.contents().contains(word)));
+        code
     }
 }
 

@@ -12,11 +12,10 @@ const SEEN: Duration = Duration::from_millis(400);
 
 const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Nothing];
 
-/// A render that does not end and whose pictures change everywhere.
+/// A render that does not end.
 fn endless(answers: Answers) -> (Folder, Terminal) {
     let folder = Folder::new();
-    let noisy = SCENE.replace("samples = 4", "samples = 10000000").replace("radius = 0.6", "radius = 3.0");
-    folder.write("scene.toml", &noisy);
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     let terminal = folder.thin_line(answers);
     terminal.wait_for("ETA");
     terminal.wait("a picture", |screen| super::Colors::of(screen).red > 500);
