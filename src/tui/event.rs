@@ -1,5 +1,6 @@
 //! Everything that can happen to the front end: one closed set.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -7,6 +8,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::input::Answer;
 use super::options::{Changed, News};
+use super::state::FrameReport;
 use crate::film::Picture;
 use crate::pipeline::protocol;
 
@@ -18,8 +20,13 @@ pub(super) enum Event {
     /// Text was pasted.
     Paste,
     /// The terminal answered a question.
-    #[expect(dead_code, reason = "nothing is asked yet")]
     Answer(Answer),
+    /// The system took so many bytes for the terminal.
+    Written { bytes: usize },
+    /// The terminal cannot be written to.
+    Unwritable(ErrorKind),
+    /// A picture has been sent.
+    Frame(FrameReport),
     /// The window has this size now.
     Resize(Window),
     /// The worker says something. Pictures come as [`Event::Picture`].

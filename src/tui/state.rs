@@ -86,6 +86,14 @@ impl AssetBar {
     }
 }
 
+/// What the last picture took on its way to the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FrameReport {
+    pub bytes: usize,
+    /// How long the terminal takes to answer; none: it does not.
+    pub round_trip: Option<Duration>,
+}
+
 /// The picture on the screen and the request that it is of.
 #[derive(Clone, Debug)]
 pub(super) struct Shown {
@@ -153,11 +161,14 @@ pub(super) struct State {
     /// From the last save to its first changed cell.
     pub first_change: Option<Duration>,
 
+    pub frame: Option<FrameReport>,
+
     /// The time of the newest event.
     pub now: Instant,
     /// Whether the screen is out of date.
     pub dirty: bool,
-    /// Whether the next frame is the first picture of a request, which does not wait for its turn.
+    /// Whether the next frame is the first picture of a request or the answer to a key, which do not wait for their
+    /// turn.
     pub urgent: bool,
 }
 
@@ -196,6 +207,7 @@ impl State {
             message: None,
             change: None,
             first_change: None,
+            frame: None,
             now,
             dirty: true,
             urgent: false,

@@ -37,8 +37,13 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
 fn happened(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
         Event::Key(key) => keys::update(state, key),
-        // There is nothing to type text into, and what the line has to know of answers it is told by the loop.
-        Event::Paste | Event::Answer(_) => Vec::new(),
+        // There is nothing to type text into; the loop tells the line what that has to know.
+        Event::Paste | Event::Answer(_) | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
+        Event::Frame(report) => {
+            state.dirty |= state.frame != Some(report);
+            state.frame = Some(report);
+            Vec::new()
+        }
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
         Event::Picture { generation, picture } => show(state, Shown { generation, picture }),

@@ -115,8 +115,22 @@ pub(super) fn status(state: &State, layout: &Layout, buffer: &mut Buffer) {
         words.splice(0..0, state.message.clone());
     }
     let used = put_right(buffer, area, &help, Tone::Strong, state.depth);
-    let room = Rect { width: area.width.saturating_sub(used + 1), ..area };
-    put(buffer, room, &[(&words.join(" · "), Tone::Plain)], state.depth);
+    let mut room = Rect { width: area.width.saturating_sub(used + 1), ..area };
+    let words = words.join(" · ");
+    let frame = format!("{} ", frame(state));
+    // The toggles come first where there is not enough room.
+    if columns(&words) + 1 + columns(&frame) <= room.width {
+        room.width -= put_right(buffer, room, &frame, Tone::Faint, state.depth);
+    }
+    put(buffer, room, &[(&words, Tone::Plain)], state.depth);
+}
+
+/// What the last picture took on its way: its size, and how long the terminal takes to answer.
+fn frame(state: &State) -> String {
+    let Some(frame) = state.frame else { return String::new() };
+    let size = format!("{} kB", frame.bytes.div_ceil(1000));
+    let answer = frame.round_trip.map_or(String::new(), |time| format!(" {} ms", time.as_millis().max(1)));
+    size + &answer
 }
 
 fn depth_of_field(state: &State) -> bool {
