@@ -288,7 +288,8 @@ impl Engine {
         self.assets = findings.files.clone();
         if findings.errors.is_empty() {
             self.say_files(findings, table.sink);
-            let (generation, warnings) = (table.sink.generation, findings.warnings.clone());
+            let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
+            let generation = table.sink.generation;
             table.sink.send(Event::Warnings { generation, warnings });
             Ok((found, texels))
         } else {

@@ -49,7 +49,7 @@ fn a_conflict_is_said_before_the_work_and_the_picture_shown_all_the_same() {
     let of = bench.send();
     let events = bench.until_end(of);
     assert!(conflicts_and_end(&events).0.is_empty());
-    assert!(good.exists() && report.exists());
+    assert!(good.exists() && report.exists(), "{events:?}");
 }
 
 #[test]
