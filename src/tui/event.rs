@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
+use super::input::Answer;
 use super::options::Changed;
 use crate::film::Picture;
 use crate::pipeline::protocol;
@@ -14,6 +15,11 @@ use crate::pipeline::protocol;
 pub(super) enum Event {
     /// A key was pressed.
     Key(KeyPress),
+    /// Text was pasted.
+    Paste,
+    /// The terminal answered a question.
+    #[expect(dead_code, reason = "nothing is asked yet")]
+    Answer(Answer),
     /// The window has this size now.
     Resize(Window),
     /// The worker says something. Pictures come as [`Event::Picture`].
@@ -72,12 +78,16 @@ pub(super) struct Window {
 pub(super) enum Signal {
     Interrupt,
     Terminate,
+    /// SIGQUIT.
+    Quit,
     /// SIGHUP, or the terminal is gone without one.
     Hangup,
     /// SIGTSTP.
     Suspend,
     /// SIGCONT.
     Continue,
+    /// SIGWINCH.
+    Resize,
 }
 
 /// Where events come from.
@@ -103,6 +113,8 @@ pub(super) enum Effect {
     Suspend,
     /// SIGCONT came: take the terminal again and draw everything.
     Redraw,
+    /// Ask how large the window is.
+    Measure,
 }
 
 /// A picture that was written.

@@ -7,6 +7,7 @@
 mod action;
 mod color;
 mod event;
+mod input;
 mod keymap;
 mod options;
 mod run;

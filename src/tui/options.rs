@@ -53,6 +53,8 @@ impl ExitStatus {
     pub const QUIT: Self = Self(0);
     /// SIGHUP: the terminal is gone.
     pub const HANGUP: Self = Self(129);
+    /// SIGQUIT.
+    pub const ABORTED: Self = Self(131);
     /// SIGINT or ctrl-c.
     pub const INTERRUPTED: Self = Self(130);
     /// SIGTERM.
@@ -64,8 +66,8 @@ impl ExitStatus {
 pub struct Ended {
     /// How the program is to end.
     pub status: ExitStatus,
-    /// Whether a picture was asked for that was still to be written, as not every pixel had a sample.
-    pub is_write_postponed: bool,
+    /// Whether a picture was asked for and the person does not know yet what came of it.
+    pub is_write_unanswered: bool,
 }
 
 /// Why the front end could not go on.

@@ -6,10 +6,9 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crossterm::event::{Event as TerminalEvent, KeyEvent, KeyEventKind};
-
 use super::color::{self, ColorDepth};
-use super::event::{Effect, Event, KeyPress, Source};
+use super::event::{Effect, Event, Source};
+use super::input;
 use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
 use super::signals::{self, Listener};
 use super::state::{PreviewKind, Setup, State};
@@ -43,7 +42,7 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
     };
     forward("worker-events", options.events, &sender, Event::Worker, Source::Worker)?;
     forward("changes", options.changes, &sender, Event::Changed, Source::Watcher)?;
-    read_keys(options.cell_aspect, &sender)?;
+    input::start(&sender).map_err(failed("read keys from"))?;
 
     let ui = Ui {
         screen,
@@ -93,31 +92,6 @@ fn forward<T: Send + 'static>(
     Ok(())
 }
 
-fn read_keys(cell_aspect: Option<f32>, events: &Sender<Event>) -> Result<(), TuiError> {
-    let events = events.clone();
-    let read = move || {
-        while let Ok(event) = crossterm::event::read() {
-            let Some(event) = translated(&event, cell_aspect) else { continue };
-            if events.send(event).is_err() {
-                return;
-            }
-        }
-        let _ = events.send(Event::Lost(Source::Keys));
-    };
-    thread::Builder::new().name("keys".to_owned()).spawn(read).map_err(failed("read keys from"))?;
-    Ok(())
-}
-
-fn translated(event: &TerminalEvent, cell_aspect: Option<f32>) -> Option<Event> {
-    match event {
-        TerminalEvent::Key(KeyEvent { code, modifiers, kind: KeyEventKind::Press, .. }) => {
-            Some(Event::Key(KeyPress { code: *code, modifiers: *modifiers }))
-        }
-        TerminalEvent::Resize(..) => Some(Event::Resize(terminal::window(cell_aspect))),
-        _ => None,
-    }
-}
-
 struct Ui {
     screen: Screen,
     state: State,
@@ -154,7 +128,7 @@ impl Ui {
             Some(End::Quit(status)) => status,
             None => ExitStatus::QUIT,
         };
-        Ok(Ended { status, is_write_postponed: self.state.is_write_postponed })
+        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write })
     }
 
     /// Everything that has happened, or the next thing that does.
@@ -214,6 +188,7 @@ impl Ui {
             }
             Effect::Suspend => {}
             Effect::Redraw => return self.redraw(),
+            Effect::Measure => return self.measure(),
         }
         None
     }
@@ -222,6 +197,10 @@ impl Ui {
         if let Err(error) = self.screen.resume() {
             return Some(unwritable(error));
         }
+        self.measure()
+    }
+
+    fn measure(&mut self) -> Option<End> {
         self.apply(Event::Resize(terminal::window(self.cell_aspect)))
     }
 
@@ -261,19 +240,8 @@ fn next_wake(state: &State, next_frame: Instant) -> Option<Instant> {
 
 #[cfg(test)]
 mod tests {
-    use crossterm::event::{KeyCode, KeyModifiers};
-
     use super::*;
     use crate::tui::fixtures::state;
-
-    #[test]
-    fn keys_act_on_press_only() {
-        let key =
-            |kind| TerminalEvent::Key(KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, kind));
-        assert!(translated(&key(KeyEventKind::Press), None).is_some());
-        assert!(translated(&key(KeyEventKind::Release), None).is_none());
-        assert!(translated(&key(KeyEventKind::Repeat), None).is_none());
-    }
 
     #[test]
     fn an_idle_state_is_not_woken() {

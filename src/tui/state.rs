@@ -131,8 +131,6 @@ pub(super) struct State {
     pub renders: u64,
     /// Whether the next picture that is written is one that was asked for.
     pub asked_to_write: bool,
-    /// Whether the picture that was asked for waits until every pixel has a sample.
-    pub is_write_postponed: bool,
     pub written: Vec<Written>,
     pub picture: Option<Shown>,
 
@@ -178,7 +176,6 @@ impl State {
             unchanged: false,
             renders: 0,
             asked_to_write: false,
-            is_write_postponed: false,
             written: Vec::new(),
             picture: None,
             problems: None,

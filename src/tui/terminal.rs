@@ -9,6 +9,7 @@ use std::sync::{Mutex, Once, PoisonError};
 use std::thread::ThreadId;
 
 use crossterm::cursor::{Hide, Show};
+use crossterm::event::{DisableBracketedPaste, EnableBracketedPaste};
 use crossterm::style::ResetColor;
 use crossterm::terminal::{
     Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode,
@@ -129,12 +130,12 @@ pub(super) fn rescue() {
 
 /// The bytes that take the screen.
 fn enter(out: &mut impl Write) -> io::Result<()> {
-    execute!(out, EnterAlternateScreen, Hide, Clear(ClearType::All))
+    execute!(out, EnterAlternateScreen, Hide, EnableBracketedPaste, Clear(ClearType::All))
 }
 
 /// The bytes that give it back, from any state that a frame can be cut in.
 fn leave(out: &mut impl Write) -> io::Result<()> {
-    execute!(out, EndSynchronizedUpdate, ResetColor, LeaveAlternateScreen, Show)
+    execute!(out, EndSynchronizedUpdate, ResetColor, DisableBracketedPaste, LeaveAlternateScreen, Show)
 }
 
 /// While the terminal is taken, a panic of its owner gives it back and is then reported as always; a panic of
@@ -216,7 +217,7 @@ mod tests {
     fn leaving_undoes_entering() {
         let enter = bytes(enter);
         let leave = bytes(leave);
-        for mode in ["?1049", "?25"] {
+        for mode in ["?1049", "?25", "?2004"] {
             assert!(enter.contains(mode) && leave.contains(mode), "{mode}: {enter:?} {leave:?}");
         }
         assert!(enter.contains("\x1b[?1049h") && enter.contains("\x1b[?25l"), "{enter:?}");

@@ -85,6 +85,8 @@ pub(super) struct Findings {
     pub(super) files: Vec<FileRead>,
     known: HashSet<FileRead>,
     pub(super) errors: Vec<Diagnostic>,
+    /// Why nothing is written, as it was found last.
+    pub(super) conflicts: Vec<Diagnostic>,
     pub(super) warnings: Vec<Diagnostic>,
 }
 

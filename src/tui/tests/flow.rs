@@ -151,7 +151,9 @@ fn signals_end_stop_and_redraw() {
     assert!(matches!(effect(&mut desk, Signal::Terminate)[..], [Effect::Quit(ExitStatus(143))]));
     assert!(matches!(effect(&mut desk, Signal::Hangup)[..], [Effect::Quit(ExitStatus(129))]));
     assert!(matches!(effect(&mut desk, Signal::Suspend)[..], [Effect::Suspend]));
+    assert!(matches!(effect(&mut desk, Signal::Quit)[..], [Effect::Quit(ExitStatus(131))]));
     assert!(matches!(effect(&mut desk, Signal::Continue)[..], [Effect::Redraw]));
+    assert!(matches!(effect(&mut desk, Signal::Resize)[..], [Effect::Measure]));
 }
 
 #[test]
@@ -172,25 +174,27 @@ fn a_cancelled_render_says_that_it_stopped() {
 }
 
 #[test]
-fn a_write_that_is_still_postponed_at_the_end_is_known() {
+fn whether_the_person_knows_what_came_of_a_write_is_known_at_the_end() {
     let generation = 1;
     let written = |generation| protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 };
     let failed = protocol::Event::WriteFailed { generation, message: "full".to_owned() };
-    for (outcome, is_left) in [(None, true), (Some(written(generation)), false), (Some(failed), false)] {
+    let refused = protocol::Event::Refused { generation, conflicts: Vec::new() };
+    let postponed = protocol::Event::WritePostponed { generation };
+    let ends = [written(generation), failed, refused].map(|event| (Some(event), false));
+    for (outcome, is_open) in [(None, true), (Some(postponed), true)].into_iter().chain(ends) {
         let mut desk = Desk::new();
+        assert!(!desk.state.asked_to_write);
         desk.press('w');
-        assert!(!desk.state.is_write_postponed, "the worker may write it at once");
-        desk.worker(protocol::Event::WritePostponed { generation });
         if let Some(event) = outcome {
             desk.worker(event);
         }
         assert!(matches!(desk.press('q')[..], [Effect::Quit(ExitStatus::QUIT)]));
-        assert_eq!(desk.state.is_write_postponed, is_left);
+        assert_eq!(desk.state.asked_to_write, is_open);
     }
     let mut desk = Desk::new();
-    desk.worker(protocol::Event::WritePostponed { generation });
+    desk.press('w');
     desk.press('r');
-    assert!(desk.state.is_write_postponed, "the order goes over to the next request");
-    desk.worker(written(generation));
-    assert!(!desk.state.is_write_postponed, "the request before wrote it after all");
+    assert!(desk.state.asked_to_write, "the order goes over to the next request");
+    desk.worker(written(desk.state.generation));
+    assert!(!desk.state.asked_to_write);
 }

@@ -257,6 +257,32 @@ fn warnings_are_counted_and_shown_on_demand() {
 }
 
 #[test]
+fn a_conflict_opens_the_pane_once_and_stays_until_it_is_solved() {
+    let mut desk = Desk::new();
+    let conflict = || vec![diagnostic(Severity::Error, "cannot write a.png")];
+    let refused = || protocol::Event::Refused { generation: 1, conflicts: conflict() };
+    desk.worker(refused());
+    assert!(
+        desk.text().contains("error: cannot write a.png") && desk.text().contains("1 error"),
+        "{}",
+        desk.text()
+    );
+    assert!(desk.text().contains("nothing is written"));
+    assert!(desk.state.is_running(), "the render goes on");
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    assert!(!desk.text().contains("cannot write a.png"));
+    desk.worker(refused());
+    assert!(!desk.text().contains("cannot write a.png"), "a person has seen and closed it");
+    let warning = diagnostic(Severity::Warning, "texture `b` is not used");
+    desk.worker(done(1, [conflict(), vec![warning]].concat(), false));
+    assert!(desk.text().contains("1 error, 1 warning (e shows them)"), "{}", desk.text());
+    desk.press('e');
+    assert!(desk.text().contains("cannot write a.png"));
+    desk.worker(done(1, Vec::new(), false));
+    assert!(!desk.text().contains("error"), "{}", desk.text());
+}
+
+#[test]
 fn names_with_escape_sequences_come_out_harmless() {
     let evil = "a\u{1b}]52;c;eA==\u{7}\u{9b}31m\u{202e}b\rc";
     let mut desk = Desk::new();

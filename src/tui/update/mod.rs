@@ -26,6 +26,8 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
     state.now = now;
     match event {
         Event::Key(key) => keys::update(state, key),
+        // There is nothing to type text into, and what the line has to know of answers it is told by the loop.
+        Event::Paste | Event::Answer(_) => Vec::new(),
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
         Event::Picture { generation, picture } => show(state, Shown { generation, picture }),
@@ -128,9 +130,11 @@ fn signalled(signal: Signal) -> Effect {
     match signal {
         Signal::Interrupt => Effect::Quit(ExitStatus::INTERRUPTED),
         Signal::Terminate => Effect::Quit(ExitStatus::TERMINATED),
+        Signal::Quit => Effect::Quit(ExitStatus::ABORTED),
         Signal::Hangup => Effect::Quit(ExitStatus::HANGUP),
         Signal::Suspend => Effect::Suspend,
         Signal::Continue => Effect::Redraw,
+        Signal::Resize => Effect::Measure,
     }
 }
 

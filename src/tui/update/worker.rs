@@ -2,16 +2,12 @@
 
 use super::say;
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport};
-use crate::scene::diagnostic::Diagnostic;
+use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Written};
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
-    // The order to write outlives its request: whichever carries it out has done so.
-    if matches!(event, Event::Written { .. } | Event::WriteFailed { .. }) {
-        state.is_write_postponed = false;
-    }
     if generation(&event) != state.generation {
         return Vec::new();
     }
@@ -37,8 +33,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             state.asked_to_write = false;
             say(state, format!("error: {}", visible(&message)));
         }
+        Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::WritePostponed { .. } => {
-            state.is_write_postponed = true;
             say(state, "the image is written as soon as every pixel has a sample");
         }
         Event::Done { report, warnings, unchanged, .. } => done(state, report, warnings, unchanged),
@@ -62,6 +58,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Preview { generation }
         | Event::Written { generation, .. }
         | Event::WriteFailed { generation, .. }
+        | Event::Refused { generation, .. }
         | Event::WritePostponed { generation }
         | Event::Files { generation, .. }
         | Event::Done { generation, .. }
@@ -101,6 +98,17 @@ fn wrote(state: &mut State, written: Written) {
     }
     state.written.retain(|other| other.path != written.path);
     state.written.push(written);
+}
+
+/// What is new is shown at once; what a person has seen and closed stays closed.
+fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
+    state.asked_to_write = false;
+    say(state, "nothing is written (e shows why)");
+    if !conflicts.iter().all(|conflict| state.warnings.contains(conflict)) {
+        state.pane = Pane { open: true, scroll: 0 };
+    }
+    state.warnings.retain(|one| one.severity == Severity::Warning);
+    state.warnings.splice(0..0, conflicts);
 }
 
 /// The file is whole again.

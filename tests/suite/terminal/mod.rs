@@ -1,7 +1,9 @@
 //! The live program in a pseudo-terminal, as a person sees it.
 
 mod endings;
+mod input;
 mod keys;
+mod outputs;
 mod pty;
 
 use std::fs;

@@ -109,7 +109,7 @@ pub struct Terminal {
     // Held so that the terminal's modes can be looked at when the program is gone.
     _slave: Box<dyn SlavePty + Send>,
     child: Box<dyn Child + Send + Sync>,
-    keys: Box<dyn Write + Send>,
+    keys: Arc<Mutex<Box<dyn Write + Send>>>,
     screen: Arc<Mutex<vt100::Parser>>,
 }
 
@@ -138,12 +138,22 @@ impl Terminal {
                 shared.lock().expect("a parser does not panic").process(&bytes[..count]);
             }
         });
-        let keys = pair.master.take_writer().expect("a writer");
+        let keys = Arc::new(Mutex::new(pair.master.take_writer().expect("a writer")));
         Self { master: pair.master, _slave: pair.slave, child, keys, screen }
     }
 
     pub fn press(&mut self, keys: &str) {
-        self.keys.write_all(keys.as_bytes()).expect("keys are taken");
+        let mut writer = self.keys.lock().expect("a writer does not panic");
+        writer.write_all(keys.as_bytes()).expect("keys are taken");
+    }
+
+    /// The same for more than the terminal holds, which waits until the program has read it.
+    pub fn burst(&mut self, keys: String) {
+        let writer = self.keys.clone();
+        std::thread::spawn(move || {
+            // A program that ends takes no more.
+            let _ = writer.lock().expect("a writer does not panic").write_all(keys.as_bytes());
+        });
     }
 
     pub fn resize(&mut self, columns: u16, rows: u16) {
@@ -205,7 +215,13 @@ impl Terminal {
 
     /// Waits for the end; gives the exit code after checking that the terminal is as it was before.
     #[track_caller]
-    pub fn end(mut self) -> u32 {
+    pub fn end(self) -> u32 {
+        self.end_saying().0
+    }
+
+    /// The same, with what is on the screen then.
+    #[track_caller]
+    pub fn end_saying(mut self) -> (u32, String) {
         let deadline = Instant::now() + LIMIT;
         let status = loop {
             if let Some(status) = self.child.try_wait().expect("a child") {
@@ -215,7 +231,7 @@ impl Terminal {
             std::thread::sleep(Duration::from_millis(5));
         };
         self.wait("the screen from before, with a cursor", |screen| {
-            !screen.alternate_screen() && !screen.hide_cursor()
+            !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
         });
         let modes = self.master.get_termios().expect("modes").local_flags.bits();
         for (name, flag) in
@@ -223,7 +239,7 @@ impl Terminal {
         {
             assert_ne!(modes & flag.bits(), 0, "{name} is off");
         }
-        status.exit_code()
+        (status.exit_code(), self.text())
     }
 }
 
