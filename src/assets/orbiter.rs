@@ -20,6 +20,7 @@ use std::path::Path;
 
 use super::{AssetError, OrbiterCamera, read};
 use crate::control::{CancelToken, unwatched};
+use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
 
 /// An orbiter file is five lines; more than this is something else.
 const LIMIT: u64 = 1 << 20;
@@ -80,14 +81,26 @@ fn numbers<'a, const N: usize>(
 ) -> Result<[f64; N], String> {
     let found: Option<Vec<f64>> =
         words.map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
-    let exact = found.and_then(|found| found.try_into().ok());
-    exact.ok_or_else(|| format!("`{letter}` is followed by {N} finite numbers"))
+    let exact: Option<[f64; N]> = found.and_then(|found| found.try_into().ok());
+    let numbers = exact.ok_or_else(|| format!("`{letter}` is followed by {N} finite numbers"))?;
+    match numbers.iter().find(|number| number.abs() > LARGEST) {
+        Some(number) => {
+            Err(format!("the numbers of `{letter}` are less than {LARGEST:e} in magnitude, not {number:e}"))
+        }
+        None => Ok(numbers),
+    }
 }
 
 /// The distance of `s`; a radius of 0 only moves planes that a ray tracer does not have.
 fn positive(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String> {
     let [size, radius] = numbers?;
-    if size > 0.0 { Ok([size, radius]) } else { Err(format!("the distance in `s` is above 0, not {size}")) }
+    match () {
+        () if !(size > 0.0) => Err(format!("the distance in `s` is above 0, not {size}")),
+        () if is_too_short(size) => {
+            Err(format!("the distance in `s` is more than {SHORTEST:e}, not {size:e}"))
+        }
+        () => Ok([size, radius]),
+    }
 }
 
 fn view_angle(numbers: Result<[f64; 3], String>) -> Result<[f64; 3], String> {
@@ -137,5 +150,15 @@ mod tests {
         assert!(says("f 180 4 3").contains("between 0 and 180"));
         assert!(says("f 40 4 0").contains("above 0"));
         assert!(says("x 1").contains("found \"x\""));
+        for (line, words) in [
+            ("c 0 1e20 0", "`c` are less than 1e18 in magnitude, not 1e20"),
+            ("p 1e308 0", "`p` are less than 1e18"),
+            ("r 0 -1e19", "`r` are less than 1e18"),
+            ("s 1e20 1", "`s` are less than 1e18"),
+            ("s 1e-30 1", "the distance in `s` is more than 1e-18, not 1e-30"),
+            ("f 40 1e19 3", "`f` are less than 1e18"),
+        ] {
+            assert!(says(line).starts_with("cam.txt:1: ") && says(line).contains(words), "{}", says(line));
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, Place, Severity};
+use super::document::is_mesh;
 use super::nearest::nearest;
 use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE};
@@ -14,6 +15,9 @@ use crate::system::in_words;
 /// The text. The error is one diagnostic that names the file.
 pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
+    if is_mesh(path) && !holds_scene(&bytes) {
+        return Err(mesh(path));
+    }
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(problem(
             path,
@@ -26,6 +30,21 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         Ok(text) => Ok(text.into()),
         Err(error) => Err(not_utf8(path, error.as_bytes(), error.utf8_error().valid_up_to())),
     }
+}
+
+/// A mesh in place of a scene, and how to show it.
+fn mesh(path: &Path) -> Box<Diagnostic> {
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let help = format!(
+        "a scene shows it, by a table [[mesh]] with `file = \"{}\"`; `glimt new FILE` writes a scene to start from",
+        visible(&name)
+    );
+    problem(path, "this is a mesh, not a scene".to_owned(), Some(help), None)
+}
+
+/// Whether a file that is named like a mesh is a scene all the same.
+fn holds_scene(bytes: &[u8]) -> bool {
+    memchr::memmem::find(bytes, b"[camera]").is_some()
 }
 
 fn problem(path: &Path, message: String, help: Option<String>, place: Option<Place>) -> Box<Diagnostic> {
@@ -173,6 +192,23 @@ mod tests {
         assert!(picture.help.expect("a way out").contains("glimt new"));
         let lonely = message(&folder.path().join("zebra"));
         assert!(lonely.help.expect("a way out").contains("glimt new"));
+    }
+
+    #[test]
+    fn a_mesh_is_no_scene() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let contents: [(&str, &[u8]); 3] =
+            [("a.obj", b"v 0 0 0\n"), ("b.PLY", b"ply\n"), ("c.glb", b"glTF\0\0")];
+        for (name, content) in contents {
+            let path = folder.path().join(name);
+            std::fs::write(&path, content).expect("written");
+            let Diagnostic { message, help, .. } = message(&path);
+            assert_eq!(message, "this is a mesh, not a scene");
+            assert!(help.expect("a way out").contains(&format!("[[mesh]] with `file = \"{name}\"`")));
+        }
+        let scene = folder.path().join("scene.obj");
+        std::fs::write(&scene, "[camera]\n").expect("written");
+        assert!(text(&scene).is_ok());
     }
 
     #[test]

@@ -63,6 +63,14 @@ fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
             symlink("/dev/zero", path).expect("a link");
             &["is a pipe, a socket or a device, not a"]
         }
+        "kernel" => {
+            // Where a machine has no such file, this is a link to nowhere.
+            if !Path::new("/proc/kmsg").exists() {
+                return None;
+            }
+            symlink("/proc/kmsg", path).expect("a link");
+            &["is a file of the kernel, as in /proc, not a"]
+        }
         "circle" => {
             symlink(path, path).expect("a link");
             &["its symbolic links lead in a circle"]
@@ -88,7 +96,8 @@ fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
     })
 }
 
-const KINDS: [&str; 8] = ["missing", "folder", "pipe", "device", "circle", "dangling", "terabytes", "locked"];
+const KINDS: [&str; 9] =
+    ["missing", "folder", "pipe", "device", "kernel", "circle", "dangling", "terabytes", "locked"];
 
 #[test]
 fn a_scene_that_is_no_file() {

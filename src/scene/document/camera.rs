@@ -25,7 +25,7 @@ pub(super) fn read(root: &Table<'_>) -> Option<Camera> {
 }
 
 fn aperture(table: &Table<'_>) -> f64 {
-    table.optional("aperture").number(Limits::AtLeast(0.0)).unwrap_or(0.0)
+    table.optional("aperture").number(Limits::LengthOrZero).unwrap_or(0.0)
 }
 
 fn fov(table: &Table<'_>) -> Option<f64> {
@@ -41,7 +41,11 @@ fn look_at(table: &Table<'_>) -> Option<Camera> {
     let aperture = aperture(table);
     let focus = table.optional("focus").number(Limits::Length);
 
+    let (position_key, look_at_key) = (position, look_at);
     let (position, look_at) = (eye?, target?);
+    if !position_key.is_apart(position, &look_at_key, look_at) {
+        return None;
+    }
     let view = look_at - position;
     let Some(direction) = view.try_normalize() else {
         let span = table.optional("look_at").span()?;
@@ -58,6 +62,9 @@ fn look_at(table: &Table<'_>) -> Option<Camera> {
 /// `up`, if it is a direction of its own.
 fn upright(table: &Table<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
     let span = table.optional("up").span().or(table.optional("look_at").span())?;
+    if !table.optional("up").is_long(up) {
+        return None;
+    }
     let Some(direction) = up.try_normalize() else {
         let issue = Issue::error(span, "`up` has no direction").label("its length is 0");
         table.context.report(issue.help("the default is [0, 1, 0]"));

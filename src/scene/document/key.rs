@@ -13,6 +13,7 @@ use super::limits::Limits;
 use super::names::Names;
 use super::table::{Table, Title};
 use super::value::{Item, Value, found, limited, whole, wrong_type};
+use crate::math::limits::{SHORTEST, is_too_short, length};
 use crate::math::{DVec3, Vec2};
 
 /// A key that was asked for.
@@ -143,6 +144,28 @@ impl<'a> Key<'a> {
         if self.is_given() { self.vector(limits) } else { Some(default) }
     }
 
+    /// Whether a vector that the key gave is long enough to work with; an error if not. One of length 0 is left to the
+    /// caller, who knows what it is for.
+    pub(super) fn is_long(&self, vector: DVec3) -> bool {
+        let length = length(vector);
+        let Some(span) = self.span().filter(|_| is_too_short(length)) else { return true };
+        let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.name));
+        self.context.report(issue.label(format!("its length is {length:e}")));
+        false
+    }
+
+    /// Whether two points are far enough from each other to work with; an error if not. Points at one place are left
+    /// to the caller. `self` and `other` are their keys.
+    pub(super) fn is_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
+        let distance = length(to - from);
+        let span = other.span().or(self.span());
+        let Some(span) = span.filter(|_| is_too_short(distance)) else { return true };
+        let (first, second) = (self.name, other.name);
+        let message = format!("`{first}` and `{second}` must be more than {SHORTEST:e} apart");
+        self.context.report(Issue::error(span, message).label(format!("they are {distance:e} apart")));
+        false
+    }
+
     /// Two numbers.
     pub(super) fn pair(&self, limits: Limits) -> Option<Vec2> {
         self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
@@ -151,12 +174,9 @@ impl<'a> Key<'a> {
     /// As many numbers as the array has room for; every wrong one is reported.
     fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
-        let array = match value.item() {
-            Item::Array(array) if array.len() == N => array,
-            _ => {
-                wrong_type(self.context, self.name, value, expected);
-                return None;
-            }
+        let Some(array) = value.array().filter(|array| array.len() == N) else {
+            wrong_type(self.context, self.name, value, expected);
+            return None;
         };
         let mut numbers = [Some(0.0); N];
         for (number, one) in numbers.iter_mut().zip(array.iter()) {
@@ -168,10 +188,10 @@ impl<'a> Key<'a> {
 
     /// A number for all three axes, or three.
     pub(super) fn scale(&self, limits: Limits) -> Option<DVec3> {
-        match self.value?.item() {
-            Item::Integer { .. } | Item::Float(_) => self.number(limits).map(DVec3::splat),
-            _ => self.numbers(limits, "a number or three, [x, y, z]").map(DVec3::from_array),
+        if matches!(self.value?.item(), Item::Integer { .. } | Item::Float(_)) {
+            return self.number(limits).map(DVec3::splat);
         }
+        self.numbers(limits, "a number or three, [x, y, z]").map(DVec3::from_array)
     }
 
     /// The index of a thing that is named elsewhere in the file.

@@ -1,6 +1,9 @@
 //! Ranges of numbers, and the words for them.
 
-/// Numbers that a key accepts. All are finite and of magnitude at most [`LARGEST`] besides.
+use crate::math::limits::{LARGEST, is_too_short};
+
+/// Numbers that a key accepts. All are finite and of magnitude at most [`LARGEST`]
+/// besides.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Limits {
     /// Any number.
@@ -11,17 +14,13 @@ pub(super) enum Limits {
     AtLeast(f64),
     /// A length or size: > 0, and not so small that its square is nothing.
     Length,
+    /// The same, or 0.
+    LengthOrZero,
     /// Both ends included.
     Between(f64, f64),
     /// Both ends excluded.
     Inside(f64, f64),
 }
-
-/// Products of two larger numbers do not fit into 32-bit floats.
-pub(super) const LARGEST: f64 = 1e18;
-
-/// Products of two smaller ones are lost there.
-const SMALLEST: f64 = 1e-18;
 
 impl Limits {
     /// What is wrong with a number, to be read after its name: `must be greater than 0`.
@@ -32,9 +31,11 @@ impl Limits {
         if number.abs() > LARGEST {
             return Some("must be less than 1e18 in magnitude".to_owned());
         }
-        let tiny = number != 0.0 && number.abs() < SMALLEST;
         match self {
-            Self::Length | Self::NotZero if tiny => Some("must be more than 1e-18 in magnitude".to_owned()),
+            Self::LengthOrZero if is_too_short(number) => Some("must be 0, or at least 1e-18".to_owned()),
+            Self::Length | Self::NotZero if is_too_short(number) => {
+                Some("must be more than 1e-18 in magnitude".to_owned())
+            }
             _ if self.contains(number) => None,
             _ => Some(self.words()),
         }
@@ -46,6 +47,7 @@ impl Limits {
             Self::NotZero => number != 0.0,
             Self::AtLeast(least) => number >= least,
             Self::Length => number > 0.0,
+            Self::LengthOrZero => number >= 0.0,
             Self::Between(least, most) => (least..=most).contains(&number),
             Self::Inside(low, high) => low < number && number < high,
         }
@@ -57,6 +59,7 @@ impl Limits {
             Self::NotZero => "must not be 0".to_owned(),
             Self::AtLeast(least) => format!("must be at least {least}"),
             Self::Length => "must be greater than 0".to_owned(),
+            Self::LengthOrZero => "must be at least 0".to_owned(),
             Self::Between(least, most) => format!("must be between {least} and {most}"),
             Self::Inside(low, high) => format!("must be greater than {low} and less than {high}"),
         }
@@ -73,6 +76,7 @@ mod tests {
         assert!(ok(Limits::Any, -0.0) && ok(Limits::AtLeast(0.0), -0.0));
         assert!(!ok(Limits::Length, 0.0) && ok(Limits::Length, 1e-9) && !ok(Limits::Length, 1e-30));
         assert!(!ok(Limits::Inside(0.0, 180.0), 180.0) && ok(Limits::Between(0.0, 1.0), 1.0));
+        assert!(ok(Limits::LengthOrZero, 0.0) && !ok(Limits::LengthOrZero, 1e-30));
         assert!(!ok(Limits::NotZero, -0.0) && ok(Limits::NotZero, -2.0));
         for bad in [f64::NAN, f64::INFINITY, 1.1e18, -1e300] {
             assert!(!ok(Limits::Any, bad), "{bad}");

@@ -26,6 +26,8 @@ use context::{Context, Issue};
 use materials::Materials;
 use table::Table;
 
+pub(super) use shapes::is_mesh;
+
 /// Reads and validates the text of a scene; `path` says where the files are that it names.
 pub(super) fn lower(source: &Arc<str>, path: &Path) -> Outcome {
     let context = Context::new(Arc::clone(source), path);

@@ -12,7 +12,7 @@ pub(super) fn read(root: &Table<'_>) -> Option<Photons> {
     let photons = Photons {
         enabled: enabled.flag().unwrap_or(default.enabled),
         count: table.optional("count").whole(1..=1_000_000_000_000).unwrap_or(default.count),
-        radius: table.optional("radius").number(Limits::AtLeast(0.0)).unwrap_or(default.radius),
+        radius: table.optional("radius").number(Limits::LengthOrZero).unwrap_or(default.radius),
         bounces: table.optional("bounces").whole(0..=u32::MAX.into()).unwrap_or(default.bounces),
     };
     if let (true, Some(span)) = (photons.enabled, enabled.span()) {

@@ -125,16 +125,16 @@ impl<'a> Table<'a> {
     pub(super) fn tables(&self, name: &'static str) -> impl Iterator<Item = Self> + use<'a> {
         let context = self.context;
         let key = self.optional(name);
-        let list = key.value.and_then(|value| match value.item() {
-            Item::Array(array) => Some(array),
-            _ => {
-                let span = key.key_span().unwrap_or_default();
-                let issue = Issue::error(span, format!("`{name}` must be a list of tables"))
-                    .label(format!("found {}", found(context, value)))
-                    .help(format!("write [[{name}]] with double brackets"));
-                context.report(issue);
-                None
+        let list = key.value.and_then(|value| {
+            if let Some(array) = value.array() {
+                return Some(array);
             }
+            let span = key.key_span().unwrap_or_default();
+            let issue = Issue::error(span, format!("`{name}` must be a list of tables"))
+                .label(format!("found {}", found(context, value)))
+                .help(format!("write [[{name}]] with double brackets"));
+            context.report(issue);
+            None
         });
         let values = list.into_iter().flat_map(|list| list.iter());
         values.filter_map(move |value| Self::of(context, value, Title::List(name)))
@@ -167,7 +167,9 @@ impl<'a> Table<'a> {
                 format!("unknown table `{shown}`")
             }
             Title::Root => format!("unknown key `{shown}` outside of any table"),
-            title => format!("unknown key `{shown}` in {title}"),
+            title @ (Title::Table(_) | Title::List(_) | Title::Named(..) | Title::Key(_)) => {
+                format!("unknown key `{shown}` in {title}")
+            }
         };
         let mut issue = Issue::error(span, message);
         if let Some(near) = near {

@@ -177,10 +177,10 @@ impl<'s> Assembly<'s> {
             };
             match found.kind {
                 Kind::Table(inner) => self.enter(inner, name, is_dotted),
-                Kind::List(list) => match self.document.list_mut(list).last()?.kind {
-                    Kind::Table(last) => Some(last),
-                    _ => None,
-                },
+                Kind::List(list) => {
+                    let last = self.document.list_mut(list).last()?.kind;
+                    if let Kind::Table(last) = last { Some(last) } else { None }
+                }
                 other => self.cannot_extend(name, other),
             }
         })

@@ -320,6 +320,11 @@ impl<'d> Value<'d> {
         self.node.span.range()
     }
 
+    /// Its elements, if it is an array.
+    pub(in super::super) fn array(&self) -> Option<Elements<'d>> {
+        if let Item::Array(array) = self.item() { Some(array) } else { None }
+    }
+
     /// What it is.
     pub(in super::super) fn item(&self) -> Item<'d> {
         let (document, span) = (self.document, self.node.span);

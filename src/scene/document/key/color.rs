@@ -25,37 +25,35 @@ impl Key<'_> {
 
     /// A colour ≥ 0 or a texture.
     pub(in super::super) fn color_or_texture(&self, textures: &Names) -> Option<ColorSource> {
-        match self.value?.item() {
-            Item::Table(_) => {
-                let table = self.inline_table()?;
-                let texture = table.required("texture", "\"name\"").name_in(textures);
-                table.finish();
-                texture.map(ColorSource::Texture)
-            }
-            Item::String(text) if textures.find(text).is_some() => {
-                let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR_OR_TEXTURE}", self.name))
-                    .label("found the name of a texture")
-                    .help(format!("write {{ texture = {} }}", self.context.text(&self.span()?)));
-                self.context.report(issue);
-                None
-            }
-            _ => self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE).map(ColorSource::Constant),
+        if self.is_table() {
+            let table = self.inline_table()?;
+            let texture = table.required("texture", "\"name\"").name_in(textures);
+            table.finish();
+            return texture.map(ColorSource::Texture);
         }
+        if let Item::String(text) = self.value?.item()
+            && textures.find(text).is_some()
+        {
+            let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR_OR_TEXTURE}", self.name))
+                .label("found the name of a texture")
+                .help(format!("write {{ texture = {} }}", self.context.text(&self.span()?)));
+            self.context.report(issue);
+            return None;
+        }
+        self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE).map(ColorSource::Constant)
     }
 
     fn color_of(&self, limits: Limits, expected: &str) -> Option<Vec3> {
         let value = self.value?;
-        match value.item() {
-            Item::String(text) => self.hexadecimal(text),
-            Item::Array(array) if array.len() == 3 => {
-                let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
-                Some(Vec3::from_array(rgb.map(|component| component as f32)))
-            }
-            _ => {
-                wrong_type(self.context, self.name, value, expected);
-                None
-            }
+        if let Item::String(text) = value.item() {
+            return self.hexadecimal(text);
         }
+        if value.array().is_some_and(|array| array.len() == 3) {
+            let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
+            return Some(Vec3::from_array(rgb.map(|component| component as f32)));
+        }
+        wrong_type(self.context, self.name, value, expected);
+        None
     }
 
     fn hexadecimal(&self, text: &str) -> Option<Vec3> {

@@ -9,10 +9,10 @@ use super::super::table::Table;
 use crate::math::DVec3;
 
 /// Endings of mesh files that can be read.
-const MESHES: [&str; 3] = ["obj", "off", "ply"];
+pub(super) const MESHES: [&str; 3] = ["obj", "off", "ply"];
 
 /// Endings that other versions read.
-const UNAVAILABLE: [&str; 3] = ["stl", "gltf", "glb"];
+pub(super) const UNAVAILABLE: [&str; 3] = ["stl", "gltf", "glb"];
 
 /// The mesh files named so far, each once, however it is written.
 #[derive(Default)]

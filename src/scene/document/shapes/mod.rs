@@ -11,7 +11,7 @@ mod sphere;
 mod torus;
 mod triangle;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::super::description::{Located, Object, Shape};
 use super::context::Issue;
@@ -42,12 +42,16 @@ const KINDS: [(&str, Reader); 10] = [
 pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Object>>, Vec<Located<PathBuf>>) {
     let mut files = MeshFiles::default();
     let mut objects = Vec::new();
+    let mut is_right = true;
     for (kind, reader) in KINDS {
         for table in root.tables(kind) {
-            objects.push(object(kind, &table, reader, materials, &mut files));
+            match object(kind, &table, reader, materials, &mut files) {
+                Some(object) => objects.push(object),
+                None => is_right = false,
+            }
         }
     }
-    (objects.into_iter().collect(), files.into_list())
+    (is_right.then_some(objects), files.into_list())
 }
 
 fn object(
@@ -81,7 +85,10 @@ fn object(
 fn direction(table: &Table<'_>, name: &'static str, what: &str) -> Option<DVec3> {
     let key = table.optional(name);
     let direction = key.vector_or(Limits::Any, DVec3::Y)?;
-    if direction.try_normalize().is_none() {
+    if !key.is_long(direction) {
+        return None;
+    }
+    if direction == DVec3::ZERO {
         let issue = Issue::error(key.span()?, format!("the {what} has no direction"))
             .label(format!("`{name}` is of length 0"))
             .help("any other length will do, such as [0, 1, 0] for upwards");
@@ -97,7 +104,10 @@ fn axis_ends(table: &Table<'_>, names: [&'static str; 2], what: &str) -> Option<
     let (first, second) =
         (keys[0].vector_or(Limits::Any, DVec3::ZERO), keys[1].vector_or(Limits::Any, DVec3::Y));
     let (first, second) = (first?, second?);
-    if Limits::Length.violation((second - first).length()).is_some() {
+    if !keys[0].is_apart(first, &keys[1], second) {
+        return None;
+    }
+    if first == second {
         let span = keys[1].span().or_else(|| keys[0].span())?;
         let [from, to] = names;
         let issue = Issue::error(span, format!("the {what} has no length"))
@@ -122,4 +132,10 @@ fn span_area(u: DVec3, v: DVec3) -> bool {
         (Some(u), Some(v)) => u.cross(v).length() > PARALLEL,
         _ => false,
     }
+}
+
+/// Whether a file is a mesh by its name, of any version of glimt.
+pub(in super::super) fn is_mesh(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    mesh::MESHES.iter().chain(&mesh::UNAVAILABLE).any(|known| *known == ending)
 }

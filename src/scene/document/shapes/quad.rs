@@ -12,14 +12,18 @@ pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
     let corner = table.optional("corner").vector_or(Limits::Any, DVec3::new(-1.0, 0.0, 1.0));
     let u = u_key.vector_or(Limits::Any, DVec3::new(2.0, 0.0, 0.0));
     let v = v_key.vector_or(Limits::Any, DVec3::new(0.0, 0.0, -2.0));
-    if let (Some(u), Some(v), Some(span)) = (u, v, v_key.span().or(u_key.span()))
-        && !span_area(u, v)
-    {
+    let (corner, u, v) = (corner?, u?, v?);
+    if !(u_key.is_long(u) & v_key.is_long(v)) {
+        return None;
+    }
+    if !span_area(u, v) {
+        let wrong = if u == DVec3::ZERO { u_key.span() } else { v_key.span() };
+        let span = wrong.or(u_key.span())?;
         let issue = Issue::error(span, "the quad has no area")
             .label("`u` and `v` are parallel, or one of them is 0")
             .help("`u` and `v` are two edges from the corner, in different directions");
         table.context.report(issue);
         return None;
     }
-    Some(Shape::Quad { corner: corner?, u: u?, v: v? })
+    Some(Shape::Quad { corner, u, v })
 }

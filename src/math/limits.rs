@@ -1,0 +1,34 @@
+//! How large and how small the numbers of a scene may be, whichever file they come from.
+
+use super::DVec3;
+
+/// Largest magnitude of any number: products of two larger ones do not fit into 32-bit floats.
+pub const LARGEST: f64 = 1e18;
+
+/// Shortest length that is not 0: products of two shorter ones are lost there.
+pub const SHORTEST: f64 = 1e-18;
+
+/// The length of a vector, also where its square is lost or does not fit.
+pub fn length(vector: DVec3) -> f64 {
+    let largest = vector.abs().max_element();
+    if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
+}
+
+/// Whether a length is more than nothing, and yet too short to work with.
+pub fn is_too_short(length: f64) -> bool {
+    length != 0.0 && length.abs() < SHORTEST
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_right_where_their_squares_are_not() {
+        assert_eq!(length(DVec3::ZERO), 0.0);
+        for scale in [1e-300, 1e-200, 1.0, 1e200] {
+            assert!((length(DVec3::new(3.0, -4.0, 12.0) * scale) / (13.0 * scale) - 1.0).abs() < 1e-15);
+        }
+        assert!(is_too_short(1e-200) && is_too_short(-1e-19) && !is_too_short(0.0) && !is_too_short(1e-18));
+    }
+}
