@@ -38,7 +38,7 @@ fn scene(file: &str) -> (String, &'static str) {
 fn refused(desk: &Desk, scene: &str, words: &[&str]) -> String {
     desk.write("ball.png", "the old one");
     let start = Instant::now();
-    let stderr = desk.expect(&format!("{scene} --once"), 2);
+    let stderr = desk.expect(&format!("{scene} --once -o ball.png"), 2);
     assert!(start.elapsed() < AT_ONCE, "{scene}: {:?}", start.elapsed());
     for word in words {
         assert!(stderr.contains(word), "{scene}: {word:?} is missing in\n{stderr}");

@@ -331,7 +331,7 @@ fn signals_end_it_with_their_code_and_leave_the_picture() {
         let desk = Desk::new();
         desk.write("ball.png", "the old one");
         let mut child = desk
-            .glimt("ball.toml --once --samples 4000000 --progress json")
+            .glimt("ball.toml --once -o ball.png --samples 4000000 --progress json")
             .stderr(Stdio::piped())
             .spawn()
             .expect("it runs");

@@ -30,8 +30,7 @@ fn a_texture_by_the_name_of_the_picture_stays_and_nothing_goes_round() {
     let before = folder.bytes("scene.png");
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    terminal.wait_for("scene.png");
-    terminal.wait_for("-o FILE");
+    terminal.wait_for("`paint`");
     wait_a_while();
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), before);
@@ -55,7 +54,7 @@ fn an_edit_that_makes_the_output_an_input_ends_the_writing() {
     terminal.wait_for_render(1);
     let (picture, report) = (folder.bytes("scene.png"), folder.bytes("r.json"));
     folder.write("scene.toml", &textured("scene.png"));
-    terminal.wait_for("texture `paint`");
+    terminal.wait_for("`paint`");
     wait_a_while();
     assert_eq!((folder.bytes("scene.png"), folder.bytes("r.json")), (picture, report), "nothing is written");
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
@@ -92,7 +91,7 @@ fn a_link_that_changes_during_the_render_is_seen() {
     fs::remove_file(folder.path("out.ppm")).expect("removed");
     symlink("paint.ppm", folder.path("out.ppm")).expect("a link");
     terminal.press("w");
-    terminal.wait_for("texture `paint`");
+    terminal.wait_for("`paint`");
     assert_eq!(folder.bytes("paint.ppm"), PAINT.as_bytes());
 }
 
