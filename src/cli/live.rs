@@ -28,10 +28,10 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
 fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
     let mut worker = start().map_err(no_thread)?;
-    let (sender, changes) = channel();
-    let watcher = Watcher::start(order.poll, worker.contents(), move |changed| {
-        // A front end that is gone wants no changes.
-        let _ = sender.send(changed);
+    let (sender, news) = channel();
+    let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
+        // A front end that is gone wants no news.
+        let _ = sender.send(said);
     })
     .map_err(no_thread)?;
     let (forward, events) = channel();
@@ -56,7 +56,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         }),
         events,
         previews: worker.previews.clone(),
-        changes,
+        news,
     });
     let has_ended = worker.finish(PATIENCE);
     if outcome.as_ref().is_ok_and(|ended| ended.is_write_unanswered) {
@@ -64,7 +64,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
             // It ends with the worker; a panic of it has nothing more to say.
             let _ = tap.join();
         }
-        console.say(&writes.said());
+        writes.said().iter().for_each(|line| console.say(line));
     }
     outcome.map(|ended| Exit(ended.status.0)).map_err(|error| {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
@@ -93,12 +93,13 @@ impl Writes {
         }
     }
 
-    fn said(&self) -> String {
+    /// A line for each picture.
+    fn said(&self) -> Vec<String> {
         let lines = self.lines();
         if lines.is_empty() {
-            "the image was not written: glimt was ended first".to_owned()
+            vec!["the image was not written: glimt was ended first".to_owned()]
         } else {
-            lines.join("\n")
+            lines.clone()
         }
     }
 }

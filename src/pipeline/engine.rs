@@ -288,6 +288,8 @@ impl Engine {
         self.assets = findings.files.clone();
         if findings.errors.is_empty() {
             self.say_files(findings, table.sink);
+            let (generation, warnings) = (table.sink.generation, findings.warnings.clone());
+            table.sink.send(Event::Warnings { generation, warnings });
             Ok((found, texels))
         } else {
             Err(Stop::Failed(findings.take_failure()))

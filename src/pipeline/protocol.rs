@@ -93,6 +93,13 @@ pub enum Event {
         /// The scene and everything that it names.
         files: Vec<FileRead>,
     },
+    /// Everything that is there to warn of is known; the picture is yet to be rendered.
+    Warnings {
+        /// Of which request.
+        generation: u64,
+        /// The same as [`Event::Done`] will have.
+        warnings: Vec<Diagnostic>,
+    },
     /// An asset is loading.
     Asset {
         /// Of which request.

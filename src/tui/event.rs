@@ -1,12 +1,14 @@
 //! Everything that can happen to the front end: one closed set.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::input::Answer;
-use super::options::Changed;
+use super::options::{Changed, News};
+use super::state::FrameReport;
 use crate::film::Picture;
 use crate::pipeline::protocol;
 
@@ -18,8 +20,13 @@ pub(super) enum Event {
     /// Text was pasted.
     Paste,
     /// The terminal answered a question.
-    #[expect(dead_code, reason = "nothing is asked yet")]
     Answer(Answer),
+    /// The system took so many bytes for the terminal.
+    Written { bytes: usize },
+    /// The terminal cannot be written to.
+    Unwritable(ErrorKind),
+    /// A picture has been sent.
+    Frame(FrameReport),
     /// The window has this size now.
     Resize(Window),
     /// The worker says something. Pictures come as [`Event::Picture`].
@@ -28,6 +35,8 @@ pub(super) enum Event {
     Picture { generation: u64, picture: Arc<Picture> },
     /// A file that the scene depends on was written.
     Changed(Changed),
+    /// Nobody is writing the files that were said to have changed.
+    Settled,
     /// A signal, or what amounts to one.
     Signal(Signal),
     /// A frame with the picture of this generation is on the screen.
@@ -38,6 +47,16 @@ pub(super) enum Event {
     NoShell,
     /// A source of events ended.
     Lost(Source),
+}
+
+impl Event {
+    /// What the watcher says.
+    pub(super) fn of_watcher(news: News) -> Self {
+        match news {
+            News::Changed(changed) => Self::Changed(changed),
+            News::Settled => Self::Settled,
+        }
+    }
 }
 
 /// A key with its modifiers.

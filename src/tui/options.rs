@@ -6,7 +6,7 @@ use std::sync::mpsc::Receiver;
 use super::color::ColorChoice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::Changed;
+pub use crate::pipeline::watch::{Changed, News};
 
 /// How the preview is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub struct Options {
     /// Where the worker puts pictures.
     pub previews: PreviewSlot,
     /// What the watcher says. Its end is said in the message line.
-    pub changes: Receiver<Changed>,
+    pub news: Receiver<News>,
 }
 
 /// How the program is to end: its exit code.

@@ -172,7 +172,7 @@ impl Decoder {
         if is_known {
             return;
         }
-        let is_middle = matches!(byte, b'0'..=b'?') && bytes.len() < LONGEST_ANSWER;
+        let is_middle = matches!(byte, b' '..=b'?') && bytes.len() < LONGEST_ANSWER;
         if is_middle {
             bytes.push(byte);
             self.held = Held::Doubtful(bytes);

@@ -111,6 +111,10 @@ impl Perform for Meaning {
         match (intermediates, action) {
             ([], 'n') if first == 0 => self.answer(Answer::Ready),
             (b"?", 'c') => self.answer(Answer::Attributes),
+            (b"?$", 'y') if first == 2026 => {
+                // 1: set, 2: reset; others: not known, or it cannot be changed.
+                self.answer(Answer::Synchronized { is_known: matches!(second, 1 | 2) });
+            }
             ([], '~') if first == 200 => self.is_paste = true,
             // A paste that was over before its end came.
             ([], '~') if first == 201 => {}
@@ -130,10 +134,13 @@ impl Perform for Meaning {
             }
             // With two numbers it is where the cursor is, not F3.
             ([], 'R') if params.len() > 1 => self.answer(Answer::Other),
-            ([], letter) => match letter_key(letter) {
-                Some(code) => self.key(code, modifiers(second)),
-                None => self.answer(Answer::Other),
-            },
+            // The focus came or went; the window's size.
+            ([], 'I' | 'O' | 't') => self.answer(Answer::Other),
+            ([], letter) => {
+                if let Some(code) = letter_key(letter) {
+                    self.key(code, modifiers(second));
+                }
+            }
             _ => self.answer(Answer::Other),
         }
     }

@@ -35,6 +35,8 @@ pub(super) enum Answer {
     Ready,
     /// To a question for the primary device attributes (DA1).
     Attributes,
+    /// Whether mode 2026 is known, by which large changes appear at once.
+    Synchronized { is_known: bool },
     /// Any other report: the cursor's position, modes, colours, names, focus, the mouse.
     Other,
 }

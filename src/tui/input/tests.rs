@@ -97,7 +97,9 @@ fn answers_are_told_from_keys() {
         (b"\x1b[?6c", Answer::Attributes),
         (b"\x1b[>0;276;0c", Answer::Other),
         (b"\x1b[12;40R", Answer::Other),
-        (b"\x1b[?2026;2$y", Answer::Other),
+        (b"\x1b[?2026;2$y", Answer::Synchronized { is_known: true }),
+        (b"\x1b[?2026;0$y", Answer::Synchronized { is_known: false }),
+        (b"\x1b[?7;1$y", Answer::Other),
         (b"\x1b]11;rgb:ffff/ffff/ffff\x07", Answer::Other),
         (b"\x1bP1+r524742=38\x1b\\", Answer::Other),
         (b"\x1b[I", Answer::Other),
@@ -135,7 +137,13 @@ fn an_escape_character_is_the_key_when_nothing_follows() {
 
 #[test]
 fn what_follows_an_escape_character_late_is_still_its_sequence() {
-    for (rest, input) in [(&b"[0n"[..], READY), (b"[A", special(KeyCode::Up))] {
+    for (rest, input) in [
+        (&b"[0n"[..], READY),
+        (b"[A", special(KeyCode::Up)),
+        (b"[?62;22c", Input::Answer(Answer::Attributes)),
+        (b"[?2026;2$y", Input::Answer(Answer::Synchronized { is_known: true })),
+        (b"[24;80R", Input::Answer(Answer::Other)),
+    ] {
         let mut bench = Bench::new();
         bench.read(b"\x1b");
         assert_eq!(bench.wait(400), [ESC]);

@@ -193,6 +193,7 @@ fn a_broken_file_keeps_the_picture_and_shows_the_place() {
     let before = cells_of(&mut desk, RED);
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    desk.event(Event::Settled);
     let text = desk.text();
     for words in [
         "error: unknown key `heigth`",
@@ -357,4 +358,23 @@ proptest! {
         }
         desk.screen();
     }
+}
+
+#[test]
+fn warnings_are_there_while_the_picture_is_rendered() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    desk.press('e');
+    assert!(desk.text().contains("files are still being read"), "{}", desk.text());
+    let warnings = vec![diagnostic(Severity::Warning, "texture `b` is not used")];
+    desk.worker(protocol::Event::Warnings { generation: 1, warnings });
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
+    assert!(desk.text().contains("1 warning"), "{}", desk.text());
+    desk.press('e');
+    assert!(desk.text().contains("warning: texture `b` is not used"), "{}", desk.text());
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.worker(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
+    assert!(!desk.text().contains("not used"), "the scene has none any more: {}", desk.text());
+    desk.press('e');
+    assert!(desk.text().contains("no errors and no warnings"), "{}", desk.text());
 }

@@ -26,6 +26,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 say(state, "no depth of field: the scene's camera has no `aperture`");
             }
         }
+        Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => state.progress = Some(progress),
         Event::Preview { .. } | Event::Files { .. } => {}
         Event::Written { path, bytes, .. } => wrote(state, Written { path, bytes }),
@@ -53,6 +54,7 @@ fn generation(event: &Event) -> u64 {
         Event::Started { generation }
         | Event::Stage { generation, .. }
         | Event::Asset { generation, .. }
+        | Event::Warnings { generation, .. }
         | Event::Settings { generation, .. }
         | Event::Progress { generation, .. }
         | Event::Preview { generation }
@@ -130,22 +132,45 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.report = Some(report);
     state.unchanged = unchanged;
     state.renders += u64::from(!unchanged);
-    state.pane.open &= !warnings.is_empty();
-    state.warnings = warnings;
+    warn(state, warnings);
     if unchanged && state.change.is_some_and(|change| change.generation == state.generation) {
         state.change = None;
         state.first_change = None;
     }
 }
 
+fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
+    state.pane.open &= !warnings.is_empty();
+    state.warnings = warnings;
+    state.are_warnings_known = true;
+}
+
+/// What is wrong with a file that may be half written is not said until that stays so.
 fn failed(state: &mut State, failure: Failure) {
-    state.activity = Activity::Broken;
     state.set_paused(false);
     state.assets.clear();
     state.change = None;
-    state.problems = Some(match failure {
-        Failure::Scene(diagnostics) => Problems { diagnostics, work: None },
-        Failure::Work(message) => Problems { diagnostics: Vec::new(), work: Some(message) },
-    });
+    match failure {
+        Failure::Scene(diagnostics) if !state.is_settled => {
+            state.activity = Activity::Waiting;
+            state.held = Some(diagnostics);
+        }
+        Failure::Scene(diagnostics) => broken(state, Problems { diagnostics, work: None }),
+        Failure::Work(message) => broken(state, Problems { diagnostics: Vec::new(), work: Some(message) }),
+    }
+}
+
+fn broken(state: &mut State, problems: Problems) {
+    state.activity = Activity::Broken;
+    state.problems = Some(problems);
     state.pane = Pane { open: true, scroll: 0 };
+    state.dirty = true;
+}
+
+/// Nobody is writing the files any more: what was found wrong with them is so.
+pub(super) fn settled(state: &mut State) {
+    state.is_settled = true;
+    if let Some(diagnostics) = state.held.take() {
+        broken(state, Problems { diagnostics, work: None });
+    }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::random::Random;
 
 /// Longest result: longer ones only take longer.
-const MOST_BYTES: usize = 4 << 20;
+const MOST_BYTES: usize = 1 << 20;
 
 /// Words that programs stumble over.
 const WORDS: &[&str] = &[

@@ -19,6 +19,9 @@ use super::{Case, Kind, Material};
 /// Longest time of a case.
 pub(super) const AT_MOST: Duration = Duration::from_secs(2);
 
+/// Longest wait for a case to be made; only a machine that stands still takes so long.
+const TO_BEGIN: Duration = Duration::from_secs(120);
+
 /// How often a case that takes longer is tried again, alone: the machine may be busy with other things.
 pub(super) const TRIES: usize = 3;
 
@@ -114,13 +117,16 @@ fn lines_of(worker: &mut Child) -> Receiver<String> {
     lines
 }
 
+/// The worker makes a case in its own time; from then on the time counts.
 fn next_result(lines: &Receiver<String>) -> Result<(), String> {
-    match lines.recv_timeout(AT_MOST) {
-        Ok(line) if line == "right" => Ok(()),
-        Ok(line) => Err(line),
+    let next = |at_most: Duration| match lines.recv_timeout(at_most) {
+        Ok(line) => Ok(line),
         Err(RecvTimeoutError::Timeout) => Err(SLOW.to_owned()),
         Err(RecvTimeoutError::Disconnected) => Err(GONE.to_owned()),
-    }
+    };
+    next(TO_BEGIN)?;
+    let said = next(AT_MOST)?;
+    if said == "right" { Ok(()) } else { Err(said) }
 }
 
 /// Does nothing where nobody ordered it.
@@ -137,9 +143,15 @@ fn worker() {
     for number in from..to {
         let case = Case { kind, seed, number };
         let scene = desk.lay(case, &material.make(case));
+        say("begin");
         let said = one(&scene).map_or_else(|reason| reason.replace('\n', " "), |()| "right".to_owned());
-        writeln!(std::io::stdout(), "\n@ {said}").expect("somebody listens");
+        say(&said);
     }
+}
+
+/// A line to who started this worker.
+fn say(text: &str) {
+    writeln!(std::io::stdout(), "\n@ {text}").expect("somebody listens");
 }
 
 /// The last panic, wherever it was caught.

@@ -5,6 +5,9 @@ mod input;
 mod keys;
 mod outputs;
 mod pty;
+mod relay;
+mod saving;
+mod thin_line;
 
 use std::fs;
 
