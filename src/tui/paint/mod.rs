@@ -5,21 +5,27 @@
 //! two colours of its halves, however they are drawn: `▀ ▄ █` and the blank show the same pairs in several ways,
 //! and the one that costs least after what was drawn before is taken.
 
+mod candidates;
 mod look;
 mod moves;
 mod pen;
 mod picture;
 mod screen;
 mod shade;
+mod taste;
 #[cfg(test)]
 mod tests;
+mod trellis;
 mod words;
+
+use std::vec;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use self::look::Look;
-use self::screen::{Screen, Slice};
+use self::screen::{Screen, Slice, Stroke};
+use self::shade::Shade;
 use super::color::ColorDepth;
 
 /// How near to the picture the cells have to come.
@@ -42,9 +48,10 @@ pub struct Painter {
     wanted: Wanted,
     /// What is still to be looked at, in order.
     parts: Vec<Part>,
-    /// The next of them, and the column in it.
+    /// The next of them.
     next: usize,
-    column: u16,
+    /// What is still to be drawn of the one before it.
+    strokes: vec::IntoIter<Stroke>,
 }
 
 /// What was aimed at.
@@ -71,7 +78,7 @@ impl Painter {
     pub fn new(depth: ColorDepth) -> Self {
         let wanted =
             Wanted { columns: 0, rows: 0, looks: Vec::new(), picture: Rect::ZERO, fidelity: Fidelity::Still };
-        Self { depth, screen: None, wanted, parts: Vec::new(), next: 0, column: 0 }
+        Self { depth, screen: None, wanted, parts: Vec::new(), next: 0, strokes: Vec::new().into_iter() }
     }
 
     /// Show this from now on, whatever is left of what was wanted before. `picture`: where cells may differ from
@@ -89,7 +96,12 @@ impl Painter {
         self.screen.take_if(|screen| (screen.columns, screen.rows) != (columns, rows));
         self.parts = (0..rows).map(Part::Words).collect();
         self.parts.extend(self.wanted.rows_from_the_middle().map(Part::Picture));
-        (self.next, self.column) = (0, 0);
+        self.start_over();
+    }
+
+    fn start_over(&mut self) {
+        self.next = 0;
+        self.strokes = Vec::new().into_iter();
     }
 
     /// The next bytes towards what is wanted, at most so many unless one cell needs more. Empty: it is shown. They
@@ -104,34 +116,28 @@ impl Painter {
             Screen::clear(&mut slice);
             Screen::cleared(columns, rows)
         });
-        while let Some(part) = self.parts.get(self.next) {
-            let reached = match *part {
-                Part::Words(y) => words::draw(screen, &self.wanted, y, self.column, &mut slice),
-                Part::Picture(y) => picture::draw(screen, &self.wanted, y, self.column, &mut slice),
-            };
-            match reached {
-                Reached::End => (self.next, self.column) = (self.next + 1, 0),
-                Reached::Column(column) => {
-                    self.column = column;
-                    break;
+        loop {
+            while let Some(stroke) = self.strokes.as_slice().first() {
+                if !screen.draw(stroke, &mut slice) {
+                    return slice.bytes;
                 }
+                self.strokes.next();
             }
+            let Some(part) = self.parts.get(self.next) else { return slice.bytes };
+            let strokes = match *part {
+                Part::Words(y) => words::plan(screen, &self.wanted, y),
+                Part::Picture(y) => picture::plan(screen, &self.wanted, y),
+            };
+            self.strokes = strokes.into_iter();
+            self.next += 1;
         }
-        slice.bytes
     }
 
     /// The content of the screen is unknown from now on: it is cleared before anything else is drawn.
     pub fn forget(&mut self) {
         self.screen = None;
-        (self.next, self.column) = (0, 0);
+        self.start_over();
     }
-}
-
-/// How far a part was drawn.
-enum Reached {
-    End,
-    /// Up to this column, which the slice has no room for.
-    Column(u16),
 }
 
 impl Wanted {
@@ -140,9 +146,12 @@ impl Wanted {
         &self.looks[usize::from(y) * columns..][..columns]
     }
 
-    /// Whether a cell belongs to the picture: words may lie over it.
-    fn is_picture(&self, x: u16, y: u16) -> bool {
-        self.picture.contains((x, y).into()) && matches!(self.row(y)[usize::from(x)], Look::Halves(_))
+    /// The colours of a cell of the picture; none of words, which may lie over it.
+    fn halves(&self, x: u16, y: u16) -> Option<[Shade; 2]> {
+        match self.row(y)[usize::from(x)] {
+            Look::Halves(halves) if self.picture.contains((x, y).into()) => Some(halves),
+            Look::Halves(_) | Look::Text(_) | Look::Covered | Look::Unknown => None,
+        }
     }
 
     fn rows_from_the_middle(&self) -> impl Iterator<Item = u16> + use<> {

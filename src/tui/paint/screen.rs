@@ -13,6 +13,15 @@ pub(super) struct Slice {
     pub(super) most: usize,
 }
 
+/// One cell to be drawn.
+#[derive(Clone, Debug)]
+pub(super) enum Stroke {
+    /// A character.
+    Text { at: Place, text: Text },
+    /// Two halves, by a glyph that can show them.
+    Halves { at: Place, glyph: Glyph, halves: [Shade; 2] },
+}
+
 /// The cells, the pen and the cursor of the terminal.
 #[derive(Debug)]
 pub(super) struct Screen {
@@ -49,32 +58,28 @@ impl Screen {
         usize::from(at.y) * usize::from(self.columns) + usize::from(at.x)
     }
 
-    /// Draws a character. False: there is no room for it, and nothing was done.
-    pub(super) fn draw_text(&mut self, at: Place, text: &Text, slice: &mut Slice) -> bool {
-        let is_drawn = self.print(at, &text.symbol, &text.pen.exactly(), slice);
-        if is_drawn {
-            self.put(at, Look::Text(text.clone()), text.columns);
-            // Terminals differ in how wide they think that such characters are.
-            if text.columns != 1 || text.symbol.chars().nth(1).is_some() {
-                self.cursor = None;
+    /// Draws a cell. False: there is no room for it, and nothing was done.
+    pub(super) fn draw(&mut self, stroke: &Stroke, slice: &mut Slice) -> bool {
+        match stroke {
+            Stroke::Text { at, text } => {
+                let is_drawn = self.print(*at, &text.symbol, &text.pen.exactly(), slice);
+                if is_drawn {
+                    self.put(*at, Look::Text(text.clone()), text.columns);
+                    // Terminals differ in how wide they think that such characters are.
+                    if text.columns != 1 || text.symbol.chars().nth(1).is_some() {
+                        self.cursor = None;
+                    }
+                }
+                is_drawn
+            }
+            Stroke::Halves { at, glyph, halves } => {
+                let is_drawn = self.print(*at, glyph.symbol(), &glyph.wish(*halves), slice);
+                if is_drawn {
+                    self.put(*at, Look::Halves(*halves), 1);
+                }
+                is_drawn
             }
         }
-        is_drawn
-    }
-
-    /// Draws two halves by a glyph that can show them. False: there is no room for it, and nothing was done.
-    pub(super) fn draw_halves(
-        &mut self,
-        at: Place,
-        glyph: Glyph,
-        halves: [Shade; 2],
-        slice: &mut Slice,
-    ) -> bool {
-        let is_drawn = self.print(at, glyph.symbol(), &glyph.wish(halves), slice);
-        if is_drawn {
-            self.put(at, Look::Halves(halves), 1);
-        }
-        is_drawn
     }
 
     fn print(&mut self, at: Place, symbol: &str, wish: &Wish, slice: &mut Slice) -> bool {
