@@ -4,9 +4,16 @@
 //! that lead there, slice by slice; a newer aim takes the place of the rest of the older one. A cell counts as the
 //! two colours of its halves, however they are drawn: `▀ ▄ █` and the blank show the same pairs in several ways,
 //! and the one that costs least after what was drawn before is taken.
+//!
+//! Words are exact. A picture that will be followed by better ones is drawn as far as an error is worth its bytes,
+//! and where an edit changed nothing the screen is left alone. A picture that stays is exact to 1/255.
+//! [`advise`] tells which pictures are worth being aimed at on a line of some speed.
 
+mod abilities;
+mod advice;
 mod candidates;
 mod look;
+mod memory;
 mod moves;
 mod pen;
 mod picture;
@@ -16,6 +23,7 @@ mod taste;
 #[cfg(test)]
 mod tests;
 mod trellis;
+mod wanted;
 mod words;
 
 use std::vec;
@@ -23,9 +31,12 @@ use std::vec;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use self::look::Look;
+pub use self::abilities::can_repeat;
+pub use self::advice::{Advice, Moment, advise};
+use self::memory::Memory;
+use self::picture::Budget;
 use self::screen::{Screen, Slice, Stroke};
-use self::shade::Shade;
+use self::wanted::Wanted;
 use super::color::ColorDepth;
 
 /// How near to the picture the cells have to come.
@@ -33,7 +44,7 @@ use super::color::ColorDepth;
 pub enum Fidelity {
     /// The first picture of a request, to be refined soon: at most 12 bytes a cell.
     First,
-    /// A picture that better ones will follow.
+    /// A picture of the same request that better ones will follow.
     Moving,
     /// A picture that stays: every colour to 1/255.
     Still,
@@ -43,25 +54,21 @@ pub enum Fidelity {
 #[derive(Debug)]
 pub struct Painter {
     depth: ColorDepth,
+    /// Whether the terminal knows REP.
+    can_repeat: bool,
     /// None: its content is unknown.
     screen: Option<Screen>,
+    memory: Memory,
     wanted: Wanted,
+    budget: Budget,
     /// What is still to be looked at, in order.
-    parts: Vec<Part>,
-    /// The next of them.
-    next: usize,
-    /// What is still to be drawn of the one before it.
+    parts: vec::IntoIter<Part>,
+    /// What is being drawn.
+    part: Option<Part>,
     strokes: vec::IntoIter<Stroke>,
-}
-
-/// What was aimed at.
-#[derive(Debug)]
-struct Wanted {
-    columns: u16,
-    rows: u16,
-    looks: Vec<Look>,
-    picture: Rect,
-    fidelity: Fidelity,
+    /// Of each row, the number of the last aim that its picture was drawn for.
+    drawn_for: Vec<u64>,
+    aim: u64,
 }
 
 /// A part of the screen that is drawn in one go.
@@ -74,41 +81,60 @@ enum Part {
 }
 
 impl Painter {
-    /// For a terminal of that many colours, whose content is unknown.
-    pub fn new(depth: ColorDepth) -> Self {
-        let wanted =
-            Wanted { columns: 0, rows: 0, looks: Vec::new(), picture: Rect::ZERO, fidelity: Fidelity::Still };
-        Self { depth, screen: None, wanted, parts: Vec::new(), next: 0, strokes: Vec::new().into_iter() }
+    /// For a terminal of that many colours, whose content is unknown. `can_repeat`: whether it knows REP, which not
+    /// all do.
+    pub fn new(depth: ColorDepth, can_repeat: bool) -> Self {
+        Self {
+            depth,
+            can_repeat,
+            screen: None,
+            memory: Memory::default(),
+            wanted: Wanted::nothing(depth),
+            budget: Budget::default(),
+            parts: Vec::new().into_iter(),
+            part: None,
+            strokes: Vec::new().into_iter(),
+            drawn_for: Vec::new(),
+            aim: 0,
+        }
     }
 
     /// Show this from now on, whatever is left of what was wanted before. `picture`: where cells may differ from
     /// what is wanted as far as the fidelity says; all others are words and come first. A buffer of another size than
     /// the one before means that the screen has been resized.
+    ///
+    /// The picture goes on with the rows that the aims before did not come to, so that aims that follow each other
+    /// faster than they are drawn lead to the edge all the same.
     pub fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
-        let (columns, rows) = (wanted.area.width, wanted.area.height);
-        self.wanted = Wanted {
-            columns,
-            rows,
-            looks: looks(wanted, self.depth),
-            picture: picture.intersection(Rect::new(0, 0, columns, rows)),
-            fidelity,
-        };
-        self.screen.take_if(|screen| (screen.columns, screen.rows) != (columns, rows));
-        self.parts = (0..rows).map(Part::Words).collect();
-        self.parts.extend(self.wanted.rows_from_the_middle().map(Part::Picture));
+        self.wanted = Wanted::new(wanted, picture, fidelity, self.depth);
+        let size = (self.wanted.columns, self.wanted.rows);
+        if self.screen.as_ref().is_some_and(|screen| (screen.columns, screen.rows) != size) {
+            self.screen = None;
+        }
+        self.memory.aim(&self.wanted, self.screen.as_ref());
+        self.aim += 1;
+        if fidelity == Fidelity::First || self.drawn_for.len() != usize::from(size.1) {
+            self.drawn_for = vec![0; usize::from(size.1)];
+        }
         self.start_over();
     }
 
     fn start_over(&mut self) {
-        self.next = 0;
+        let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
+        rows.sort_by_key(|y| self.drawn_for[usize::from(*y)]);
+        let words = (0..self.wanted.rows).map(Part::Words);
+        self.parts = words.chain(rows.into_iter().map(Part::Picture)).collect::<Vec<_>>().into_iter();
+        self.part = None;
         self.strokes = Vec::new().into_iter();
+        self.budget = Budget::default();
     }
 
     /// The next bytes towards what is wanted, at most so many unless one cell needs more. Empty: it is shown. They
-    /// have to be written: what follows builds on them.
+    /// have to be written: what follows builds on them. Between two slices nobody else may move the cursor or
+    /// change the colours.
     pub fn slice(&mut self, most_bytes: usize) -> Vec<u8> {
         let mut slice = Slice { bytes: Vec::new(), most: most_bytes };
-        if self.wanted.looks.is_empty() {
+        if self.wanted.is_empty() {
             return slice.bytes;
         }
         let (columns, rows) = (self.wanted.columns, self.wanted.rows);
@@ -121,65 +147,37 @@ impl Painter {
                 if !screen.draw(stroke, &mut slice) {
                     return slice.bytes;
                 }
+                if let (Some(Part::Picture(_)), Stroke::Halves { at, count, .. }) = (self.part, stroke) {
+                    self.memory.drawn(*at, *count);
+                }
                 self.strokes.next();
             }
-            let Some(part) = self.parts.get(self.next) else { return slice.bytes };
-            let strokes = match *part {
-                Part::Words(y) => words::plan(screen, &self.wanted, y),
-                Part::Picture(y) => picture::plan(screen, &self.wanted, y),
+            if let Some(Part::Picture(y)) = self.part {
+                self.memory.row_done(y);
+                self.drawn_for[usize::from(y)] = self.aim;
+            }
+            self.part = self.parts.next();
+            let strokes = match self.part {
+                Some(Part::Words(y)) => words::plan(screen, &self.wanted, y, false),
+                Some(Part::Picture(y)) if self.wanted.is_ramp() => words::plan(screen, &self.wanted, y, true),
+                Some(Part::Picture(y)) => {
+                    picture::plan(screen, &self.wanted, &self.memory, y, self.can_repeat, &mut self.budget)
+                }
+                None => break,
             };
             self.strokes = strokes.into_iter();
-            self.next += 1;
         }
+        if self.wanted.fidelity == Fidelity::Still {
+            self.memory.finish();
+        }
+        slice.bytes
     }
 
     /// The content of the screen is unknown from now on: it is cleared before anything else is drawn.
     pub fn forget(&mut self) {
         self.screen = None;
+        self.memory.forget();
+        self.drawn_for.fill(0);
         self.start_over();
     }
-}
-
-impl Wanted {
-    fn row(&self, y: u16) -> &[Look] {
-        let columns = usize::from(self.columns);
-        &self.looks[usize::from(y) * columns..][..columns]
-    }
-
-    /// The colours of a cell of the picture; none of words, which may lie over it.
-    fn halves(&self, x: u16, y: u16) -> Option<[Shade; 2]> {
-        match self.row(y)[usize::from(x)] {
-            Look::Halves(halves) if self.picture.contains((x, y).into()) => Some(halves),
-            Look::Halves(_) | Look::Text(_) | Look::Covered | Look::Unknown => None,
-        }
-    }
-
-    fn rows_from_the_middle(&self) -> impl Iterator<Item = u16> + use<> {
-        let (top, bottom) = (self.picture.top(), self.picture.bottom());
-        let middle = top + (bottom - top) / 2;
-        (0..=bottom - top).flat_map(move |away| {
-            let below = middle.checked_add(away).filter(|y| *y < bottom);
-            let above = middle.checked_sub(away).filter(|y| away > 0 && *y >= top);
-            [below, above].into_iter().flatten()
-        })
-    }
-}
-
-/// What the cells of a buffer look like.
-fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<Look> {
-    let columns = usize::from(buffer.area.width.max(1));
-    let mut looks: Vec<Look> = buffer.content.iter().map(|cell| Look::of(cell, depth)).collect();
-    for row in looks.chunks_mut(columns) {
-        let mut x = 0;
-        while x < row.len() {
-            let end = x + usize::from(row[x].columns());
-            if end > row.len() {
-                row[x] = Look::BLANK;
-            } else {
-                row[x + 1..end].fill(Look::Covered);
-            }
-            x = end;
-        }
-    }
-    looks
 }

@@ -21,11 +21,11 @@ impl Taste {
     /// An error of 9/255 in all channels of a half is about worth the bytes of a colour.
     pub(super) const MOVING: Self = Self { byte: 14.0, most: 255, spans: &[1, 4, 9] };
 
-    /// The same for bytes that are worth more.
-    pub(super) fn dearer(self, factor: f32) -> Self {
-        let byte = self.byte * factor;
+    /// The same where a byte is worth this much, or as much as for a moving picture at least.
+    pub(super) fn at(self, byte: f32) -> Self {
+        let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
-            ..30.0 => &[1, 4, 9],
+            ..30.0 => Self::MOVING.spans,
             30.0..100.0 => &[3, 8, 16],
             100.0..400.0 => &[6, 14, 28],
             _ => &[12, 28, 60],

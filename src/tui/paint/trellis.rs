@@ -47,6 +47,8 @@ struct Way {
     fg: Shade,
     bg: Shade,
     gap: Gap,
+    bytes: u32,
+    /// Bytes and errors.
     cost: f32,
     /// Of the ways to the cell before.
     parent: usize,
@@ -65,7 +67,7 @@ enum Gap {
 impl Gap {
     fn bytes(self) -> u32 {
         match self {
-            Self::Far => 7,
+            Self::Far => 8,
             Self::Cells(0) => 0,
             Self::Cells(1) => 3,
             Self::Cells(count) => 3 + digits(count),
@@ -80,10 +82,17 @@ impl Gap {
     }
 }
 
-/// The dabs that lead through the row at the least cost.
-pub(super) fn dabs(targets: &[Target], start: Start, taste: Taste) -> Vec<Dab> {
+/// What is drawn in a row.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    pub(super) dabs: Vec<Dab>,
+    pub(super) bytes: u32,
+}
+
+/// What leads through the row at the least cost.
+pub(super) fn row(targets: &[Target], start: Start, taste: Taste) -> Row {
     let gap = if start.is_there { Gap::Cells(0) } else { Gap::Far };
-    let first = Way { fg: start.fg, bg: start.bg, gap, cost: 0.0, parent: 0, glyph: None };
+    let first = Way { fg: start.fg, bg: start.bg, gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
     let mut ways = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
@@ -153,8 +162,8 @@ impl Beam {
 #[derive(Clone, Copy)]
 struct Change {
     shade: Shade,
-    /// Cost of the parameters of SGR.
-    cost: f32,
+    /// Of the parameters of SGR.
+    bytes: u32,
     /// In the upper and the lower half.
     errors: [f32; 2],
 }
@@ -173,7 +182,7 @@ impl Changes {
     fn new(candidates: &Candidates, halves: [Shade; 2], taste: Taste) -> Self {
         let change = |shade: &Shade| Change {
             shade: *shade,
-            cost: shade.length() as f32 * taste.byte,
+            bytes: shade.length(),
             errors: halves.map(|half| taste.error(*shade, half)),
         };
         let Candidates { upper, lower, both } = candidates;
@@ -186,34 +195,36 @@ impl Changes {
         let byte = self.taste.byte;
         let errors = |shade| self.halves.map(|half| self.taste.error(shade, half));
         let pen = Ends { fg: way.fg, fg_errors: errors(way.fg), bg: way.bg, bg_errors: errors(way.bg) };
-        let base = way.cost + way.gap.bytes() as f32 * byte;
+        let (bytes, error) = (way.bytes + way.gap.bytes(), way.cost - way.bytes as f32 * byte);
         let mut bound = beam.bound();
-        let mut end = |ends: Ends, cost: f32, glyphs: &[Glyph]| {
+        let mut end = |ends: Ends, sgr: u32, glyphs: &[Glyph]| {
             for glyph in glyphs {
-                let cost = base + cost + glyph.symbol().len() as f32 * byte + ends.error(*glyph);
+                let bytes = bytes + sgr + glyph.symbol().len() as u32;
+                let cost = bytes as f32 * byte + error + ends.error(*glyph);
                 if cost < bound {
                     let Ends { fg, bg, .. } = ends;
-                    beam.add(Way { fg, bg, gap: Gap::Cells(0), cost, parent, glyph: Some(*glyph) });
+                    let gap = Gap::Cells(0);
+                    beam.add(Way { fg, bg, gap, bytes, cost, parent, glyph: Some(*glyph) });
                     bound = beam.bound();
                 }
             }
         };
-        end(pen, 0.0, &Glyph::ALL);
+        end(pen, 0, &Glyph::ALL);
         for change in &self.all {
-            let cost = change.cost + 3.0 * byte;
+            let bytes = change.bytes + 3;
             if change.shade.fits(Layer::Foreground) {
-                end(pen.with_fg(change), cost, &[Glyph::Upper, Glyph::Lower, Glyph::Full]);
+                end(pen.with_fg(change), bytes, &[Glyph::Upper, Glyph::Lower, Glyph::Full]);
             }
             if change.shade.fits(Layer::Background) {
-                end(pen.with_bg(change), cost, &[Glyph::Upper, Glyph::Lower, Glyph::Blank]);
+                end(pen.with_bg(change), bytes, &[Glyph::Upper, Glyph::Lower, Glyph::Blank]);
             }
         }
         for upper in &self.all[..self.upper] {
             for lower in &self.all[self.upper..self.lower] {
-                let cost = upper.cost + lower.cost + 4.0 * byte;
+                let bytes = upper.bytes + lower.bytes + 4;
                 for (fg, bg, glyph) in [(upper, lower, Glyph::Upper), (lower, upper, Glyph::Lower)] {
                     if fg.shade.fits(Layer::Foreground) && bg.shade.fits(Layer::Background) {
-                        end(pen.with_fg(fg).with_bg(bg), cost, &[glyph]);
+                        end(pen.with_fg(fg).with_bg(bg), bytes, &[glyph]);
                     }
                 }
             }
@@ -249,11 +260,11 @@ impl Ends {
 }
 
 /// The cheapest way back from the last cell.
-fn trace(ways: &[Vec<Way>]) -> Vec<Dab> {
-    let mut dabs = Vec::new();
+fn trace(ways: &[Vec<Way>]) -> Row {
     let last = ways.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-    let mut index = best.map_or(0, |(index, _)| index);
+    let (mut index, bytes) = best.map_or((0, 0), |(index, way)| (index, way.bytes));
+    let mut dabs = Vec::new();
     for (column, ways) in ways.iter().enumerate().skip(1).rev() {
         let Some(way) = ways.get(index) else { break };
         if let Some(glyph) = way.glyph {
@@ -266,5 +277,100 @@ fn trace(ways: &[Vec<Way>]) -> Vec<Dab> {
         index = way.parent;
     }
     dabs.reverse();
-    dabs
+    Row { dabs, bytes }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const BLACK: Shade = Shade::Rgb([0, 0, 0]);
+    const RED: Shade = Shade::Rgb([200, 0, 0]);
+
+    fn wanted(halves: &[[Shade; 2]]) -> Vec<Target> {
+        halves
+            .iter()
+            .map(|halves| Target { wanted: Some(*halves), shown: Some([Shade::Ground; 2]) })
+            .collect()
+    }
+
+    fn start(fg: Shade, bg: Shade) -> Start {
+        Start { fg, bg, is_there: true }
+    }
+
+    #[test]
+    fn the_pen_is_turned_once_and_blanks_are_preferred() {
+        let found =
+            row(&wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]), start(BLACK, Shade::Ground), Taste::EXACT);
+        let glyphs: Vec<Glyph> = found.dabs.iter().map(|dab| dab.glyph).collect();
+        assert_eq!(glyphs, [Glyph::Blank, Glyph::Blank, Glyph::Upper]);
+        // ESC [ 48;2;200;0;0 m and the glyphs.
+        assert_eq!(found.bytes, 3 + 12 + 1 + 1 + 3);
+    }
+
+    #[test]
+    fn what_is_shown_is_left_and_jumped_over() {
+        let mut targets = wanted(&[[RED, BLACK]; 9]);
+        for target in &mut targets[1..8] {
+            target.shown = Some([RED, Shade::Rgb([1, 1, 1])]);
+        }
+        let found = row(&targets, start(RED, BLACK), Taste::EXACT);
+        let columns: Vec<usize> = found.dabs.iter().map(|dab| dab.column).collect();
+        assert_eq!((columns, found.bytes), (vec![0, 8], 3 + 4 + 3));
+        // A gap of one cell is drawn again, which is no longer than a jump and leaves it nearer to what is wanted.
+        let found = row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), Taste::EXACT);
+        assert_eq!((found.dabs.len(), found.bytes), (3, 9));
+    }
+
+    #[test]
+    fn colours_that_only_one_layer_has_are_shown_by_it() {
+        for halves in
+            [[RED, Shade::Ground], [Shade::Ground, RED], [Shade::Ink, Shade::Ground], [Shade::Ink; 2]]
+        {
+            let targets = [Target { wanted: Some(halves), shown: None }];
+            let found = row(&targets, start(BLACK, BLACK), Taste::MOVING);
+            assert_eq!(found.dabs.first().map(|dab| dab.halves), Some(halves));
+        }
+    }
+
+    fn shade() -> impl Strategy<Value = Shade> {
+        prop_oneof![
+            4 => (0..4_u8, 0..4_u8).prop_map(|(r, g)| Shade::Rgb([98 + r, 8 + g, 250])),
+            2 => any::<[u8; 3]>().prop_map(Shade::Rgb),
+            1 => any::<u8>().prop_map(Shade::Palette),
+            1 => Just(Shade::Ground),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn every_cell_comes_near_enough(
+            cells in proptest::collection::vec(
+                (proptest::option::weighted(0.9, [shade(), shade()]), proptest::option::of([shade(), shade()])),
+                1..40,
+            ),
+            is_exact in any::<bool>(),
+        ) {
+            let targets: Vec<Target> = cells.iter().map(|(wanted, shown)| Target { wanted: *wanted, shown: *shown }).collect();
+            let taste = if is_exact { Taste::EXACT } else { Taste::MOVING };
+            let found = row(&targets, start(Shade::Ink, Shade::Ground), taste);
+            let mut screen: Vec<Option<[Shade; 2]>> = targets.iter().map(|target| target.shown).collect();
+            for dab in &found.dabs {
+                prop_assert!(targets[dab.column].wanted.is_some(), "a cell of another's");
+                prop_assert!(dab.glyph.shows(dab.halves));
+                screen[dab.column] = Some(dab.halves);
+            }
+            for (shown, target) in screen.iter().zip(&targets) {
+                let Some(wanted) = target.wanted else { continue };
+                let shown = shown.expect("a cell that was unknown is drawn");
+                for (shown, wanted) in shown.iter().zip(wanted) {
+                    // More than that in one channel is worth any bytes.
+                    let most = if is_exact { 3.0 } else { Taste::MOVING.byte * 120.0 };
+                    prop_assert!(taste.error(*shown, wanted) <= most);
+                }
+            }
+        }
+    }
 }
