@@ -7,7 +7,7 @@
 //!
 //! | room | what it knows |
 //! | --- | --- |
-//! | [`system`] | the operating system's errors in plain words |
+//! | [`system`] | the operating system's errors in plain words, which files have an end |
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
@@ -45,7 +45,7 @@
 //! film        -> math
 //! integrators -> world scene materials lights geometry sampling film math control
 //! output      -> film math control system
-//! pipeline    -> integrators world assets scene film output materials math control
+//! pipeline    -> integrators world assets scene film output materials math control system
 //! tui         -> pipeline scene film math
 //! cli         -> pipeline tui output scene film
 //! ```

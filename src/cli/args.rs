@@ -65,7 +65,7 @@ pub enum Subcommand {
     },
     /// Write a commented scene to start from; refuses to overwrite
     New {
-        /// The file to write
+        /// The file to write; - is stdout
         file: PathBuf,
     },
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::protocol::Effective;
 use super::settings::{Overrides, View};
+use super::targets::NamedBy;
 use crate::film::Rect;
 use crate::film::tone::{Curve, ToneMapping};
 use crate::integrators::RenderSettings;
@@ -28,6 +29,8 @@ pub(super) struct Plan {
     pub(super) tone: ToneMapping,
     pub(super) bit_depth: u8,
     pub(super) outputs: Vec<PathBuf>,
+    pub(super) named_by: NamedBy,
+    pub(super) report: Option<PathBuf>,
     pub(super) effective: Effective,
 }
 
@@ -53,7 +56,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         view: overrides.view.unwrap_or_default(),
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
-    let outputs = outputs(render.output.as_ref(), path, overrides);
+    let (outputs, named_by) = outputs(render.output.as_ref(), path, overrides);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     outputs.iter().try_for_each(|path| check_format(path, (render.width, render.height), bit_depth))?;
     Ok(Plan {
@@ -67,6 +70,8 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         bit_depth,
         effective: effective(render, &settings, threads, &outputs),
         outputs,
+        named_by,
+        report: overrides.report.clone(),
         scene: with_accel(scene, render.accel),
     })
 }
@@ -94,16 +99,16 @@ fn overridden(of_scene: &Render, overrides: &Overrides) -> Render {
 }
 
 /// The command line's files, else the scene's, else the scene's name with `.png` in the working directory.
-fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> Vec<PathBuf> {
+fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (Vec<PathBuf>, NamedBy) {
     if !overrides.outputs.is_empty() {
-        return overrides.outputs.clone();
+        return (overrides.outputs.clone(), NamedBy::Call);
     }
-    let default = || {
-        let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
-        name.push(".png");
-        PathBuf::from(name)
-    };
-    vec![of_scene.cloned().unwrap_or_else(default)]
+    if let Some(of_scene) = of_scene {
+        return (vec![of_scene.clone()], NamedBy::Scene);
+    }
+    let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
+    name.push(".png");
+    (vec![PathBuf::from(name)], NamedBy::Nobody)
 }
 
 fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Diagnostic>> {

@@ -6,8 +6,11 @@
 
 mod action;
 mod color;
+mod display;
 mod event;
+mod input;
 mod keymap;
+mod line;
 mod options;
 pub mod paint;
 mod run;
@@ -16,6 +19,7 @@ mod state;
 mod terminal;
 mod update;
 mod view;
+mod writer;
 
 #[cfg(test)]
 mod by_hand;
@@ -25,5 +29,5 @@ mod fixtures;
 mod tests;
 
 pub use color::{ColorChoice, ColorDepth};
-pub use options::{Changed, Ended, ExitStatus, Options, PreviewChoice, TuiError};
+pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};
 pub use run::run;

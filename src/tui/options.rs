@@ -6,7 +6,7 @@ use std::sync::mpsc::Receiver;
 use super::color::ColorChoice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::Changed;
+pub use crate::pipeline::watch::{Changed, News};
 
 /// How the preview is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub struct Options {
     /// Where the worker puts pictures.
     pub previews: PreviewSlot,
     /// What the watcher says. Its end is said in the message line.
-    pub changes: Receiver<Changed>,
+    pub news: Receiver<News>,
 }
 
 /// How the program is to end: its exit code.
@@ -53,6 +53,8 @@ impl ExitStatus {
     pub const QUIT: Self = Self(0);
     /// SIGHUP: the terminal is gone.
     pub const HANGUP: Self = Self(129);
+    /// SIGQUIT.
+    pub const ABORTED: Self = Self(131);
     /// SIGINT or ctrl-c.
     pub const INTERRUPTED: Self = Self(130);
     /// SIGTERM.
@@ -64,8 +66,8 @@ impl ExitStatus {
 pub struct Ended {
     /// How the program is to end.
     pub status: ExitStatus,
-    /// Whether a picture was asked for that was still to be written, as not every pixel had a sample.
-    pub is_write_postponed: bool,
+    /// Whether a picture was asked for and the person does not know yet what came of it.
+    pub is_write_unanswered: bool,
 }
 
 /// Why the front end could not go on.

@@ -13,6 +13,7 @@ pub(super) mod render;
 pub(super) mod textures;
 pub(super) mod write;
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -80,15 +81,18 @@ pub(super) struct Reading<'a> {
 /// What a request found out about files on its way.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
-    /// Everything that was read or tried.
+    /// Everything that was read or tried, each once.
     pub(super) files: Vec<FileRead>,
+    known: HashSet<FileRead>,
     pub(super) errors: Vec<Diagnostic>,
+    /// Why nothing is written, as it was found last.
+    pub(super) conflicts: Vec<Diagnostic>,
     pub(super) warnings: Vec<Diagnostic>,
 }
 
 impl Findings {
     pub(super) fn read(&mut self, file: FileRead) {
-        if !self.files.contains(&file) {
+        if self.known.insert(file.clone()) {
             self.files.push(file);
         }
     }

@@ -8,7 +8,7 @@ use crate::math::{DVec3, Vec3};
 const FALLOFFS: [(&str, Falloff); 2] = [("square", Falloff::Square), ("none", Falloff::None)];
 
 pub(super) fn read(root: &Table<'_>) -> Option<Vec<PointLight>> {
-    let read: Vec<Option<PointLight>> = root.tables("light").iter().map(light).collect();
+    let read: Vec<Option<PointLight>> = root.tables("light").map(|table| light(&table)).collect();
     read.into_iter().collect()
 }
 

@@ -85,7 +85,7 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
 }
 
 fn emission(key: &Key<'_>) -> Option<Vec3> {
-    if key.value?.get_ref().is_table() {
+    if key.is_table() {
         let issue = Issue::error(key.span()?, "a texture in `emission` is not supported yet")
             .help("give it a colour, [r, g, b] or \"#rrggbb\"");
         key.context.report(issue);
