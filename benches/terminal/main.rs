@@ -120,12 +120,7 @@ struct Window {
 impl Window {
     fn new(columns: u16, rows: u16) -> Self {
         let area = Rect::new(0, 0, columns, rows);
-        Self {
-            area,
-            painter: Painter::new(ColorDepth::TrueColor, false),
-            plain: Plain::new(area),
-            last: None,
-        }
+        Self { area, painter: Painter::new(ColorDepth::TrueColor), plain: Plain::new(area), last: None }
     }
 
     /// The previews of one render, of which those are drawn that are worth it.
@@ -203,7 +198,7 @@ impl Window {
 
     /// Bytes of a picture on a screen that is unknown.
     fn exact(&self, picture: &Picture) -> usize {
-        let mut painter = Painter::new(ColorDepth::TrueColor, false);
+        let mut painter = Painter::new(ColorDepth::TrueColor);
         let (buffer, place) = self.cells(picture);
         painter.aim(&buffer, place, Fidelity::Still);
         drain(&mut painter)

@@ -61,6 +61,8 @@ pub(crate) fn render(
             | Event::Written { .. }
             | Event::WriteFailed { .. }
             | Event::WritePostponed { .. }
+            | Event::Warnings { .. }
+            | Event::Refused { .. }
             | Event::Cancelled { .. } => {}
         }
     }

@@ -88,7 +88,7 @@ impl Screen {
     fn new() -> Self {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let terminal = vt100::Parser::new(side(WINDOW.height), side(WINDOW.width), 0);
-        Self { painter: Painter::new(ColorDepth::TrueColor, false), terminal }
+        Self { painter: Painter::new(ColorDepth::TrueColor), terminal }
     }
 
     /// Bytes until a picture is shown.

@@ -66,8 +66,8 @@ pub struct Painter {
     /// What is being drawn.
     part: Option<Part>,
     strokes: vec::IntoIter<Stroke>,
-    /// Of each row, the number of the last aim that its picture was drawn for.
-    drawn_for: Vec<u64>,
+    /// How far the picture is in each row.
+    rows: Vec<Progress>,
     aim: u64,
 }
 
@@ -80,13 +80,21 @@ enum Part {
     Picture(u16),
 }
 
+/// How far the picture is in a row.
+#[derive(Clone, Copy, Debug, Default)]
+struct Progress {
+    /// The number of the last aim that it was drawn for.
+    aim: u64,
+    /// Whether it is as it is wanted.
+    is_done: bool,
+}
+
 impl Painter {
-    /// For a terminal of that many colours, whose content is unknown. `can_repeat`: whether it knows REP, which not
-    /// all do.
-    pub fn new(depth: ColorDepth, can_repeat: bool) -> Self {
+    /// For a terminal of that many colours, whose content is unknown.
+    pub fn new(depth: ColorDepth) -> Self {
         Self {
             depth,
-            can_repeat,
+            can_repeat: false,
             screen: None,
             memory: Memory::default(),
             wanted: Wanted::nothing(depth),
@@ -94,9 +102,14 @@ impl Painter {
             parts: Vec::new().into_iter(),
             part: None,
             strokes: Vec::new().into_iter(),
-            drawn_for: Vec::new(),
+            rows: Vec::new(),
             aim: 0,
         }
+    }
+
+    /// The same for a terminal that knows REP; see [`can_repeat`].
+    pub fn repeating(self, can_repeat: bool) -> Self {
+        Self { can_repeat, ..self }
     }
 
     /// Show this from now on, whatever is left of what was wanted before. `picture`: where cells may differ from
@@ -106,22 +119,29 @@ impl Painter {
     /// The picture goes on with the rows that the aims before did not come to, so that aims that follow each other
     /// faster than they are drawn lead to the edge all the same.
     pub fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
-        self.wanted = Wanted::new(wanted, picture, fidelity, self.depth);
-        let size = (self.wanted.columns, self.wanted.rows);
+        let wanted = Wanted::new(wanted, picture, fidelity, self.depth);
+        let size = (wanted.columns, wanted.rows);
         if self.screen.as_ref().is_some_and(|screen| (screen.columns, screen.rows) != size) {
             self.screen = None;
         }
-        self.memory.aim(&self.wanted, self.screen.as_ref());
-        self.aim += 1;
-        if fidelity == Fidelity::First || self.drawn_for.len() != usize::from(size.1) {
-            self.drawn_for = vec![0; usize::from(size.1)];
+        if self.screen.is_none() || self.rows.len() != usize::from(wanted.rows) {
+            self.rows = vec![Progress::default(); usize::from(wanted.rows)];
         }
+        for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
+            row.is_done = row.is_done && self.wanted.serves(&wanted, y);
+            if fidelity == Fidelity::First && !row.is_done {
+                row.aim = 0;
+            }
+        }
+        self.memory.aim(&wanted, self.screen.as_ref());
+        self.wanted = wanted;
+        self.aim += 1;
         self.start_over();
     }
 
     fn start_over(&mut self) {
         let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
-        rows.sort_by_key(|y| self.drawn_for[usize::from(*y)]);
+        rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
         let words = (0..self.wanted.rows).map(Part::Words);
         self.parts = words.chain(rows.into_iter().map(Part::Picture)).collect::<Vec<_>>().into_iter();
         self.part = None;
@@ -154,11 +174,14 @@ impl Painter {
             }
             if let Some(Part::Picture(y)) = self.part {
                 self.memory.row_done(y);
-                self.drawn_for[usize::from(y)] = self.aim;
+                self.rows[usize::from(y)] = Progress { aim: self.aim, is_done: true };
             }
             self.part = self.parts.next();
             let strokes = match self.part {
                 Some(Part::Words(y)) => words::plan(screen, &self.wanted, y, false),
+                Some(Part::Picture(y)) if self.rows[usize::from(y)].is_done && !screen.is_damaged(y) => {
+                    Vec::new()
+                }
                 Some(Part::Picture(y)) if self.wanted.is_ramp() => words::plan(screen, &self.wanted, y, true),
                 Some(Part::Picture(y)) => {
                     picture::plan(screen, &self.wanted, &self.memory, y, self.can_repeat, &mut self.budget)
@@ -177,7 +200,7 @@ impl Painter {
     pub fn forget(&mut self) {
         self.screen = None;
         self.memory.forget();
-        self.drawn_for.fill(0);
+        self.rows.fill(Progress::default());
         self.start_over();
     }
 }

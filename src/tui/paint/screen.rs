@@ -94,6 +94,12 @@ impl Screen {
         &self.looks[self.index(at)]
     }
 
+    /// Whether drawing has left cells of a row in a state that nobody knows.
+    pub(super) fn is_damaged(&self, y: u16) -> bool {
+        let start = self.index(Place { x: 0, y });
+        self.looks[start..start + usize::from(self.columns)].contains(&Look::Unknown)
+    }
+
     fn index(&self, at: Place) -> usize {
         usize::from(at.y) * usize::from(self.columns) + usize::from(at.x)
     }

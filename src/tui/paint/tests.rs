@@ -25,7 +25,7 @@ impl Desk {
     fn repeating(columns: u16, rows: u16, depth: ColorDepth, can_repeat: bool) -> Self {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let terminal = vt100::Parser::new(side(rows), side(columns), 0);
-        Self { painter: Painter::new(depth, can_repeat), terminal, sent: 0 }
+        Self { painter: Painter::new(depth).repeating(can_repeat), terminal, sent: 0 }
     }
 
     /// Sends one slice; whether there was one.
@@ -283,7 +283,7 @@ fn words_come_before_the_picture_and_the_picture_from_its_middle() {
 
 #[test]
 fn a_painter_that_was_not_aimed_says_nothing() {
-    let mut painter = Painter::new(ColorDepth::TrueColor, false);
+    let mut painter = Painter::new(ColorDepth::TrueColor);
     assert_eq!(painter.slice(1000), b"");
     painter.forget();
     assert_eq!(painter.slice(1000), b"");
@@ -469,5 +469,34 @@ fn blanks_of_words_are_erased_in_one_go() {
         let sent = desk.finish(100);
         assert!(sent <= most, "{sent} bytes for {text:?}");
         assert_eq!(desk.difference(&buffer, ColorDepth::TrueColor), 0);
+    }
+}
+
+#[test]
+fn words_that_change_during_a_picture_do_not_hold_it_up() {
+    let (mut buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 5));
+    let whole = showing(&buffer, picture, Fidelity::First).sent;
+    let mut desk = Desk::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
+    for step in 0..40 {
+        buffer.set_string(0, SIDE.1, format!("{step:02}"), ratatui::style::Style::new());
+        desk.painter.aim(&buffer, picture, Fidelity::First);
+        desk.slice(whole / 20);
+    }
+    desk.finish(4096);
+    assert!(desk.sent < whole + 40 * 80, "{} bytes in place of {whole}", desk.sent);
+    let looks = on_screen(&desk, picture);
+    assert!(!looks.contains(&Look::BLANK), "cells that were never drawn");
+}
+
+#[test]
+fn a_picture_under_words_comes_back_when_they_go() {
+    let (buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 5));
+    let mut desk = showing(&buffer, picture, Fidelity::Still);
+    let mut covered = buffer.clone();
+    covered.set_string(8, 4, "日本 x", ratatui::style::Style::reset());
+    for wanted in [&covered, &buffer] {
+        desk.painter.aim(wanted, picture, Fidelity::Still);
+        assert!(desk.finish(4096) < 400);
+        assert!(desk.difference(wanted, ColorDepth::TrueColor) <= 1);
     }
 }

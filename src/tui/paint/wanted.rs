@@ -40,6 +40,16 @@ impl Wanted {
         &self.looks[usize::from(y) * columns..][..columns]
     }
 
+    /// Whether a row that shows this picture shows that one as well.
+    pub(super) fn serves(&self, other: &Self, y: u16) -> bool {
+        let is_as_near = self.fidelity == other.fidelity
+            || (self.fidelity == Fidelity::Still && other.fidelity == Fidelity::Moving);
+        let columns = usize::from(self.picture.left())..usize::from(self.picture.right());
+        is_as_near
+            && (self.columns, self.picture) == (other.columns, other.picture)
+            && self.row(y).get(columns.clone()) == other.row(y).get(columns)
+    }
+
     /// The colours of a cell of the picture; none of words, which may lie over it.
     pub(super) fn halves(&self, x: u16, y: u16) -> Option<[Shade; 2]> {
         match self.row(y)[usize::from(x)] {
