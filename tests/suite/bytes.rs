@@ -54,10 +54,9 @@ impl Studio {
         };
         self.handle.send(Command::Render(Box::new(request)));
         for event in &self.handle.events {
-            match event {
-                Event::Done { generation, .. } if generation == self.generation => break,
-                Event::Failed { failure, .. } => panic!("{failure:?}"),
-                _ => {}
+            assert!(!matches!(event, Event::Failed { .. }), "{event:?}");
+            if matches!(event, Event::Done { generation, .. } if generation == self.generation) {
+                break;
             }
         }
         let latest = self.handle.previews.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -38,13 +38,12 @@ impl Stroke {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::goes_on) {
             let count = run.len() as u16;
-            match run {
-                [Self::Halves { at, glyph: Glyph::Blank, halves, .. }, _, ..]
-                    if run.len() > 1 + moves::control(count - 1, b'b').len() =>
-                {
-                    shorter.push(Self::Halves { at: *at, glyph: Glyph::Blank, halves: *halves, count });
-                }
-                _ => shorter.extend_from_slice(run),
+            if let [Self::Halves { at, glyph: Glyph::Blank, halves, .. }, _, ..] = run
+                && run.len() > 1 + moves::control(count - 1, b'b').len()
+            {
+                shorter.push(Self::Halves { at: *at, glyph: Glyph::Blank, halves: *halves, count });
+            } else {
+                shorter.extend_from_slice(run);
             }
         }
         shorter
@@ -52,12 +51,14 @@ impl Stroke {
 
     /// Whether the next stroke is the same in the next cell.
     fn goes_on(&self, next: &Self) -> bool {
-        match (self, next) {
-            (
-                Self::Halves { at, glyph, halves, .. },
-                Self::Halves { at: next_at, glyph: next_glyph, halves: next_halves, .. },
-            ) => (at.x + 1, at.y, glyph, halves) == (next_at.x, next_at.y, next_glyph, next_halves),
-            _ => false,
+        if let (
+            Self::Halves { at, glyph, halves, .. },
+            Self::Halves { at: next_at, glyph: next_glyph, halves: next_halves, .. },
+        ) = (self, next)
+        {
+            (at.x + 1, at.y, glyph, halves) == (next_at.x, next_at.y, next_glyph, next_halves)
+        } else {
+            false
         }
     }
 }
