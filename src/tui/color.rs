@@ -115,7 +115,7 @@ pub(super) fn pixel(rgb: [u8; 3], depth: ColorDepth, x: usize, y: usize) -> Colo
 }
 
 /// The nearer of the nearest colour of the cube (16 to 231) and the nearest grey (232 to 255).
-fn nearest_256(rgb: [u8; 3]) -> u8 {
+pub(super) fn nearest_256(rgb: [u8; 3]) -> u8 {
     let steps = rgb.map(nearest_level);
     let cube = steps.map(|step| CUBE_LEVELS[step]);
     let mean = rgb.iter().map(|&channel| u32::from(channel)).sum::<u32>() / 3;

@@ -1,6 +1,7 @@
 //! The program as a whole: one crate, so that it links once.
 
 mod broken;
+mod bytes;
 mod closed_forms;
 mod contract;
 mod desk;

@@ -30,6 +30,13 @@ pub(super) struct Text {
     pub(super) pen: Pen,
 }
 
+impl Text {
+    /// Whether it is one code point of one column.
+    pub(super) fn is_plain(&self) -> bool {
+        self.columns == 1 && self.symbol.chars().nth(1).is_none()
+    }
+}
+
 /// The four ways to fill the halves of a cell by the two colours of the pen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Glyph {

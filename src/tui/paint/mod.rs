@@ -4,22 +4,39 @@
 //! that lead there, slice by slice; a newer aim takes the place of the rest of the older one. A cell counts as the
 //! two colours of its halves, however they are drawn: `▀ ▄ █` and the blank show the same pairs in several ways,
 //! and the one that costs least after what was drawn before is taken.
+//!
+//! Words are exact. A picture that will be followed by better ones is drawn as far as an error is worth its bytes,
+//! and where an edit changed nothing the screen is left alone. A picture that stays is exact to 1/255.
+//! [`advise`] tells which pictures are worth being aimed at on a line of some speed.
 
+mod abilities;
+mod advice;
+mod candidates;
 mod look;
+mod memory;
 mod moves;
 mod pen;
 mod picture;
 mod screen;
 mod shade;
+mod taste;
 #[cfg(test)]
 mod tests;
+mod trellis;
+mod wanted;
 mod words;
+
+use std::vec;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use self::look::Look;
-use self::screen::{Screen, Slice};
+pub use self::abilities::can_repeat;
+pub use self::advice::{Advice, Moment, advise};
+use self::memory::Memory;
+use self::picture::Budget;
+use self::screen::{Screen, Slice, Stroke};
+use self::wanted::Wanted;
 use super::color::ColorDepth;
 
 /// How near to the picture the cells have to come.
@@ -27,7 +44,7 @@ use super::color::ColorDepth;
 pub enum Fidelity {
     /// The first picture of a request, to be refined soon: at most 12 bytes a cell.
     First,
-    /// A picture that better ones will follow.
+    /// A picture of the same request that better ones will follow.
     Moving,
     /// A picture that stays: every colour to 1/255.
     Still,
@@ -37,24 +54,21 @@ pub enum Fidelity {
 #[derive(Debug)]
 pub struct Painter {
     depth: ColorDepth,
+    /// Whether the terminal knows REP.
+    can_repeat: bool,
     /// None: its content is unknown.
     screen: Option<Screen>,
+    memory: Memory,
     wanted: Wanted,
+    budget: Budget,
     /// What is still to be looked at, in order.
-    parts: Vec<Part>,
-    /// The next of them, and the column in it.
-    next: usize,
-    column: u16,
-}
-
-/// What was aimed at.
-#[derive(Debug)]
-struct Wanted {
-    columns: u16,
-    rows: u16,
-    looks: Vec<Look>,
-    picture: Rect,
-    fidelity: Fidelity,
+    parts: vec::IntoIter<Part>,
+    /// What is being drawn.
+    part: Option<Part>,
+    strokes: vec::IntoIter<Stroke>,
+    /// How far the picture is in each row.
+    rows: Vec<Progress>,
+    aim: u64,
 }
 
 /// A part of the screen that is drawn in one go.
@@ -66,37 +80,81 @@ enum Part {
     Picture(u16),
 }
 
+/// How far the picture is in a row.
+#[derive(Clone, Copy, Debug, Default)]
+struct Progress {
+    /// The number of the last aim that it was drawn for.
+    aim: u64,
+    /// Whether it is as it is wanted.
+    is_done: bool,
+}
+
 impl Painter {
     /// For a terminal of that many colours, whose content is unknown.
     pub fn new(depth: ColorDepth) -> Self {
-        let wanted =
-            Wanted { columns: 0, rows: 0, looks: Vec::new(), picture: Rect::ZERO, fidelity: Fidelity::Still };
-        Self { depth, screen: None, wanted, parts: Vec::new(), next: 0, column: 0 }
+        Self {
+            depth,
+            can_repeat: false,
+            screen: None,
+            memory: Memory::default(),
+            wanted: Wanted::nothing(depth),
+            budget: Budget::default(),
+            parts: Vec::new().into_iter(),
+            part: None,
+            strokes: Vec::new().into_iter(),
+            rows: Vec::new(),
+            aim: 0,
+        }
+    }
+
+    /// The same for a terminal that knows REP; see [`can_repeat`].
+    pub fn repeating(self, can_repeat: bool) -> Self {
+        Self { can_repeat, ..self }
     }
 
     /// Show this from now on, whatever is left of what was wanted before. `picture`: where cells may differ from
     /// what is wanted as far as the fidelity says; all others are words and come first. A buffer of another size than
     /// the one before means that the screen has been resized.
+    ///
+    /// The picture goes on with the rows that the aims before did not come to, so that aims that follow each other
+    /// faster than they are drawn lead to the edge all the same.
     pub fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
-        let (columns, rows) = (wanted.area.width, wanted.area.height);
-        self.wanted = Wanted {
-            columns,
-            rows,
-            looks: looks(wanted, self.depth),
-            picture: picture.intersection(Rect::new(0, 0, columns, rows)),
-            fidelity,
-        };
-        self.screen.take_if(|screen| (screen.columns, screen.rows) != (columns, rows));
-        self.parts = (0..rows).map(Part::Words).collect();
-        self.parts.extend(self.wanted.rows_from_the_middle().map(Part::Picture));
-        (self.next, self.column) = (0, 0);
+        let wanted = Wanted::new(wanted, picture, fidelity, self.depth);
+        let size = (wanted.columns, wanted.rows);
+        if self.screen.as_ref().is_some_and(|screen| (screen.columns, screen.rows) != size) {
+            self.screen = None;
+        }
+        if self.screen.is_none() || self.rows.len() != usize::from(wanted.rows) {
+            self.rows = vec![Progress::default(); usize::from(wanted.rows)];
+        }
+        for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
+            row.is_done = row.is_done && self.wanted.serves(&wanted, y);
+            if fidelity == Fidelity::First && !row.is_done {
+                row.aim = 0;
+            }
+        }
+        self.memory.aim(&wanted, self.screen.as_ref());
+        self.wanted = wanted;
+        self.aim += 1;
+        self.start_over();
+    }
+
+    fn start_over(&mut self) {
+        let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
+        rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
+        let words = (0..self.wanted.rows).map(Part::Words);
+        self.parts = words.chain(rows.into_iter().map(Part::Picture)).collect::<Vec<_>>().into_iter();
+        self.part = None;
+        self.strokes = Vec::new().into_iter();
+        self.budget = Budget::default();
     }
 
     /// The next bytes towards what is wanted, at most so many unless one cell needs more. Empty: it is shown. They
-    /// have to be written: what follows builds on them.
+    /// have to be written: what follows builds on them. Between two slices nobody else may move the cursor or
+    /// change the colours.
     pub fn slice(&mut self, most_bytes: usize) -> Vec<u8> {
         let mut slice = Slice { bytes: Vec::new(), most: most_bytes };
-        if self.wanted.looks.is_empty() {
+        if self.wanted.is_empty() {
             return slice.bytes;
         }
         let (columns, rows) = (self.wanted.columns, self.wanted.rows);
@@ -104,18 +162,36 @@ impl Painter {
             Screen::clear(&mut slice);
             Screen::cleared(columns, rows)
         });
-        while let Some(part) = self.parts.get(self.next) {
-            let reached = match *part {
-                Part::Words(y) => words::draw(screen, &self.wanted, y, self.column, &mut slice),
-                Part::Picture(y) => picture::draw(screen, &self.wanted, y, self.column, &mut slice),
-            };
-            match reached {
-                Reached::End => (self.next, self.column) = (self.next + 1, 0),
-                Reached::Column(column) => {
-                    self.column = column;
-                    break;
+        loop {
+            while let Some(stroke) = self.strokes.as_slice().first() {
+                if !screen.draw(stroke, &mut slice) {
+                    return slice.bytes;
                 }
+                if let (Some(Part::Picture(_)), Stroke::Halves { at, count, .. }) = (self.part, stroke) {
+                    self.memory.drawn(*at, *count);
+                }
+                self.strokes.next();
             }
+            if let Some(Part::Picture(y)) = self.part {
+                self.memory.row_done(y);
+                self.rows[usize::from(y)] = Progress { aim: self.aim, is_done: true };
+            }
+            self.part = self.parts.next();
+            let strokes = match self.part {
+                Some(Part::Words(y)) => words::plan(screen, &self.wanted, y, false),
+                Some(Part::Picture(y)) if self.rows[usize::from(y)].is_done && !screen.is_damaged(y) => {
+                    Vec::new()
+                }
+                Some(Part::Picture(y)) if self.wanted.is_ramp() => words::plan(screen, &self.wanted, y, true),
+                Some(Part::Picture(y)) => {
+                    picture::plan(screen, &self.wanted, &self.memory, y, self.can_repeat, &mut self.budget)
+                }
+                None => break,
+            };
+            self.strokes = strokes.into_iter();
+        }
+        if self.wanted.fidelity == Fidelity::Still {
+            self.memory.finish();
         }
         slice.bytes
     }
@@ -123,54 +199,8 @@ impl Painter {
     /// The content of the screen is unknown from now on: it is cleared before anything else is drawn.
     pub fn forget(&mut self) {
         self.screen = None;
-        (self.next, self.column) = (0, 0);
+        self.memory.forget();
+        self.rows.fill(Progress::default());
+        self.start_over();
     }
-}
-
-/// How far a part was drawn.
-enum Reached {
-    End,
-    /// Up to this column, which the slice has no room for.
-    Column(u16),
-}
-
-impl Wanted {
-    fn row(&self, y: u16) -> &[Look] {
-        let columns = usize::from(self.columns);
-        &self.looks[usize::from(y) * columns..][..columns]
-    }
-
-    /// Whether a cell belongs to the picture: words may lie over it.
-    fn is_picture(&self, x: u16, y: u16) -> bool {
-        self.picture.contains((x, y).into()) && matches!(self.row(y)[usize::from(x)], Look::Halves(_))
-    }
-
-    fn rows_from_the_middle(&self) -> impl Iterator<Item = u16> + use<> {
-        let (top, bottom) = (self.picture.top(), self.picture.bottom());
-        let middle = top + (bottom - top) / 2;
-        (0..=bottom - top).flat_map(move |away| {
-            let below = middle.checked_add(away).filter(|y| *y < bottom);
-            let above = middle.checked_sub(away).filter(|y| away > 0 && *y >= top);
-            [below, above].into_iter().flatten()
-        })
-    }
-}
-
-/// What the cells of a buffer look like.
-fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<Look> {
-    let columns = usize::from(buffer.area.width.max(1));
-    let mut looks: Vec<Look> = buffer.content.iter().map(|cell| Look::of(cell, depth)).collect();
-    for row in looks.chunks_mut(columns) {
-        let mut x = 0;
-        while x < row.len() {
-            let end = x + usize::from(row[x].columns());
-            if end > row.len() {
-                row[x] = Look::BLANK;
-            } else {
-                row[x + 1..end].fill(Look::Covered);
-            }
-            x = end;
-        }
-    }
-    looks
 }

@@ -1,44 +1,90 @@
-//! The picture.
+//! The picture: as near to what is wanted as the bytes allow.
 
-use super::look::{Glyph, Look};
+use super::Fidelity;
+use super::look::Look;
+use super::memory::Memory;
 use super::moves::Place;
-use super::screen::{Screen, Slice};
-use super::shade::Shade;
-use super::{Fidelity, Reached, Wanted};
+use super::screen::{Screen, Stroke};
+use super::taste::Taste;
+use super::trellis::{Dab, Row, Start, Target, row};
+use super::wanted::Wanted;
 
-/// Draws what differs of the picture in a row, from a column on.
-pub(super) fn draw(screen: &mut Screen, wanted: &Wanted, y: u16, from: u16, slice: &mut Slice) -> Reached {
-    for x in from.max(wanted.picture.left())..wanted.picture.right() {
-        let at = Place { x, y };
-        let Look::Halves(halves) = wanted.row(y)[usize::from(x)] else { continue };
-        if is_shown(screen.look(at), halves, wanted.fidelity) {
-            continue;
-        }
-        let pen = screen.pen;
-        let cost = |glyph: &Glyph| {
-            let wish = glyph.wish(halves);
-            let fg = wish.fg.filter(|shade| *shade != pen.fg).map_or(0, Shade::length);
-            let bg = wish.bg.filter(|shade| *shade != pen.bg).map_or(0, Shade::length);
-            fg + bg + glyph.symbol().len() as u32
-        };
-        let glyph = Glyph::ALL.into_iter().filter(|glyph| glyph.shows(halves)).min_by_key(cost);
-        if !glyph.is_none_or(|glyph| screen.draw_halves(at, glyph, halves, slice)) {
-            return Reached::Column(x);
-        }
-    }
-    Reached::End
+/// Bytes that a cell of a first picture may take, in the mean over the rows so far.
+const FIRST_BYTES: u32 = 12;
+/// Bytes at the begin of a row that the search does not count: modifiers of words that are turned off.
+const ROW_BYTES: u32 = 4;
+/// How much dearer bytes become from one try to the next.
+const STEP: f32 = 1.6;
+/// A byte dearer than this buys nothing.
+const DEAREST: f32 = 4000.0;
+
+/// What is left for the rows of a first picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Budget {
+    bytes: u32,
+    taste: Taste,
 }
 
-/// Whether a cell is near enough to what is wanted.
-fn is_shown(look: &Look, wanted: [Shade; 2], fidelity: Fidelity) -> bool {
-    let Look::Halves(halves) = look else { return false };
-    let most = match fidelity {
-        Fidelity::Still => 1,
-        Fidelity::First | Fidelity::Moving => 9,
+impl Default for Budget {
+    fn default() -> Self {
+        Self { bytes: 0, taste: Taste::MOVING }
+    }
+}
+
+impl Budget {
+    /// The row at the least error that the bytes allow.
+    fn spend(&mut self, targets: &[Target], start: Start) -> Row {
+        self.bytes += FIRST_BYTES * targets.len() as u32;
+        self.taste = self.taste.at(self.taste.byte / STEP);
+        loop {
+            let found = row(targets, start, self.taste);
+            let bytes = found.bytes + ROW_BYTES;
+            if bytes <= self.bytes || self.taste.byte > DEAREST {
+                self.bytes = self.bytes.saturating_sub(bytes);
+                return found;
+            }
+            self.taste = self.taste.at(self.taste.byte * STEP);
+        }
+    }
+}
+
+/// What is to be drawn of the picture in a row.
+pub(super) fn plan(
+    screen: &Screen,
+    wanted: &Wanted,
+    memory: &Memory,
+    y: u16,
+    can_repeat: bool,
+    budget: &mut Budget,
+) -> Vec<Stroke> {
+    let columns = wanted.picture.left()..wanted.picture.right();
+    let targets: Vec<Target> =
+        columns.clone().map(|x| target(screen, wanted, memory, Place { x, y })).collect();
+    let start = Start {
+        fg: screen.pen.fg,
+        bg: screen.pen.bg,
+        is_there: screen.cursor == Some(Place { x: columns.start, y }),
     };
-    let is_near = |a: Shade, b: Shade| {
-        let apart = |(a, b): ([u8; 3], [u8; 3])| a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= most);
-        a == b || a.rgb().zip(b.rgb()).is_some_and(apart)
+    let row = match wanted.fidelity {
+        Fidelity::Still => row(&targets, start, Taste::EXACT),
+        Fidelity::Moving => row(&targets, start, Taste::MOVING),
+        Fidelity::First => budget.spend(&targets, start),
     };
-    halves.iter().zip(wanted).all(|(a, b)| is_near(*a, b))
+    let stroke = |dab: Dab| Stroke::Halves {
+        at: Place { x: columns.start + dab.column as u16, y },
+        glyph: dab.glyph,
+        halves: dab.halves,
+        count: 1,
+    };
+    let strokes: Vec<Stroke> = row.dabs.into_iter().map(stroke).collect();
+    if can_repeat { Stroke::repeated(&strokes) } else { strokes }
+}
+
+fn target(screen: &Screen, wanted: &Wanted, memory: &Memory, at: Place) -> Target {
+    let shown = match screen.look(at) {
+        Look::Halves(halves) => Some(*halves),
+        Look::Unknown | Look::Text(_) | Look::Covered => None,
+    };
+    let wanted = wanted.halves(at.x, at.y).map(|wanted| memory.halves(at, wanted, shown));
+    Target { wanted, shown }
 }

@@ -2,7 +2,7 @@
 
 use super::look::{Glyph, Look, Text};
 use super::moves::{self, Place};
-use super::pen::{Pen, Wish};
+use super::pen::Pen;
 use super::shade::Shade;
 
 /// Bytes that are written in one go.
@@ -11,6 +11,56 @@ pub(super) struct Slice {
     pub(super) bytes: Vec<u8>,
     /// It gets no longer than this, unless one cell needs more.
     pub(super) most: usize,
+}
+
+/// What is drawn in one go.
+#[derive(Clone, Debug)]
+pub(super) enum Stroke {
+    /// A character.
+    Text { at: Place, text: Text },
+    /// Two halves, by a glyph that can show them, in this many cells. More than one: by REP.
+    Halves { at: Place, glyph: Glyph, halves: [Shade; 2], count: u16 },
+    /// Blanks of the terminal's own background, this many or, if none, up to the end of the row.
+    Erase { at: Place, count: Option<u16> },
+}
+
+impl Stroke {
+    /// Where it begins.
+    pub(super) fn at(&self) -> Place {
+        match self {
+            Self::Text { at, .. } | Self::Halves { at, .. } | Self::Erase { at, .. } => *at,
+        }
+    }
+
+    /// The same with REP in place of blanks that are alike, where that is shorter. Some terminals repeat no other
+    /// characters than those of ASCII.
+    pub(super) fn repeated(strokes: &[Self]) -> Vec<Self> {
+        let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
+        for run in strokes.chunk_by(Self::goes_on) {
+            let count = run.len() as u16;
+            if let [Self::Halves { at, glyph: Glyph::Blank, halves, .. }, _, ..] = run
+                && run.len() > 1 + moves::control(count - 1, b'b').len()
+            {
+                shorter.push(Self::Halves { at: *at, glyph: Glyph::Blank, halves: *halves, count });
+            } else {
+                shorter.extend_from_slice(run);
+            }
+        }
+        shorter
+    }
+
+    /// Whether the next stroke is the same in the next cell.
+    fn goes_on(&self, next: &Self) -> bool {
+        if let (
+            Self::Halves { at, glyph, halves, .. },
+            Self::Halves { at: next_at, glyph: next_glyph, halves: next_halves, .. },
+        ) = (self, next)
+        {
+            (at.x + 1, at.y, glyph, halves) == (next_at.x, next_at.y, next_glyph, next_halves)
+        } else {
+            false
+        }
+    }
 }
 
 /// The cells, the pen and the cursor of the terminal.
@@ -45,49 +95,76 @@ impl Screen {
         &self.looks[self.index(at)]
     }
 
+    /// Whether drawing has left cells of a row in a state that nobody knows.
+    pub(super) fn is_damaged(&self, y: u16) -> bool {
+        let start = self.index(Place { x: 0, y });
+        self.looks[start..start + usize::from(self.columns)].contains(&Look::Unknown)
+    }
+
     fn index(&self, at: Place) -> usize {
         usize::from(at.y) * usize::from(self.columns) + usize::from(at.x)
     }
 
-    /// Draws a character. False: there is no room for it, and nothing was done.
-    pub(super) fn draw_text(&mut self, at: Place, text: &Text, slice: &mut Slice) -> bool {
-        let is_drawn = self.print(at, &text.symbol, &text.pen.exactly(), slice);
-        if is_drawn {
-            self.put(at, Look::Text(text.clone()), text.columns);
-            // Terminals differ in how wide they think that such characters are.
-            if text.columns != 1 || text.symbol.chars().nth(1).is_some() {
-                self.cursor = None;
-            }
-        }
-        is_drawn
-    }
-
-    /// Draws two halves by a glyph that can show them. False: there is no room for it, and nothing was done.
-    pub(super) fn draw_halves(
-        &mut self,
-        at: Place,
-        glyph: Glyph,
-        halves: [Shade; 2],
-        slice: &mut Slice,
-    ) -> bool {
-        let is_drawn = self.print(at, glyph.symbol(), &glyph.wish(halves), slice);
-        if is_drawn {
-            self.put(at, Look::Halves(halves), 1);
-        }
-        is_drawn
-    }
-
-    fn print(&mut self, at: Place, symbol: &str, wish: &Wish, slice: &mut Slice) -> bool {
+    /// False: there is no room for it, and nothing was done.
+    pub(super) fn draw(&mut self, stroke: &Stroke, slice: &mut Slice) -> bool {
         let (start, pen) = (slice.bytes.len(), self.pen);
-        moves::go(self.cursor, at, &mut slice.bytes);
-        self.pen.turn(wish, &mut slice.bytes);
-        slice.bytes.extend_from_slice(symbol.as_bytes());
-        let has_room = start == 0 || slice.bytes.len() <= slice.most;
-        if !has_room {
+        self.write(stroke, &mut slice.bytes);
+        if start > 0 && slice.bytes.len() > slice.most {
             slice.bytes.truncate(start);
             self.pen = pen;
+            return false;
         }
-        has_room
+        self.keep(stroke);
+        true
+    }
+
+    fn write(&mut self, stroke: &Stroke, bytes: &mut Vec<u8>) {
+        let (at, wish) = match stroke {
+            Stroke::Text { at, text } => (at, text.pen.exactly()),
+            Stroke::Halves { at, glyph, halves, .. } => (at, glyph.wish(*halves)),
+            Stroke::Erase { at, .. } => (at, Glyph::Blank.wish([Shade::Ground; 2])),
+        };
+        moves::go(self.cursor, *at, bytes);
+        self.pen.turn(&wish, bytes);
+        match stroke {
+            Stroke::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),
+            Stroke::Halves { glyph, count, .. } => {
+                bytes.extend_from_slice(glyph.symbol().as_bytes());
+                if *count > 1 {
+                    bytes.extend(moves::control(*count - 1, b'b'));
+                }
+            }
+            Stroke::Erase { count: Some(count), .. } => bytes.extend(moves::control(*count, b'X')),
+            Stroke::Erase { count: None, .. } => bytes.extend_from_slice(b"\x1b[K"),
+        }
+    }
+
+    /// What is on the screen, and where the cursor is, after a stroke.
+    fn keep(&mut self, stroke: &Stroke) {
+        match stroke {
+            Stroke::Text { at, text } => {
+                self.put(*at, Look::Text(text.clone()), text.columns);
+                // Terminals differ in how wide they think that others are.
+                self.cursor = if text.is_plain() { self.after(*at, 1) } else { None };
+            }
+            Stroke::Halves { at, halves, count, .. } => {
+                for x in at.x..at.x + count {
+                    self.put(Place { x, ..*at }, Look::Halves(*halves), 1);
+                }
+                self.cursor = self.after(*at, *count);
+            }
+            Stroke::Erase { at, count } => {
+                for x in at.x..count.map_or(self.columns, |count| at.x + count) {
+                    self.put(Place { x, ..*at }, Look::BLANK, 1);
+                }
+                self.cursor = Some(*at);
+            }
+        }
+    }
+
+    /// The cursor after so many columns; behind the last one it may be anywhere.
+    fn after(&self, at: Place, columns: u16) -> Option<Place> {
+        Some(Place { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)
     }
 
     /// Keeps what was drawn. Half of a character that was two columns wide is gone as a whole.
@@ -102,7 +179,5 @@ impl Screen {
         if at.x + columns < self.columns && self.looks[end] == Look::Covered {
             self.looks[end] = Look::Unknown;
         }
-        let next = Place { x: at.x + columns, ..at };
-        self.cursor = Some(next).filter(|next| next.x < self.columns);
     }
 }

@@ -1,29 +1,89 @@
 //! Words: exactly as they are wanted.
 
 use super::look::{Glyph, Look};
-use super::moves::Place;
-use super::screen::{Screen, Slice};
-use super::{Reached, Wanted};
+use super::moves::{self, Place};
+use super::screen::{Screen, Stroke};
+use super::wanted::Wanted;
 
-/// Draws what differs of the words in a row, from a column on.
-pub(super) fn draw(screen: &mut Screen, wanted: &Wanted, y: u16, from: u16, slice: &mut Slice) -> Reached {
-    for x in from..wanted.columns {
+/// From so many blanks on, they are erased in one go.
+const ERASED: usize = 9;
+/// The same up to the end of a row.
+const ERASED_TO_END: usize = 4;
+
+/// What is to be drawn in a row of the words, or of a picture that is made of characters.
+pub(super) fn plan(screen: &Screen, wanted: &Wanted, y: u16, of_picture: bool) -> Vec<Stroke> {
+    let mut strokes = Vec::new();
+    for x in 0..wanted.columns {
         let at = Place { x, y };
         let look = &wanted.row(y)[usize::from(x)];
-        if wanted.is_picture(x, y) || screen.look(at) == look {
+        if wanted.is_picture(x, y) != of_picture || screen.look(at) == look {
             continue;
         }
-        let is_drawn = match look {
-            Look::Text(text) => screen.draw_text(at, text, slice),
-            Look::Halves(halves) => Glyph::ALL
-                .into_iter()
-                .find(|glyph| glyph.shows(*halves))
-                .is_none_or(|glyph| screen.draw_halves(at, glyph, *halves, slice)),
-            Look::Unknown | Look::Covered => true,
-        };
-        if !is_drawn {
-            return Reached::Column(x);
+        if let Some(stroke) = stroke(at, look) {
+            bridge(screen, &mut strokes, at);
+            strokes.push(stroke);
         }
     }
-    Reached::End
+    erased(wanted, y, &strokes)
+}
+
+fn stroke(at: Place, look: &Look) -> Option<Stroke> {
+    match look {
+        Look::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
+        Look::Halves(halves) => {
+            let glyph = Glyph::ALL.into_iter().find(|glyph| glyph.shows(*halves))?;
+            Some(Stroke::Halves { at, glyph, halves: *halves, count: 1 })
+        }
+        Look::Unknown | Look::Covered => None,
+    }
+}
+
+/// Writes the cells between the last stroke and a place again where that is shorter than to jump over them.
+fn bridge(screen: &Screen, strokes: &mut Vec<Stroke>, to: Place) {
+    let Some(Stroke::Text { at, text }) = strokes.last() else { return };
+    let first = at.x + text.columns;
+    let jump = moves::control(to.x - first, b'C').len();
+    let (mut between, mut bytes) = (Vec::new(), 0);
+    for x in first..to.x {
+        let at = Place { x, ..to };
+        match screen.look(at) {
+            Look::Text(other) if other.pen == text.pen && other.is_plain() => {
+                bytes += other.symbol.len();
+                between.push(Stroke::Text { at, text: other.clone() });
+            }
+            Look::Halves(halves) if *halves == [text.pen.bg; 2] && text.pen.modifier.is_empty() => {
+                bytes += 1;
+                between.push(Stroke::Halves { at, glyph: Glyph::Blank, halves: *halves, count: 1 });
+            }
+            Look::Text(_) | Look::Halves(_) | Look::Unknown | Look::Covered => return,
+        }
+        if bytes > jump {
+            return;
+        }
+    }
+    strokes.extend(between);
+}
+
+/// The same with many blanks in a row erased in one go.
+fn erased(wanted: &Wanted, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
+    let mut shorter = Vec::with_capacity(strokes.len());
+    for run in strokes.chunk_by(|a, b| is_blank(a) && is_blank(b) && a.at().x + 1 == b.at().x) {
+        let at = run[0].at();
+        let end = usize::from(at.x) + run.len();
+        let rest = end as u16..wanted.columns;
+        let is_last = rest.clone().all(|x| !wanted.is_picture(x, y))
+            && wanted.row(y)[end.min(usize::from(wanted.columns))..].iter().all(|look| *look == Look::BLANK);
+        if is_blank(&run[0]) && is_last && run.len() >= ERASED_TO_END {
+            shorter.push(Stroke::Erase { at, count: None });
+        } else if is_blank(&run[0]) && run.len() >= ERASED {
+            shorter.push(Stroke::Erase { at, count: Some(run.len() as u16) });
+        } else {
+            shorter.extend_from_slice(run);
+        }
+    }
+    shorter
+}
+
+fn is_blank(stroke: &Stroke) -> bool {
+    matches!(stroke, Stroke::Halves { halves, count: 1, .. } if Look::Halves(*halves) == Look::BLANK)
 }

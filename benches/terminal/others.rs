@@ -1,0 +1,66 @@
+//! Other ways to draw the same cells.
+
+use std::cell::Cell;
+use std::error::Error;
+use std::io::{self, Write};
+use std::process::{Command, Stdio};
+use std::rc::Rc;
+
+use glimt::film::Picture;
+use ratatui::backend::{Backend, CrosstermBackend};
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+/// Counts what is written.
+struct Counter(Rc<Cell<usize>>);
+
+impl Write for Counter {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.set(self.0.get() + bytes.len());
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// ratatui on crossterm, as it is.
+pub(crate) struct Plain {
+    backend: CrosstermBackend<Counter>,
+    sent: Rc<Cell<usize>>,
+    shown: Buffer,
+}
+
+impl Plain {
+    pub(crate) fn new(area: Rect) -> Self {
+        crossterm::style::force_color_output(true);
+        let sent = Rc::new(Cell::new(0));
+        let backend = CrosstermBackend::new(Counter(Rc::clone(&sent)));
+        Self { backend, sent, shown: Buffer::empty(area) }
+    }
+
+    /// Bytes that lead from what is shown to this.
+    pub(crate) fn draw(&mut self, wanted: &Buffer) -> usize {
+        let before = self.sent.get();
+        let difference = self.shown.diff(wanted);
+        // The counter takes everything.
+        let _ = self.backend.draw(difference.into_iter());
+        self.shown = wanted.clone();
+        self.sent.get() - before
+    }
+}
+
+/// Bytes of the picture by chafa in half blocks of 24 bits; none where there is no chafa.
+pub(crate) fn chafa(picture: &Picture) -> Result<Option<usize>, Box<dyn Error>> {
+    let file = tempfile::Builder::new().suffix(".png").tempfile()?;
+    let pixels = picture.pixels.as_flattened();
+    image::save_buffer(file.path(), pixels, picture.width, picture.height, image::ColorType::Rgb8)?;
+    let size = format!("{}x{}", picture.width, picture.height.div_ceil(2));
+    let output = Command::new("chafa")
+        .args(["--format", "symbols", "--symbols", "vhalf", "--colors", "full", "--stretch", "--size", &size])
+        .arg(file.path())
+        .stderr(Stdio::null())
+        .output();
+    Ok(output.ok().filter(|output| output.status.success()).map(|output| output.stdout.len()))
+}

@@ -1,0 +1,71 @@
+//! The previews of a render, as a front end gets them.
+
+use std::error::Error;
+use std::path::Path;
+use std::sync::PoisonError;
+use std::time::Instant;
+
+use glimt::film::Picture;
+use glimt::pipeline::Handle;
+use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
+use glimt::pipeline::settings::Overrides;
+
+/// A picture on its way to the final one.
+pub(crate) struct Shot {
+    /// Since the request.
+    pub(crate) seconds: f64,
+    /// Of a pixel of the film, in the mean; 0: a coarse picture.
+    pub(crate) samples: f64,
+    pub(crate) picture: Picture,
+    pub(crate) is_final: bool,
+}
+
+/// Renders the scene and keeps every preview that was seen; the last one is final.
+pub(crate) fn render(
+    handle: &Handle,
+    generation: u64,
+    scene: &Path,
+    size: PreviewSize,
+) -> Result<Vec<Shot>, Box<dyn Error>> {
+    let request = Request {
+        generation,
+        scene: scene.to_owned(),
+        overrides: Overrides::default(),
+        preview: Some(size),
+        write: Writing::No,
+        force: false,
+    };
+    let start = Instant::now();
+    handle.send(Command::Render(Box::new(request)));
+    let (mut shots, mut samples) = (Vec::<Shot>::new(), 0.0);
+    for event in &handle.events {
+        match event {
+            Event::Progress { progress, .. } => {
+                samples = progress.fraction * f64::from(progress.total_samples);
+            }
+            Event::Preview { .. } => {
+                let latest = handle.previews.lock().unwrap_or_else(PoisonError::into_inner).take();
+                if let Some(latest) = latest {
+                    let seconds = start.elapsed().as_secs_f64();
+                    let picture = latest.picture.as_ref().clone();
+                    shots.push(Shot { seconds, samples, picture, is_final: false });
+                }
+            }
+            Event::Done { .. } => break,
+            Event::Failed { failure, .. } => return Err(format!("{}: {failure:?}", scene.display()).into()),
+            Event::Started { .. }
+            | Event::Stage { .. }
+            | Event::Files { .. }
+            | Event::Asset { .. }
+            | Event::Settings { .. }
+            | Event::Written { .. }
+            | Event::WriteFailed { .. }
+            | Event::WritePostponed { .. }
+            | Event::Warnings { .. }
+            | Event::Refused { .. }
+            | Event::Cancelled { .. } => {}
+        }
+    }
+    shots.last_mut().ok_or("no preview came")?.is_final = true;
+    Ok(shots)
+}

@@ -1,0 +1,165 @@
+//! Which pictures are worth being drawn.
+
+use std::time::Duration;
+
+use super::Fidelity;
+
+/// What is known when there is a picture that was not aimed at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Bytes that the line takes in a second; none: more than anybody noticed.
+    pub bytes_per_second: Option<f64>,
+    /// Cells of the picture.
+    pub cells: u32,
+    /// Samples of a pixel of the picture at hand, in the mean over the pixels; 0: a coarse picture.
+    pub samples: f64,
+    /// The same of the last picture of this request that was aimed at; none: there was none.
+    pub aimed_samples: Option<f64>,
+    /// Since then.
+    pub since_aim: Duration,
+    /// Whether that picture is on the screen.
+    pub is_shown: bool,
+    /// Whether the picture stays.
+    pub is_final: bool,
+    /// Until there is one that stays, where that can be told.
+    pub final_in: Option<Duration>,
+}
+
+/// What to do with a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Advice {
+    /// Aim at it.
+    Aim(Fidelity),
+    /// Wait for a better one.
+    Wait,
+}
+
+/// Bytes that a cell takes until it is as it stays, about.
+const MOVING_BYTES: f64 = 6.0;
+/// At least so many times the samples of the picture before: the noise falls by the root of that.
+const MORE_SAMPLES: f64 = 2.0;
+/// The same while the picture before is still on its way.
+const MANY_MORE_SAMPLES: f64 = 4.0;
+/// While pixels get their first sample, a picture that has so many more of them is worth being drawn.
+const FIRST_PASS: f64 = 0.25;
+/// Pictures come no faster than this, but for the first and the last one.
+const SHORTEST: Duration = Duration::from_millis(100);
+/// After this any picture is better than one that stands still.
+const LONGEST: Duration = Duration::from_secs(2);
+/// Part of the line that pictures on the way may take.
+const SHARE: f64 = 0.5;
+
+/// Whether a picture is worth its bytes. The first and the last one always are. On a line that takes long for a
+/// picture there are few in between, and none that would keep the last one waiting.
+pub fn advise(moment: &Moment) -> Advice {
+    if moment.is_final {
+        return Advice::Aim(Fidelity::Still);
+    }
+    let Some(aimed) = moment.aimed_samples else { return Advice::Aim(Fidelity::First) };
+    let frame = moment.frame();
+    let is_too_late = moment.final_in.is_some_and(|left| left < frame);
+    let is_too_soon = moment.since_aim < SHORTEST.max(frame.div_f64(SHARE));
+    if is_too_late || is_too_soon {
+        return Advice::Wait;
+    }
+    let is_better = |factor: f64| moment.samples >= (aimed * factor).max(1.0) && moment.samples > aimed;
+    let is_worth_it = if moment.is_shown {
+        is_better(MORE_SAMPLES)
+            || (moment.samples < 1.0 && moment.samples >= aimed + FIRST_PASS)
+            || (moment.samples > aimed && moment.since_aim >= LONGEST)
+    } else {
+        is_better(MANY_MORE_SAMPLES)
+    };
+    if is_worth_it { Advice::Aim(Fidelity::Moving) } else { Advice::Wait }
+}
+
+impl Moment {
+    /// How long the line takes for a picture on the way.
+    fn frame(&self) -> Duration {
+        let bytes = f64::from(self.cells) * MOVING_BYTES;
+        self.bytes_per_second.map_or(Duration::ZERO, |rate| {
+            Duration::try_from_secs_f64(bytes / rate.max(1.0))
+                .unwrap_or(Duration::MAX)
+                .min(Duration::from_secs(3600))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A second after an aim at one sample.
+    const MOMENT: Moment = Moment {
+        bytes_per_second: None,
+        cells: 2500,
+        samples: 1.5,
+        aimed_samples: Some(1.0),
+        since_aim: Duration::from_secs(1),
+        is_shown: true,
+        is_final: false,
+        final_in: None,
+    };
+
+    const MOVING: Advice = Advice::Aim(Fidelity::Moving);
+
+    #[test]
+    fn the_first_and_the_last_picture_are_drawn_whatever_the_line() {
+        for bytes_per_second in [None, Some(0.0), Some(100.0), Some(f64::NAN)] {
+            let slow = Moment { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
+            assert_eq!(advise(&Moment { aimed_samples: None, ..slow }), Advice::Aim(Fidelity::First));
+            assert_eq!(advise(&Moment { is_final: true, ..slow }), Advice::Aim(Fidelity::Still));
+        }
+    }
+
+    #[test]
+    fn a_picture_on_the_way_has_twice_the_samples() {
+        assert_eq!(advise(&MOMENT), Advice::Wait);
+        assert_eq!(advise(&Moment { samples: 2.0, ..MOMENT }), MOVING);
+        let late = Moment { since_aim: Duration::from_secs(3), ..MOMENT };
+        assert_eq!(advise(&late), MOVING, "or it is a while ago");
+        assert_eq!(advise(&Moment { samples: 1.0, ..late }), Advice::Wait, "but not the same one again");
+    }
+
+    #[test]
+    fn the_first_pass_is_shown_in_parts() {
+        let coarse = Moment { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
+        assert_eq!(advise(&coarse), Advice::Wait);
+        assert_eq!(advise(&Moment { samples: 0.25, ..coarse }), MOVING);
+        assert_eq!(advise(&Moment { samples: 1.0, aimed_samples: Some(0.5), ..coarse }), MOVING);
+    }
+
+    #[test]
+    fn on_a_thin_line_pictures_are_few() {
+        // 15 kB: a quarter of a second at 60 kB/s.
+        let thin = Moment { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
+        assert_eq!(advise(&thin), MOVING);
+        assert_eq!(advise(&Moment { since_aim: Duration::from_millis(400), ..thin }), Advice::Wait);
+        assert_eq!(advise(&Moment { is_shown: false, ..thin }), Advice::Wait, "the one before is on its way");
+        assert_eq!(advise(&Moment { is_shown: false, samples: 4.0, ..thin }), MOVING, "but much worse");
+        let ending = Moment { final_in: Some(Duration::from_millis(200)), ..thin };
+        assert_eq!(advise(&ending), Advice::Wait, "the last one would wait for it");
+    }
+
+    #[test]
+    fn a_render_of_64_samples_shows_a_handful_of_pictures() {
+        for (bytes_per_second, most) in [(None, 12), (Some(125e3), 8), (Some(10e3), 2)] {
+            let (mut aimed, mut at, mut count) = (None, 0.0, 0);
+            // 2.5 seconds, a preview every 66 ms.
+            for preview in 0..38_u32 {
+                let seconds = f64::from(preview) * 0.066;
+                let moment = Moment {
+                    bytes_per_second,
+                    samples: seconds / 2.5 * 64.0,
+                    aimed_samples: aimed,
+                    since_aim: Duration::from_secs_f64(seconds - at),
+                    ..MOMENT
+                };
+                if advise(&moment) != Advice::Wait {
+                    (aimed, at, count) = (Some(moment.samples), seconds, count + 1);
+                }
+            }
+            assert!(count <= most && count >= 1, "{bytes_per_second:?}: {count}");
+        }
+    }
+}

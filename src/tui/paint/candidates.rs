@@ -1,0 +1,123 @@
+//! Colours that are worth being set at a cell.
+
+use super::shade::{Shade, digits};
+use super::taste::Taste;
+use crate::tui::color::nearest_256;
+
+/// The most of them for one half, and for both together.
+const MOST: usize = 6;
+/// No colour is looked for that serves longer than this.
+const LONGEST: usize = 32;
+
+/// Colours for the halves of one cell.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Candidates {
+    pub(super) upper: Vec<Shade>,
+    pub(super) lower: Vec<Shade>,
+    /// For both halves at once.
+    pub(super) both: Vec<Shade>,
+}
+
+/// For the first of these cells. Each candidate serves as many of the cells after it as it can.
+pub(super) fn candidates(cells: &[Option<[Shade; 2]>], taste: Taste) -> Candidates {
+    let column = |half: usize| cells.iter().map_while(move |cell| cell.map(|halves| halves[half]));
+    let both = cells.iter().map_while(|cell| *cell).flatten();
+    Candidates { upper: shades(column(0), taste), lower: shades(column(1), taste), both: shades(both, taste) }
+}
+
+fn shades(wanted: impl Iterator<Item = Shade> + Clone, taste: Taste) -> Vec<Shade> {
+    let mut shades = Vec::with_capacity(MOST);
+    let Some(first) = wanted.clone().next() else { return shades };
+    let mut add = |shade| {
+        if shades.len() < MOST && !shades.contains(&shade) {
+            shades.push(shade);
+        }
+    };
+    let Shade::Rgb(_) = first else {
+        add(first);
+        return shades;
+    };
+    for span in taste.spans {
+        let box_ = common(wanted.clone(), *span);
+        add(Shade::Rgb(box_.shortest()));
+        let fixed = Shade::Palette(nearest_256(box_.mean()));
+        if fixed.rgb().is_some_and(|rgb| box_.holds(rgb)) {
+            add(fixed);
+        }
+    }
+    shades
+}
+
+/// Colours that serve a row of wanted ones.
+struct Common {
+    low: [u8; 3],
+    high: [u8; 3],
+    sum: [u32; 3],
+    count: u32,
+}
+
+/// The colours within `span` of as many as possible.
+fn common(wanted: impl Iterator<Item = Shade>, span: u8) -> Common {
+    let mut common = Common { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
+    for shade in wanted.take(LONGEST) {
+        let Shade::Rgb(rgb) = shade else { break };
+        let low = std::array::from_fn(|i| common.low[i].max(rgb[i].saturating_sub(span)));
+        let high = std::array::from_fn(|i| common.high[i].min(rgb[i].saturating_add(span)));
+        if (0..3).any(|i| low[i] > high[i]) {
+            break;
+        }
+        (common.low, common.high) = (low, high);
+        common.sum = std::array::from_fn(|i| common.sum[i] + u32::from(rgb[i]));
+        common.count += 1;
+    }
+    common
+}
+
+impl Common {
+    fn mean(&self) -> [u8; 3] {
+        let count = self.count.max(1);
+        let mean = |i: usize| u8::try_from((self.sum[i] + count / 2) / count).unwrap_or(u8::MAX);
+        std::array::from_fn(|i| mean(i).clamp(self.low[i], self.high[i]))
+    }
+
+    /// The one of fewest digits; of those, the nearest to the mean.
+    fn shortest(&self) -> [u8; 3] {
+        let mean = self.mean();
+        std::array::from_fn(|i| {
+            let fewest = digits(self.low[i]);
+            let most = [9, 99, u8::MAX][fewest as usize - 1];
+            mean[i].min(most)
+        })
+    }
+
+    fn holds(&self, rgb: [u8; 3]) -> bool {
+        (0..3).all(|i| (self.low[i]..=self.high[i]).contains(&rgb[i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(values: &[u8]) -> Vec<Option<[Shade; 2]>> {
+        values.iter().map(|value| Some([Shade::Rgb([*value, 50, 100]), Shade::Rgb([0, 0, 0])])).collect()
+    }
+
+    #[test]
+    fn a_colour_serves_as_many_neighbours_as_it_can() {
+        // 20 to 22 have 21 in common; 24 does not.
+        let found = candidates(&row(&[20, 21, 22, 24]), Taste::EXACT);
+        assert_eq!(found.upper, [Shade::Rgb([21, 50, 99])]);
+        assert_eq!(found.lower, [Shade::Rgb([0, 0, 0]), Shade::Palette(16)]);
+        assert_eq!(found.both.len(), 1, "the halves have nothing in common");
+    }
+
+    #[test]
+    fn what_is_no_colour_of_three_numbers_is_taken_as_it_is() {
+        let cells = [Some([Shade::Ground, Shade::Palette(3)]), None];
+        let found = candidates(&cells, Taste::MOVING);
+        assert_eq!((found.upper, found.lower), (vec![Shade::Ground], vec![Shade::Palette(3)]));
+        let found = candidates(&[None], Taste::MOVING);
+        assert!(found.upper.is_empty() && found.both.is_empty());
+    }
+}

@@ -1,0 +1,147 @@
+//! What an edit did not change.
+//!
+//! The first pictures of two requests have the same random numbers, so that they differ only where the scene does. A
+//! cell that is alike in both keeps what is on the screen, which has converged, through all the noise that
+//! comes until the new picture has converged too.
+
+use ratatui::layout::Rect;
+
+use super::Fidelity;
+use super::look::Look;
+use super::moves::Place;
+use super::screen::Screen;
+use super::shade::Shade;
+use super::wanted::Wanted;
+
+/// First pictures are alike where no channel differs by more.
+const ALIKE: u8 = 2;
+/// Noise that a cell is left in spite of is no larger than this.
+const MOST_NOISE: u8 = 12;
+
+/// Of each cell of the screen, the first picture of the request that it shows.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    columns: usize,
+    picture: Rect,
+    /// None: nothing is known.
+    firsts: Vec<Option<[Shade; 2]>>,
+    /// The first picture of the request under way; empty: it had none.
+    newest: Vec<Option<[Shade; 2]>>,
+    /// Whether the cell is alike in the first pictures of the request under way and of the one that it shows.
+    steady: Vec<bool>,
+    /// How far what is wanted may be off what is shown where it is steady.
+    noise: u8,
+}
+
+impl Memory {
+    /// Nothing of what is on the screen is known.
+    pub(super) fn forget(&mut self) {
+        self.firsts.fill(None);
+        self.steady.fill(false);
+    }
+
+    pub(super) fn aim(&mut self, wanted: &Wanted, screen: Option<&Screen>) {
+        let cells = usize::from(wanted.columns) * usize::from(wanted.rows);
+        if self.picture != wanted.picture || self.firsts.len() != cells {
+            *self = Self {
+                columns: usize::from(wanted.columns),
+                picture: wanted.picture,
+                firsts: vec![None; cells],
+                steady: vec![false; cells],
+                ..Self::default()
+            };
+        }
+        match wanted.fidelity {
+            Fidelity::First => self.begin(wanted),
+            Fidelity::Moving => self.noise = screen.map_or(0, |screen| self.measure(wanted, screen)),
+            Fidelity::Still => self.steady.fill(false),
+        }
+    }
+
+    /// A request shows its first picture.
+    fn begin(&mut self, wanted: &Wanted) {
+        let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
+        self.newest = places.map(|(x, y)| wanted.halves(x, y)).collect();
+        self.noise = u8::MAX;
+        for (steady, (first, newest)) in self.steady.iter_mut().zip(self.firsts.iter().zip(&self.newest)) {
+            *steady = first.zip(*newest).is_some_and(|(a, b)| apart(a, b) <= ALIKE);
+        }
+    }
+
+    /// The noise in what is wanted, from how far it is off the cells that did not change: four times the median.
+    fn measure(&self, wanted: &Wanted, screen: &Screen) -> u8 {
+        let mut counts = [0_u32; 256];
+        for y in wanted.picture.top()..wanted.picture.bottom() {
+            for x in wanted.picture.left()..wanted.picture.right() {
+                if let (true, Look::Halves(shown), Some(wanted)) =
+                    (self.is_steady(Place { x, y }), screen.look(Place { x, y }), wanted.halves(x, y))
+                {
+                    counts[usize::from(apart(*shown, wanted))] += 1;
+                }
+            }
+        }
+        let all: u32 = counts.iter().sum();
+        let mut below = 0;
+        let median = counts.iter().take_while(|count| {
+            below += **count;
+            below * 2 < all
+        });
+        u8::try_from(4 * median.count() + 2).unwrap_or(u8::MAX).min(MOST_NOISE)
+    }
+
+    /// What a cell is to show: what it shows already where nothing but noise speaks against it.
+    pub(super) fn halves(&self, at: Place, wanted: [Shade; 2], shown: Option<[Shade; 2]>) -> [Shade; 2] {
+        shown
+            .filter(|shown| {
+                self.is_steady(at) && (self.noise == u8::MAX || apart(*shown, wanted) <= self.noise)
+            })
+            .unwrap_or(wanted)
+    }
+
+    fn is_steady(&self, at: Place) -> bool {
+        self.steady.get(self.index(at)).copied().unwrap_or(false)
+    }
+
+    fn index(&self, at: Place) -> usize {
+        usize::from(at.y) * self.columns + usize::from(at.x)
+    }
+
+    /// Cells of the picture were drawn for the request under way.
+    pub(super) fn drawn(&mut self, at: Place, count: u16) {
+        let first = self.index(at);
+        for index in first..first + usize::from(count) {
+            if let Some(kept) = self.firsts.get_mut(index) {
+                *kept = self.newest.get(index).copied().flatten();
+                self.steady[index] = false;
+            }
+        }
+    }
+
+    /// All that had to be drawn of the picture in a row was drawn: the cells that were left show the request under
+    /// way as well.
+    pub(super) fn row_done(&mut self, y: u16) {
+        for x in self.picture.left()..self.picture.right() {
+            let index = self.index(Place { x, y });
+            if let Some(Some(newest)) = self.newest.get(index)
+                && !self.steady[index]
+            {
+                self.firsts[index] = Some(*newest);
+            }
+        }
+    }
+
+    /// The picture is shown as it stays: what comes next is another request's.
+    pub(super) fn finish(&mut self) {
+        self.newest.clear();
+    }
+}
+
+/// The largest difference of a channel; 255 where there is no telling.
+fn apart(a: [Shade; 2], b: [Shade; 2]) -> u8 {
+    let one = |a: Shade, b: Shade| match (a.rgb(), b.rgb()) {
+        _ if a == b => 0,
+        (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),
+        _ => u8::MAX,
+    };
+    one(a[0], b[0]).max(one(a[1], b[1]))
+}

@@ -1,0 +1,64 @@
+//! What a byte is worth in error.
+
+use super::shade::Shade;
+
+/// How bytes are weighed against error. The error of a half of a cell is the sum of the squared differences of its
+/// channels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Taste {
+    /// Error that a byte may save.
+    pub(super) byte: f32,
+    /// No channel may be farther off than this.
+    pub(super) most: u8,
+    /// Neighbours that differ by twice this in no channel may become one colour: colours are tried for each.
+    pub(super) spans: &'static [u8],
+}
+
+impl Taste {
+    /// Every colour to 1/255.
+    pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
+
+    /// An error of 9/255 in all channels of a half is about worth the bytes of a colour.
+    pub(super) const MOVING: Self = Self { byte: 14.0, most: 255, spans: &[1, 4, 9] };
+
+    /// The same where a byte is worth this much, or as much as for a moving picture at least.
+    pub(super) fn at(self, byte: f32) -> Self {
+        let byte = byte.max(Self::MOVING.byte);
+        let spans: &[u8] = match byte {
+            ..30.0 => Self::MOVING.spans,
+            30.0..100.0 => &[3, 8, 16],
+            100.0..400.0 => &[6, 14, 28],
+            _ => &[12, 28, 60],
+        };
+        Self { byte, spans, ..self }
+    }
+
+    /// The error of showing one colour for another; infinite where that must not be.
+    pub(super) fn error(self, shown: Shade, wanted: Shade) -> f32 {
+        if shown == wanted {
+            return 0.0;
+        }
+        let (Some(shown), Some(wanted)) = (shown.rgb(), wanted.rgb()) else { return f32::INFINITY };
+        let apart: [u8; 3] = std::array::from_fn(|i| shown[i].abs_diff(wanted[i]));
+        if apart.iter().any(|apart| *apart > self.most) {
+            return f32::INFINITY;
+        }
+        apart.iter().map(|apart| f32::from(*apart) * f32::from(*apart)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_sums_of_squares_up_to_a_limit() {
+        let (a, b) = (Shade::Rgb([10, 20, 30]), Shade::Rgb([11, 20, 32]));
+        assert_eq!(Taste::MOVING.error(a, b), 5.0);
+        assert_eq!(Taste::EXACT.error(a, b), f32::INFINITY);
+        assert_eq!(Taste::EXACT.error(a, Shade::Rgb([9, 21, 30])), 2.0);
+        assert_eq!(Taste::MOVING.error(Shade::Palette(16), Shade::Rgb([1, 1, 0])), 2.0);
+        assert_eq!(Taste::MOVING.error(Shade::Ground, Shade::Palette(0)), f32::INFINITY);
+        assert_eq!(Taste::MOVING.error(Shade::Ground, Shade::Ground), 0.0);
+    }
+}

@@ -1,0 +1,200 @@
+//! Bytes that real pictures take on a terminal: first pictures, edits until they stay.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError};
+
+use glimt::film::Picture;
+use glimt::pipeline::Handle;
+use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
+use glimt::pipeline::settings::Overrides;
+use glimt::tui::ColorDepth;
+use glimt::tui::paint::{Fidelity, Painter};
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Color;
+
+const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 24 };
+const PREVIEW: PreviewSize = PreviewSize { width: 60, height: 40 };
+/// Pixels across and down of the film. Larger ones have less noise in their previews.
+const FILM: u32 = 320;
+
+/// Renders scenes one after the other.
+struct Studio {
+    handle: Handle,
+    generation: u64,
+    folder: tempfile::TempDir,
+}
+
+impl Studio {
+    fn new() -> Self {
+        let handle = glimt::pipeline::start().expect("a worker");
+        Self { handle, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
+    }
+
+    /// The last preview of a scene. Without a number of samples: the coarse picture that comes first, with one sample
+    /// for each of its own pixels.
+    fn preview(&mut self, scene: &str, samples: Option<u32>) -> Picture {
+        let path: PathBuf = self.folder.path().join("scene.toml");
+        std::fs::write(&path, scene).expect("written");
+        let side = if samples.is_some() { FILM } else { PREVIEW.height };
+        let overrides = Overrides {
+            width: Some(side),
+            height: Some(side),
+            samples: Some(samples.unwrap_or(1)),
+            ..Overrides::default()
+        };
+        self.generation += 1;
+        let request = Request {
+            generation: self.generation,
+            scene: path,
+            overrides,
+            preview: Some(PREVIEW),
+            write: Writing::No,
+            force: false,
+        };
+        self.handle.send(Command::Render(Box::new(request)));
+        for event in &self.handle.events {
+            assert!(!matches!(event, Event::Failed { .. }), "{event:?}");
+            if matches!(event, Event::Done { generation, .. } if generation == self.generation) {
+                break;
+            }
+        }
+        let latest = self.handle.previews.lock().unwrap_or_else(PoisonError::into_inner).take();
+        Arc::unwrap_or_clone(latest.expect("a preview").picture)
+    }
+
+    /// The pictures of a render on their way to the last one.
+    fn pictures(&mut self, scene: &str) -> Vec<(Picture, Fidelity)> {
+        let steps = [
+            (None, Fidelity::First),
+            (Some(1), Fidelity::Moving),
+            (Some(2), Fidelity::Moving),
+            (Some(4), Fidelity::Moving),
+            (Some(16), Fidelity::Moving),
+            (Some(32), Fidelity::Still),
+        ];
+        steps.map(|(samples, fidelity)| (self.preview(scene, samples), fidelity)).into()
+    }
+}
+
+/// A painter and the terminal behind it.
+struct Screen {
+    painter: Painter,
+    terminal: vt100::Parser,
+}
+
+impl Screen {
+    fn new() -> Self {
+        let side = |length| std::num::NonZero::new(length).expect("not zero");
+        let terminal = vt100::Parser::new(side(WINDOW.height), side(WINDOW.width), 0);
+        Self { painter: Painter::new(ColorDepth::TrueColor), terminal }
+    }
+
+    /// Bytes until a picture is shown.
+    fn show(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {
+        let mut buffer = Buffer::empty(WINDOW);
+        let place = Rect::new(2, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
+        for y in 0..place.height {
+            for x in 0..place.width {
+                let color = |row: u16| {
+                    let [r, g, b] =
+                        picture.pixels[usize::from(row) * picture.width as usize + usize::from(x)];
+                    Color::Rgb(r, g, b)
+                };
+                let cell = &mut buffer[(x + place.x, y + place.y)];
+                cell.set_symbol("▀").set_fg(color(2 * y)).set_bg(color(2 * y + 1));
+            }
+        }
+        self.painter.aim(&buffer, place, fidelity);
+        let mut sent = 0;
+        loop {
+            let bytes = self.painter.slice(8192);
+            if bytes.is_empty() {
+                return sent;
+            }
+            self.terminal.process(&bytes);
+            sent += bytes.len();
+        }
+    }
+
+    /// The largest difference of a channel between the screen and a picture.
+    fn difference(&self, picture: &Picture) -> u8 {
+        let pixels = picture.pixels.iter().enumerate();
+        let off = pixels.map(|(i, wanted)| {
+            let (x, y) = (i % picture.width as usize, i / picture.width as usize);
+            let cell = self.terminal.screen().cell(y as u16 / 2 + 1, x as u16 + 2).expect("a cell");
+            let is_upper = y % 2 == 0;
+            let color = match cell.contents() {
+                "▀" if is_upper => cell.fgcolor(),
+                "▄" if !is_upper => cell.fgcolor(),
+                "█" => cell.fgcolor(),
+                _ => cell.bgcolor(),
+            };
+            let shown = rgb(color);
+            (0..3).map(|k| shown[k].abs_diff(wanted[k])).max().unwrap_or(0)
+        });
+        off.max().unwrap_or(0)
+    }
+}
+
+/// What a colour looks like; the palette is xterm's.
+fn rgb(color: vt100::Color) -> [u8; 3] {
+    match color {
+        vt100::Color::Rgb(r, g, b) => [r, g, b],
+        vt100::Color::Idx(index @ 232..) => [8 + 10 * (index - 232); 3],
+        vt100::Color::Idx(index @ 16..) => {
+            let index = usize::from(index - 16);
+            [index / 36, index / 6 % 6, index % 6].map(|step| [0, 95, 135, 175, 215, 255][step])
+        }
+        other => panic!("{other:?} is of no picture"),
+    }
+}
+
+fn scene(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    std::fs::read_to_string(path).expect("a bundled scene")
+}
+
+/// Cells that differ in more than the last bit.
+fn changed(a: &Picture, b: &Picture) -> usize {
+    let width = a.width as usize;
+    let is_off = |i: usize| (0..3).any(|k| a.pixels[i][k].abs_diff(b.pixels[i][k]) > 1);
+    let tops = (0..a.pixels.len()).filter(|i| i / width % 2 == 0);
+    tops.filter(|i| is_off(*i) || is_off(i + width)).count()
+}
+
+/// The screen is led through a render; the bytes of its first picture and of all.
+fn through(screen: &mut Screen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
+    let sent: Vec<usize> =
+        pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();
+    let (last, _) = pictures.last().expect("pictures");
+    let off = screen.difference(last);
+    assert!(off <= 1, "the last picture is off by {off}");
+    assert_eq!(screen.show(last, Fidelity::Still), 0, "nothing when nothing changes");
+    (sent[0], sent.iter().sum())
+}
+
+#[test]
+fn renders_and_edits_stay_within_their_bytes_and_end_exactly() {
+    let green = "green = { diffuse = [0.13, 0.45, 0.09] }";
+    let red = "red = { diffuse = [0.70, 0.13, 0.10]";
+    for (name, from, to) in [
+        ("cornell.toml", green, "green = { diffuse = [0.13, 0.25, 0.39] }"),
+        ("cornell.toml", "size = [0.6, 0.6, 0.6]", "size = [0.6, 0.75, 0.6]"),
+        ("spheres.toml", red, "red = { diffuse = [0.20, 0.53, 0.10]"),
+        ("spheres.toml", "position = [0, 1.3, 5.5]", "position = [0.2, 1.4, 5.5]"),
+    ] {
+        let (before, mut studio, mut screen) = (scene(name), Studio::new(), Screen::new());
+        assert!(before.contains(from), "{name} has no `{from}`");
+        let old = studio.pictures(&before);
+        let new = studio.pictures(&before.replace(from, to));
+        let [(old_last, _), (new_last, _)] = [&old, &new].map(|pictures| pictures.last().expect("pictures"));
+        let cells = old_last.pixels.len() / 2;
+        let (first, all) = through(&mut screen, &old);
+        assert!(first <= 12 * cells, "{name}: {first} bytes for a first picture of {cells} cells");
+        assert!(all <= 48 * cells, "{name}: {all} bytes for {cells} cells");
+        let edited = changed(old_last, new_last);
+        let (_, all) = through(&mut screen, &new);
+        assert!(edited > 0 && all <= 48 * edited, "{name}, {to}: {all} bytes for {edited} cells");
+    }
+}
