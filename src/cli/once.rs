@@ -11,8 +11,8 @@ use super::progress::{self, Reporter};
 use super::report;
 use super::signals;
 use crate::output::check_place;
-use crate::pipeline::protocol::{Command, Effective, Event, Failure, Report, Request, Writing};
-use crate::pipeline::settings::Overrides;
+use crate::pipeline::protocol::{Command, Event, Failure, Report, Request, Writing};
+use crate::pipeline::settings::{Effective, Overrides};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 

@@ -10,9 +10,7 @@ use crate::film::Rect;
 use crate::geometry::Ray;
 use crate::lights::{LightSamples, Source};
 use crate::math::{DVec2, Vec2, Vec3};
-use crate::sampling::filter::Filter;
 use crate::sampling::{PixelSampler, Purpose, warp};
-use crate::scene::description::PixelFilter;
 use crate::world::{Hit, World};
 
 /// The samples of a tile. A slot is the place of a sample among them: all of the first pixel, all of the next.
@@ -172,22 +170,13 @@ impl Tracer<'_> {
 
     fn camera_ray(&self, slot: u32) -> PathRay {
         let (x, y, sample) = self.block.place(slot);
-        let sampler = PixelSampler::new(self.settings.seed, x, y, sample);
+        let sampler = PixelSampler::new(self.settings.render.seed, x, y, sample);
         let [fx, fy, lx, ly] = sampler.get4(Purpose::CAMERA);
-        let sample = filter(self.settings.filter).sample(Vec2::new(fx, fy));
+        let sample = self.settings.render.filter.sample(Vec2::new(fx, fy));
         let place = (sample.offset + Vec2::splat(0.5)).as_dvec2();
         let lens = if self.settings.dof { warp::disk(Vec2::new(lx, ly)) } else { Vec2::ZERO };
         let from_corner = DVec2::new(f64::from(x), f64::from(y)) + place;
         let ray = self.world.camera.ray(self.settings.from_middle(from_corner), lens);
         PathRay { ray, throughput: Vec3::splat(sample.weight), slot, path: 1, medium: Medium::default() }
-    }
-}
-
-fn filter(filter: PixelFilter) -> Filter {
-    match filter {
-        PixelFilter::Box => Filter::Box,
-        PixelFilter::Tent => Filter::Tent,
-        PixelFilter::Gaussian => Filter::Gaussian,
-        PixelFilter::Mitchell => Filter::Mitchell,
     }
 }

@@ -54,7 +54,11 @@ impl<'a> PhongVertex<'a> {
             View::Diffuse => [diffuse(), Vec3::ZERO],
             View::Specular => [Vec3::ZERO, specular()],
             View::Shadow => [Vec3::splat(luminance(radiance)), Vec3::ZERO],
-            _ => [diffuse(), specular()],
+            View::Beauty => [diffuse(), specular()],
+            // Nothing of it is light that lights send.
+            View::Ambient | View::Normal | View::Depth | View::Barycentric | View::Uv | View::Albedo => {
+                [Vec3::ZERO; 2]
+            }
         }
     }
 
@@ -99,7 +103,7 @@ pub(super) fn light(wave: &mut Wave<'_>, vertex: &PhongVertex<'_>) {
     let (world, settings) = (wave.tracer.world, wave.tracer.settings);
     let mut arrivals = Arrivals::new(wave, vertex);
     for (number, light) in (0_u32..).zip(&world.lights) {
-        if settings.shadows == Shadows::Hard {
+        if settings.render.shadows == Shadows::Hard {
             if let Some(sample) = light.middle(vertex.surface.point) {
                 arrivals.push(&sample.into(), 1.0);
             }
@@ -147,15 +151,16 @@ struct Arrivals<'a, 'w, 'v> {
 impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
     fn new(wave: &'a mut Wave<'w>, vertex: &'a PhongVertex<'v>) -> Self {
         let first = wave.shadows.len();
-        let sampler = wave.tracer.block.sampler(wave.tracer.settings.seed, vertex.path.slot);
+        let sampler = wave.tracer.block.sampler(wave.tracer.settings.render.seed, vertex.path.slot);
         Self { wave, vertex, sampler, shadow_origin: vertex.shadow_origin(), first, total: 0.0 }
     }
 
     /// As many samples of a light as the settings ask for.
     fn push_samples(&mut self, light: &SeenLight<'_>, number: u32) {
         let (settings, path) = (self.wave.tracer.settings, self.vertex.path);
-        let numbers = self.sampler.get2_all(Purpose::at_vertex(path.path, number), settings.shadow_samples);
-        let share = 1.0 / settings.shadow_samples as f32;
+        let numbers =
+            self.sampler.get2_all(Purpose::at_vertex(path.path, number), settings.render.shadow_samples);
+        let share = 1.0 / settings.render.shadow_samples as f32;
         let mut queue = std::mem::take(self.wave.samples);
         queue.clear();
         self.wave.tracer.world.geometry.instructions().run(Draw { light, numbers, queue: &mut queue });
@@ -192,7 +197,7 @@ impl<'a, 'w, 'v> Arrivals<'a, 'w, 'v> {
         let settings = self.wave.tracer.settings;
         let (contribution, slot) = (value * self.vertex.path.throughput, self.vertex.path.slot);
         self.total += value.x;
-        if settings.shadows == Shadows::Off && settings.view != View::Shadow {
+        if settings.render.shadows == Shadows::Off && settings.view != View::Shadow {
             self.wave.radiance[slot as usize] += contribution;
         } else {
             let ray = Ray::segment(self.shadow_origin, from);

@@ -26,19 +26,15 @@ pub fn absorption(
     material: &Material,
 ) -> Vec3 {
     let from_inside = || surface.normal.dot(path.ray.direction) > 0.0;
-    let glass = match (path.medium.innermost(), material) {
-        (Some(inside), _) => glass_of(world, inside),
-        (None, Material::Glass(glass)) if from_inside() => Some(glass),
-        _ => None,
+    let glass = match path.medium.innermost() {
+        Some(inside) => glass_of(world, inside),
+        None => material.glass().filter(|_| from_inside()),
     };
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
 fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
-    match &world.materials[inside.material as usize] {
-        Material::Glass(glass) => Some(glass),
-        _ => None,
-    }
+    world.materials[inside.material as usize].glass()
 }
 
 /// Index of refraction of what a ray is in.
@@ -89,7 +85,7 @@ impl Wave<'_> {
     }
 
     fn chance(&self, path: &PathRay) -> f32 {
-        let sampler = self.tracer.block.sampler(self.tracer.settings.seed, path.slot);
+        let sampler = self.tracer.block.sampler(self.tracer.settings.render.seed, path.slot);
         sampler.get2(Purpose::at_vertex(path.path, CHOICE)).x
     }
 

@@ -2,7 +2,7 @@
 
 use super::batch::{Queues, Tracer};
 use super::whitted::closest_hits;
-use super::{RayCounters, View};
+use super::{FirstHit, RayCounters};
 use crate::control::Cancelled;
 use crate::geometry::SurfacePoint;
 use crate::materials::Material;
@@ -11,6 +11,7 @@ use crate::math::{Vec2, Vec3};
 /// Show what each camera ray in the queue hits; black where nothing.
 pub fn shade(
     tracer: &Tracer<'_>,
+    number: FirstHit,
     queues: &mut Queues,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
@@ -20,12 +21,12 @@ pub fn shade(
         let Some(hit) = hit else { continue };
         let surface = tracer.world.geometry.surface(&path.ray, hit);
         let material = &tracer.world.materials[tracer.world.material_index(hit)];
-        let value = match tracer.settings.view {
-            View::Normal => (normal(&surface, material, counters) + Vec3::ONE) * 0.5,
-            View::Depth => Vec3::splat(nearness(tracer, &surface)),
-            View::Barycentric => surface.barycentric,
-            View::Uv => fraction(surface.uv).extend(0.0),
-            _ => albedo(material, surface.uv, counters),
+        let value = match number {
+            FirstHit::Normal => (normal(&surface, material, counters) + Vec3::ONE) * 0.5,
+            FirstHit::Depth => Vec3::splat(nearness(tracer, &surface)),
+            FirstHit::Barycentric => surface.barycentric,
+            FirstHit::Uv => fraction(surface.uv).extend(0.0),
+            FirstHit::Albedo => albedo(material, surface.uv, counters),
         };
         radiance[path.slot as usize] = value * path.throughput;
     }
@@ -33,16 +34,13 @@ pub fn shade(
 }
 
 fn normal(surface: &SurfacePoint, material: &Material, counters: &mut RayCounters) -> Vec3 {
-    match material {
-        Material::Phong(phong) if phong.normal_map.is_some() => {
-            counters.texture_lookups += 1;
-            let bent = phong.normal_map.as_ref();
-            bent.map_or(surface.shading_normal, |map| {
-                map.bend(surface.uv, surface.shading_normal, surface.dpdu, surface.dpdv)
-            })
-        }
-        _ => surface.shading_normal,
-    }
+    let map = match material {
+        Material::Phong(phong) => phong.normal_map.as_ref(),
+        Material::Mirror(_) | Material::Glass(_) => None,
+    };
+    let Some(map) = map else { return surface.shading_normal };
+    counters.texture_lookups += 1;
+    map.bend(surface.uv, surface.shading_normal, surface.dpdu, surface.dpdv)
 }
 
 /// 1 at the eye, ½ at the distance in focus, towards 0 far away.

@@ -80,7 +80,7 @@ impl Wave<'_> {
 
     /// Add what arrives by the shadow rays in the queue, in their order, and empty it.
     fn trace_shadows(&mut self, arrived: &mut [Vec3]) -> Result<(), Cancelled> {
-        let is_traced = self.tracer.settings.shadows != Shadows::Off;
+        let is_traced = self.tracer.settings.render.shadows != Shadows::Off;
         let ShadowQueue { rays, sources, arrivals } = &*self.shadows;
         let packets = rays.chunks(PACKET).zip(sources.chunks(PACKET)).zip(arrivals.chunks(PACKET));
         for (number, ((rays, sources), arrivals)) in packets.enumerate() {
@@ -102,12 +102,12 @@ impl Wave<'_> {
 
     /// Whether one more scattering is allowed.
     pub(super) fn may_scatter(&self) -> bool {
-        self.depth < self.tracer.settings.max_depth
+        self.depth < self.tracer.settings.render.max_depth
     }
 
     fn leave(&mut self, path: &PathRay) {
         if self.tracer.settings.view == View::Beauty {
-            self.add(path.slot, path.throughput * self.tracer.world.background);
+            self.add(path.slot, path.throughput * self.tracer.settings.render.background);
         }
     }
 
@@ -138,7 +138,7 @@ impl Wave<'_> {
     fn shade_phong(&mut self, path: &PathRay, surface: &SurfacePoint, phong: &Phong) {
         let bsdf = phong.at(surface.uv, &mut self.counters.texture_lookups);
         let view = self.tracer.settings.view;
-        let ambient = self.tracer.world.ambient;
+        let ambient = self.tracer.settings.render.ambient;
         if ambient != Vec3::ZERO && matches!(view, View::Beauty | View::Ambient) {
             self.add(path.slot, path.throughput * ambient * bsdf.ambient);
         }

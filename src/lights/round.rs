@@ -62,7 +62,9 @@ impl RoundEmitter {
         let cosine = -place.normal.dot(direction);
         let (target, source) = match self.shape {
             Round::Torus(torus) => (above(&torus, &place, offset), Source::Nothing),
-            _ => (place.point.as_vec3(), Source::Object(object)),
+            Round::Disk(_) | Round::Cylinder(_) | Round::Cone(_) => {
+                (place.point.as_vec3(), Source::Object(object))
+            }
         };
         (cosine > 0.0).then(|| LightSample {
             target,

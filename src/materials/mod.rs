@@ -26,6 +26,14 @@ pub enum Material {
 }
 
 impl Material {
+    /// What it is filled with, if it is a glass.
+    pub fn glass(&self) -> Option<&Glass> {
+        match self {
+            Self::Glass(glass) => Some(glass),
+            Self::Phong(_) | Self::Mirror(_) => None,
+        }
+    }
+
     /// Radiance that its front side sends out, in every direction alike.
     pub fn emission(&self) -> Vec3 {
         match self {

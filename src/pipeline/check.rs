@@ -8,7 +8,7 @@ use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
 use crate::math::Vec3;
-use crate::scene::description::{MaterialKind, Object, Shape};
+use crate::scene::description::{Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
 
 /// What a scene that is right consists of.
@@ -39,16 +39,20 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
     let triangles = |shape: &Shape| match shape {
         Shape::Mesh { file, .. } => meshes[*file].mesh.mesh.triangles.len() as u64,
         Shape::Triangle { .. } => 1,
-        _ => 0,
+        Shape::Sphere { .. }
+        | Shape::Quad { .. }
+        | Shape::Plane { .. }
+        | Shape::Box { .. }
+        | Shape::Disk { .. }
+        | Shape::Cylinder { .. }
+        | Shape::Cone { .. }
+        | Shape::Torus { .. } => 0,
     };
-    let emits =
-        |object: &&Object| match (object.material.map(|index| &scene.materials[index].kind), &object.shape) {
-            (Some(MaterialKind::Phong { emission, .. }), _) => *emission != Vec3::ZERO,
-            (None, Shape::Mesh { file, .. }) => {
-                meshes[*file].mesh.materials.iter().any(|own| own.emission != Vec3::ZERO)
-            }
-            _ => false,
-        };
+    let emits = |object: &&Object| match (object.material, object.shape.mesh_file()) {
+        (Some(index), _) => scene.materials[index].kind.emission() != Vec3::ZERO,
+        (None, Some(file)) => meshes[file].mesh.materials.iter().any(|own| own.emission != Vec3::ZERO),
+        (None, None) => false,
+    };
     Ok(Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),

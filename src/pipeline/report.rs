@@ -42,11 +42,11 @@ fn image(outcome: &Outcome<'_>) -> ImageReport {
     ImageReport {
         path: paths.first().cloned(),
         paths,
-        width: plan.settings.width,
-        height: plan.settings.height,
+        width: plan.settings.render.width,
+        height: plan.settings.render.height,
         samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
         error: outcome.canvas.film.relative_error(),
-        complete: outcome.canvas.is_complete(plan.samples),
+        complete: outcome.canvas.is_complete(plan.settings.render.samples),
     }
 }
 

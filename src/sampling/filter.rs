@@ -3,19 +3,21 @@
 
 use std::sync::LazyLock;
 
+use crate::choice;
 use crate::math::Vec2;
 
-/// A reconstruction filter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Filter {
-    /// One pixel wide.
-    Box,
-    /// Two pixels wide.
-    Tent,
-    /// Standard deviation ½ pixel, three pixels wide.
-    Gaussian,
-    /// Mitchell and Netravali 1988, B = C = 1/3, four pixels wide.
-    Mitchell,
+choice! {
+    /// Reconstruction filters.
+    pub enum PixelFilter {
+        /// One pixel wide.
+        Box = "box",
+        /// Two pixels wide, falling linearly.
+        Tent = "tent",
+        /// A truncated Gaussian of standard deviation half a pixel, three pixels wide.
+        Gaussian = "gaussian",
+        /// Mitchell and Netravali, B = C = 1/3, four pixels wide.
+        Mitchell = "mitchell",
+    }
 }
 
 /// A place relative to the pixel's centre, in pixels, and what a sample there counts: ∫|f|/∫f with f's sign.
@@ -27,7 +29,7 @@ pub struct FilterSample {
     pub weight: f32,
 }
 
-impl Filter {
+impl PixelFilter {
     /// Warp a point of the unit square.
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
@@ -110,10 +112,10 @@ mod tests {
     fn every_filter_has_its_weight_and_width() {
         let n = 2048;
         for (filter, moment) in [
-            (Filter::Box, 1.0 / 12.0),
-            (Filter::Tent, 1.0 / 6.0),
-            (Filter::Gaussian, gaussian_moment()),
-            (Filter::Mitchell, mitchell_moment()),
+            (PixelFilter::Box, 1.0 / 12.0),
+            (PixelFilter::Tent, 1.0 / 6.0),
+            (PixelFilter::Gaussian, gaussian_moment()),
+            (PixelFilter::Mitchell, mitchell_moment()),
         ] {
             let (mut weight, mut second, mut mean) = (0.0, 0.0, 0.0);
             for i in 0..n * n {

@@ -6,13 +6,20 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use crate::choice;
+pub use crate::film::tone::Tonemap;
+pub use crate::lights::point::Falloff;
+pub use crate::materials::texture::{TextureFilter, Wrap};
 use crate::math::{DVec3, Vec2, Vec3};
+pub use crate::sampling::filter::PixelFilter;
 
 /// A whole scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The `[render]` table.
     pub render: Render,
+    /// Where the picture goes, if the scene says so, resolved against the scene's folder.
+    pub output: Option<PathBuf>,
     /// The `[camera]` table.
     pub camera: Camera,
     /// The `[photons]` table.
@@ -42,7 +49,7 @@ pub struct Located<T> {
 pub const MOST_SCATTERINGS: u32 = 10_000;
 
 /// Settings of the picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Render {
     /// Pixels across, 1 … 65536.
     pub width: u32,
@@ -72,64 +79,40 @@ pub struct Render {
     pub accel: Accel,
     /// Seed of every random number.
     pub seed: u32,
-    /// Where the picture goes, if the scene says so, resolved against the scene's folder.
-    pub output: Option<PathBuf>,
 }
 
-/// Rendering methods.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Integrator {
-    /// Direct light by Phong, mirror, glass, ambient.
-    Whitted,
+choice! {
+    /// Rendering methods.
+    pub enum Integrator {
+        /// Direct light by Phong, mirror, glass, ambient.
+        Whitted = "whitted",
+    }
+    unavailable "path"
 }
 
-/// How shadows are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Shadows {
-    /// Nothing stops light.
-    Off,
-    /// One ray to the middle of a light.
-    Hard,
-    /// The visible part of the light, sampled.
-    Soft,
+choice! {
+    /// How shadows are made.
+    pub enum Shadows {
+        /// Nothing stops light.
+        Off = "off",
+        /// One ray to the middle of a light.
+        Hard = "hard",
+        /// The visible part of the light, sampled.
+        Soft = "soft",
+    }
 }
 
-/// Reconstruction filters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum PixelFilter {
-    /// One pixel wide.
-    Box,
-    /// Two pixels wide, falling linearly.
-    Tent,
-    /// A truncated Gaussian of standard deviation half a pixel, three pixels wide.
-    Gaussian,
-    /// Mitchell and Netravali, B = C = 1/3, four pixels wide.
-    Mitchell,
-}
-
-/// Tone curves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Tonemap {
-    /// Clamp.
-    None,
-    /// x/(1 + x) on luminance.
-    Reinhard,
-    /// A fit of the ACES filmic curve.
-    Aces,
-    /// AgX.
-    Agx,
-}
-
-/// Acceleration structures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Accel {
-    /// Bounding volume hierarchy.
-    Bvh,
-    /// The same, with large triangles of meshes in several of its leaves: longer to build, faster to trace where
-    /// triangles are long and lie askew.
-    BvhHigh,
-    /// kd-tree over the triangles of meshes.
-    KdTree,
+choice! {
+    /// Acceleration structures.
+    pub enum Accel {
+        /// Bounding volume hierarchy.
+        Bvh = "bvh",
+        /// The same, with large triangles of meshes in several of its leaves: longer to build, faster to trace where
+        /// triangles are long and lie askew.
+        BvhHigh = "bvh-high",
+        /// kd-tree over the triangles of meshes.
+        KdTree = "kdtree",
+    }
 }
 
 /// The view.
@@ -193,35 +176,16 @@ pub struct Texture {
     pub encoding: Encoding,
 }
 
-/// Texture interpolation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum TextureFilter {
-    /// The texel that holds the point.
-    Nearest,
-    /// Between the four nearest texel centres.
-    Bilinear,
-}
-
-/// What a texture is outside [0, 1].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Wrap {
-    /// Periodic.
-    Repeat,
-    /// The border's texels.
-    Clamp,
-    /// Periodic, every second tile mirrored.
-    Mirror,
-}
-
-/// What a texture's numbers are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Encoding {
-    /// sRGB for 8-bit colour, linear for normal maps and float files.
-    Auto,
-    /// sRGB, decoded.
-    Srgb,
-    /// Used as they are.
-    Linear,
+choice! {
+    /// What a texture's numbers are.
+    pub enum Encoding {
+        /// sRGB for 8-bit colour, linear for normal maps and float files.
+        Auto = "auto",
+        /// sRGB, decoded.
+        Srgb = "srgb",
+        /// Used as they are.
+        Linear = "linear",
+    }
 }
 
 /// A colour or a texture.
@@ -272,6 +236,16 @@ pub enum MaterialKind {
         /// Transmittance per unit of length inside, in [0, 1].
         tint: Vec3,
     },
+}
+
+impl MaterialKind {
+    /// Radiance of the front side.
+    pub fn emission(&self) -> Vec3 {
+        match self {
+            Self::Phong { emission, .. } => *emission,
+            Self::Mirror { .. } | Self::Glass { .. } => Vec3::ZERO,
+        }
+    }
 }
 
 /// A shape with its material.
@@ -386,6 +360,24 @@ pub enum Shape {
     },
 }
 
+impl Shape {
+    /// Index into [`Scene::mesh_files`] of the file that it is an instance of, if it is a mesh.
+    pub fn mesh_file(&self) -> Option<usize> {
+        match self {
+            Self::Mesh { file, .. } => Some(*file),
+            Self::Sphere { .. }
+            | Self::Quad { .. }
+            | Self::Plane { .. }
+            | Self::Box { .. }
+            | Self::Triangle { .. }
+            | Self::Disk { .. }
+            | Self::Cylinder { .. }
+            | Self::Cone { .. }
+            | Self::Torus { .. } => None,
+        }
+    }
+}
+
 /// A light without extent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointLight {
@@ -395,13 +387,4 @@ pub struct PointLight {
     pub intensity: Vec3,
     /// How it weakens with distance.
     pub falloff: Falloff,
-}
-
-/// How a point light weakens with distance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Falloff {
-    /// With the square of the distance.
-    Square,
-    /// Not at all.
-    None,
 }

@@ -17,7 +17,7 @@ use crate::geometry::triangle::Triangle;
 use crate::lights::{Light, PointLight};
 use crate::materials::Material;
 use crate::math::transform::Transform;
-use crate::scene::description::{self, Falloff, Scene};
+use crate::scene::description::{self, Scene};
 
 impl World {
     /// Put the parts together. The tree over all objects is taken from `reuse` where the same shapes stand under it.
@@ -46,8 +46,6 @@ impl World {
             materials,
             object_materials,
             lights,
-            background: scene.render.background,
-            ambient: scene.render.ambient,
         })
     }
 }
@@ -96,12 +94,10 @@ fn lower_materials(scene: &Scene, parts: &Parts) -> (Vec<Material>, Vec<ObjectMa
     }
     let fallback = materials.len() as u32;
     materials.push(lower::fallback_material());
-    let of_object = |object: &description::Object| match (object.material, &object.shape) {
+    let of_object = |object: &description::Object| match (object.material, object.shape.mesh_file()) {
         (Some(index), _) => ObjectMaterial::One(index as u32),
-        (None, description::Shape::Mesh { file, .. }) => {
-            ObjectMaterial::OfFile { first: first_of_file[*file], fallback }
-        }
-        (None, _) => ObjectMaterial::One(fallback),
+        (None, Some(file)) => ObjectMaterial::OfFile { first: first_of_file[file], fallback },
+        (None, None) => ObjectMaterial::One(fallback),
     };
     let of_objects = scene.objects.iter().map(of_object).collect();
     (materials, of_objects)
@@ -118,7 +114,7 @@ fn gather_lights(
         Light::Point(PointLight {
             position: light.position,
             intensity: light.intensity,
-            falls_off: light.falloff == Falloff::Square,
+            falloff: light.falloff,
         })
     });
     let shapes = (0_u32..).zip(geometry.shapes()).zip(object_materials);

@@ -18,49 +18,45 @@ pub fn area_lights(
     material: ObjectMaterial,
     materials: &[Material],
 ) -> Vec<Light> {
-    let light = |shape, radiance| Light::Area(AreaLight { shape, radiance, object });
-    let of_one =
+    let emission =
         |index: u32| Some(materials[index as usize].emission()).filter(|&radiance| radiance != Vec3::ZERO);
+    let light = |shape, radiance| Light::Area(AreaLight { shape, radiance, object });
+    // The radiance of a shape that is all of one material.
     let radiance = match material {
-        ObjectMaterial::One(index) => of_one(index),
+        ObjectMaterial::One(index) => emission(index),
         ObjectMaterial::OfFile { .. } => None,
     };
-    let round = |shape, radiance| {
-        let emitter = RoundEmitter::new(shape);
-        emitter.map(|emitter| light(Emitter::Round(emitter), radiance)).into_iter().collect()
-    };
-    match (shape, radiance) {
-        (Shape::Disk(disk), Some(radiance)) => round(Round::Disk(*disk), radiance),
-        (Shape::Cylinder(cylinder), Some(radiance)) => round(Round::Cylinder(*cylinder), radiance),
-        (Shape::Cone(cone), Some(radiance)) => round(Round::Cone(*cone), radiance),
-        (Shape::Torus(torus), Some(radiance)) => round(Round::Torus(*torus), radiance),
-        (Shape::Sphere(sphere), Some(radiance)) => {
-            vec![light(
-                Emitter::Sphere(SphereEmitter { center: sphere.center, radius: sphere.radius }),
-                radiance,
-            )]
+    let one = |shape: Option<Emitter>| shape.zip(radiance).map(|(shape, radiance)| light(shape, radiance));
+    let round = |shape| one(RoundEmitter::new(shape).map(Emitter::Round)).into_iter().collect();
+    match shape {
+        Shape::Disk(disk) => round(Round::Disk(*disk)),
+        Shape::Cylinder(cylinder) => round(Round::Cylinder(*cylinder)),
+        Shape::Cone(cone) => round(Round::Cone(*cone)),
+        Shape::Torus(torus) => round(Round::Torus(*torus)),
+        Shape::Sphere(sphere) => {
+            let emitter = SphereEmitter { center: sphere.center, radius: sphere.radius };
+            one(Some(Emitter::Sphere(emitter))).into_iter().collect()
         }
-        (Shape::Quad(quad), Some(radiance)) => {
-            vec![light(Emitter::Quad(QuadEmitter::new(quad.corner, quad.u, quad.v)), radiance)]
+        Shape::Quad(quad) => {
+            let emitter = QuadEmitter::new(quad.corner, quad.u, quad.v);
+            one(Some(Emitter::Quad(emitter))).into_iter().collect()
         }
-        (Shape::Box(cuboid), Some(radiance)) => {
-            box_faces(cuboid).map(|face| light(Emitter::Quad(face), radiance)).collect()
-        }
-        (Shape::Triangle(triangle), Some(radiance)) => {
+        Shape::Box(cuboid) => box_faces(cuboid).filter_map(|face| one(Some(Emitter::Quad(face)))).collect(),
+        Shape::Triangle(triangle) => {
             let corners = [triangle.a, triangle.b, triangle.c];
-            let emitter = TriangleEmitter::new(vec![(corners, 0)]);
-            emitter.map(|emitter| light(Emitter::Triangles(emitter), radiance)).into_iter().collect()
+            one(TriangleEmitter::new(vec![(corners, 0)]).map(Emitter::Triangles)).into_iter().collect()
         }
-        (Shape::Mesh(mesh), _) => mesh_materials(&mesh.tree, material)
+        // No part of the sky is without it: such a scene is refused where it is read.
+        Shape::Plane(_) => Vec::new(),
+        Shape::Mesh(mesh) => mesh_materials(&mesh.tree, material)
             .into_iter()
             .filter_map(|(index, wanted)| {
-                let radiance = of_one(index)?;
+                let radiance = emission(index)?;
                 let triangles = triangles_of(&mesh.tree, wanted);
                 let corners = triangles.into_iter().map(|id| (mesh.world_corners(id), id)).collect();
                 Some(light(Emitter::Triangles(TriangleEmitter::new(corners)?), radiance))
             })
             .collect(),
-        _ => Vec::new(),
     }
 }
 

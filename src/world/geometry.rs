@@ -80,11 +80,11 @@ impl Geometry {
         described: &[description::Shape],
         meshes: &[std::sync::Arc<super::MeshTree>],
     ) -> bool {
-        let same_mesh = |(shape, described): (&Shape, &description::Shape)| match (shape, described) {
-            (Shape::Mesh(mesh), description::Shape::Mesh { file, .. }) => {
-                std::sync::Arc::ptr_eq(&mesh.tree, &meshes[*file])
-            }
-            _ => true,
+        let same_mesh = |(shape, described): (&Shape, &description::Shape)| {
+            shape
+                .mesh()
+                .zip(described.mesh_file())
+                .is_none_or(|(mesh, file)| std::sync::Arc::ptr_eq(&mesh.tree, &meshes[file]))
         };
         self.described == described && self.shapes.iter().zip(described).all(same_mesh)
     }
@@ -115,12 +115,11 @@ impl Geometry {
     /// Whether anything but the light itself lies on the segment.
     pub fn occluded(&self, ray: &Ray, source: Source) -> bool {
         let ray_f64 = ray.to_f64();
+        let any = |id: u32, except: Option<u32>| self.shapes[id as usize].any(ray, &ray_f64, except);
         let test = |id: u32| match source {
-            Source::Object(own) if own == id => false,
-            Source::Primitive(own, part) if own == id => {
-                self.shapes[id as usize].any(ray, &ray_f64, Some(part))
-            }
-            _ => self.shapes[id as usize].any(ray, &ray_f64, None),
+            Source::Nothing => any(id, None),
+            Source::Object(own) => own != id && any(id, None),
+            Source::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
         self.unbounded.iter().any(|&id| test(id)) || self.tree.any(ray, test)
     }
@@ -132,7 +131,7 @@ impl Geometry {
 
     /// The material that a mesh file gives the triangle that was hit, by the file's own count.
     pub fn file_material(&self, hit: &Hit) -> Option<u32> {
-        let Shape::Mesh(mesh) = &self.shapes[hit.object as usize] else { return None };
+        let mesh = self.shapes[hit.object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
         materials.get(hit.shape.primitive as usize).copied().filter(|&own| own != u32::MAX)
     }
@@ -141,10 +140,8 @@ impl Geometry {
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
         let mut bytes = self.tree.memory_bytes();
-        for shape in &self.shapes {
-            if let Shape::Mesh(mesh) = shape
-                && !seen.contains(&std::sync::Arc::as_ptr(&mesh.tree))
-            {
+        for mesh in self.shapes.iter().filter_map(Shape::mesh) {
+            if !seen.contains(&std::sync::Arc::as_ptr(&mesh.tree)) {
                 seen.push(std::sync::Arc::as_ptr(&mesh.tree));
                 bytes += mesh.tree.memory_bytes();
             }

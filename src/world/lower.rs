@@ -8,10 +8,10 @@ use super::textures::{TextureSource, Use, declared_source, file_source};
 use crate::assets::FileMaterial;
 use crate::materials::normal_map::NormalMap;
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{Color, Filter, Texture, Wrap};
+use crate::materials::texture::{Color, Texture, TextureFilter, Wrap};
 use crate::materials::{Glass, Material, Mirror, Phong};
 use crate::math::{Vec2, Vec3};
-use crate::scene::description::{self, ColorSource, MaterialKind, Scene, TextureFilter};
+use crate::scene::description::{self, ColorSource, MaterialKind, Scene};
 
 /// A material of the scene file.
 pub fn material(scene: &Scene, parts: &Parts, kind: &MaterialKind) -> Material {
@@ -88,22 +88,14 @@ fn declared_color(scene: &Scene, parts: &Parts, source: &ColorSource) -> Color {
 
 fn declared_texture(scene: &Scene, parts: &Parts, index: usize, used: Use) -> Arc<Texture> {
     let declared = &scene.textures[index];
-    let filter = match declared.filter {
-        TextureFilter::Nearest => Filter::Nearest,
-        TextureFilter::Bilinear => Filter::Bilinear,
-    };
-    let wrap = match declared.wrap {
-        description::Wrap::Repeat => Wrap::Repeat,
-        description::Wrap::Clamp => Wrap::Clamp,
-        description::Wrap::Mirror => Wrap::Mirror,
-    };
+    let &description::Texture { filter, wrap, repeat, .. } = declared;
     let texels = texels(parts, &declared_source(scene, index, used));
-    Arc::new(Texture { texels, filter, wrap, repeat: declared.repeat })
+    Arc::new(Texture { texels, filter, wrap, repeat })
 }
 
 fn file_texture(parts: &Parts, source: &TextureSource) -> Arc<Texture> {
     let texels = texels(parts, source);
-    Arc::new(Texture { texels, filter: Filter::Bilinear, wrap: Wrap::Repeat, repeat: Vec2::ONE })
+    Arc::new(Texture { texels, filter: TextureFilter::Bilinear, wrap: Wrap::Repeat, repeat: Vec2::ONE })
 }
 
 /// The texels that were loaded. A material that no object has names textures that were not: they are never looked up.

@@ -25,7 +25,6 @@ use crate::assets::OrbiterCamera;
 use crate::lights::Light;
 use crate::materials::Material;
 use crate::materials::texels::Texels;
-use crate::math::Vec3;
 
 /// What a world is made of.
 #[derive(Clone, Debug, Default)]
@@ -51,10 +50,6 @@ pub struct World {
     object_materials: Vec<ObjectMaterial>,
     /// Lights of every kind.
     pub lights: Vec<Light>,
-    /// Radiance seen by rays that leave.
-    pub background: Vec3,
-    /// Ambient radiance of the Phong model.
-    pub ambient: Vec3,
 }
 
 /// How an object finds its material.

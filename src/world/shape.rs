@@ -73,7 +73,15 @@ impl Shape {
     pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
         match self {
             Self::Mesh(mesh) => mesh.tree.any(&mesh.local_ray(ray), except),
-            _ => self.closest(ray, ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
+            Self::Sphere(_)
+            | Self::Quad(_)
+            | Self::Plane(_)
+            | Self::Box(_)
+            | Self::Triangle(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_) => self.closest(ray, ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
         }
     }
 
@@ -110,12 +118,35 @@ impl Shape {
         }
     }
 
+    /// The instance that it is, if it is a mesh.
+    pub fn mesh(&self) -> Option<&MeshInstance> {
+        match self {
+            Self::Mesh(mesh) => Some(mesh),
+            Self::Sphere(_)
+            | Self::Quad(_)
+            | Self::Plane(_)
+            | Self::Box(_)
+            | Self::Triangle(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_) => None,
+        }
+    }
+
     /// Triangles that it is made of.
     pub fn triangle_count(&self) -> u64 {
         match self {
             Self::Triangle(_) => 1,
             Self::Mesh(mesh) => mesh.tree.loaded().mesh.triangles.len() as u64,
-            _ => 0,
+            Self::Sphere(_)
+            | Self::Quad(_)
+            | Self::Plane(_)
+            | Self::Box(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_) => 0,
         }
     }
 }

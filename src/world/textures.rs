@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
-use crate::scene::description::{ColorSource, Encoding, Material, MaterialKind, Scene, Shape};
+use crate::scene::description::{ColorSource, Encoding, Material, MaterialKind, Scene};
 
 /// An image file, and how its numbers are read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -79,10 +79,10 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
     for object in &scene.objects {
-        match (object.material, &object.shape) {
+        match (object.material, object.shape.mesh_file()) {
             (Some(material), _) => materials[material] = true,
-            (None, Shape::Mesh { file, .. }) => files[*file] = true,
-            (None, _) => {}
+            (None, Some(file)) => files[file] = true,
+            (None, None) => {}
         }
     }
     (materials, files)
@@ -92,8 +92,8 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
 pub fn declared_source(scene: &Scene, texture: usize, used: Use) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
-        (Encoding::Srgb, _) => ImageEncoding::Srgb,
-        (Encoding::Linear, _) | (Encoding::Auto, Use::Normal) => ImageEncoding::Linear,
+        (Encoding::Srgb, Use::Color | Use::Normal) => ImageEncoding::Srgb,
+        (Encoding::Linear, Use::Color | Use::Normal) | (Encoding::Auto, Use::Normal) => ImageEncoding::Linear,
         (Encoding::Auto, Use::Color) => ImageEncoding::Color,
     };
     TextureSource { path: texture.file.value.clone(), encoding }
@@ -110,8 +110,14 @@ pub fn file_source(path: &Path, used: Use) -> TextureSource {
 
 /// Indices of the textures that a material names.
 fn material_textures(material: &Material) -> Vec<(usize, Use)> {
-    let MaterialKind::Phong { diffuse, specular, ambient, normal_map, .. } = &material.kind else {
-        return Vec::new();
+    // Every field by name: a new one may name a texture.
+    let (diffuse, specular, ambient, normal_map) = match &material.kind {
+        MaterialKind::Phong { diffuse, specular, shininess: _, ambient, emission: _, normal_map } => {
+            (diffuse, specular, ambient, normal_map)
+        }
+        MaterialKind::Mirror { reflectance: _ } | MaterialKind::Glass { ior: _, tint: _ } => {
+            return Vec::new();
+        }
     };
     let color = |source: &ColorSource| match source {
         ColorSource::Texture(index) => Some((*index, Use::Color)),

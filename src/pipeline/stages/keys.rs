@@ -4,8 +4,8 @@
 use super::super::fingerprint::{Fingerprint, Key};
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
-use crate::math::DVec3;
-use crate::scene::description::{Accel, Camera, ColorSource, MaterialKind, Scene, Shape};
+use crate::math::{DVec3, Vec3};
+use crate::scene::description::{Accel, Camera, ColorSource, MaterialKind, Render, Scene, Shape};
 
 /// What a mesh's tree is built of.
 pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
@@ -37,14 +37,11 @@ pub(in crate::pipeline) fn lights(scene: &Scene, meshes: &[Key]) -> Key {
         key.dvec3(light.position).vec3(light.intensity).index(light.falloff as usize);
     }
     for object in &scene.objects {
-        match object.material.map(|index| &scene.materials[index].kind) {
-            Some(MaterialKind::Phong { emission, .. }) if emission.max_element() > 0.0 => {
-                shape(&mut key, &object.shape, meshes);
-                key.vec3(*emission);
-            }
-            Some(_) => {}
-            // The file's own materials may emit.
-            None => shape(&mut key, &object.shape, meshes),
+        let emission = object.material.map(|index| scene.materials[index].kind.emission());
+        // None: the file's own materials may emit.
+        if emission != Some(Vec3::ZERO) {
+            shape(&mut key, &object.shape, meshes);
+            key.vec3(emission.unwrap_or(Vec3::ZERO));
         }
     }
     key.finish()
@@ -71,18 +68,35 @@ pub(in crate::pipeline) fn world(
         key.key(texture);
     }
     camera(&mut key, &scene.camera, orbiter);
-    let render = &scene.render;
-    key.vec3(render.ambient).vec3(render.background);
     key.finish()
 }
 
 /// Everything that a film's sums depend on, apart from the number of samples.
 pub(in crate::pipeline) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
     // Every field by name: a new one must be thought of here.
-    let RenderSettings { width, height, max_depth, shadows, shadow_samples, filter, dof, seed, view } =
-        *settings;
+    let RenderSettings { render, dof, view } = *settings;
+    let Render {
+        width,
+        height,
+        // The film knows how many it has.
+        samples: _,
+        shadow_samples,
+        max_depth,
+        integrator,
+        shadows,
+        ambient,
+        background,
+        filter,
+        // For files and screens only.
+        exposure: _,
+        tonemap: _,
+        // All trees give the same hits.
+        accel: _,
+        seed,
+    } = render;
     let mut key = Fingerprint::new("render");
     key.key(&world).u64(width.into()).u64(height.into()).u64(max_depth.into());
+    key.index(integrator as usize).vec3(ambient).vec3(background);
     key.index(shadows as usize).u64(shadow_samples.into()).index(filter as usize);
     key.index(dof.into()).u64(seed.into()).index(view as usize);
     if let Some(rect) = crop {
@@ -179,7 +193,7 @@ mod tests {
     use super::*;
     use crate::integrators::View;
     use crate::pipeline::tests::loaded_of;
-    use crate::scene::description::{PixelFilter, Shadows};
+    use crate::scene::description::{Integrator, PixelFilter, Shadows, Tonemap};
 
     const BALL: &str = "[materials.m]\ntype = \"phong\"\ndiffuse = [1, 0, 0]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
 
@@ -221,22 +235,54 @@ mod tests {
         let plan = crate::pipeline::plan::plan(&scene, std::path::Path::new("a.toml"), &Default::default());
         let settings = plan.expect("a plan").settings;
         let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
+        let render_settings = settings.render;
         // Without `..`: a field that is added does not compile until it has a line below.
-        let RenderSettings { width, height, max_depth, shadows, shadow_samples, filter, dof, seed, view } =
-            settings;
-        assert_eq!((shadows, filter, view), (Shadows::Soft, PixelFilter::Box, View::Beauty));
+        let RenderSettings { render: _, dof, view } = settings;
+        let Render {
+            width,
+            height,
+            samples,
+            shadow_samples,
+            max_depth,
+            integrator,
+            shadows,
+            ambient,
+            background,
+            filter,
+            exposure,
+            tonemap,
+            accel,
+            seed,
+        } = render_settings;
+        assert_eq!((integrator, shadows), (Integrator::Whitted, Shadows::Soft));
+        assert_eq!(
+            (filter, view, tonemap, accel),
+            (PixelFilter::Box, View::Beauty, Tonemap::None, Accel::Bvh)
+        );
+        let with = |render: Render| RenderSettings { render, ..settings };
         let others = [
-            RenderSettings { width: width + 1, ..settings },
-            RenderSettings { height: height + 1, ..settings },
-            RenderSettings { max_depth: max_depth + 1, ..settings },
-            RenderSettings { shadows: Shadows::Hard, ..settings },
-            RenderSettings { shadows: Shadows::Off, ..settings },
-            RenderSettings { shadow_samples: shadow_samples + 1, ..settings },
-            RenderSettings { filter: PixelFilter::Tent, ..settings },
+            with(Render { width: width + 1, ..render_settings }),
+            with(Render { height: height + 1, ..render_settings }),
+            with(Render { shadow_samples: shadow_samples + 1, ..render_settings }),
+            with(Render { max_depth: max_depth + 1, ..render_settings }),
+            with(Render { shadows: Shadows::Hard, ..render_settings }),
+            with(Render { shadows: Shadows::Off, ..render_settings }),
+            with(Render { ambient: ambient + Vec3::ONE, ..render_settings }),
+            with(Render { background: background + Vec3::ONE, ..render_settings }),
+            with(Render { filter: PixelFilter::Tent, ..render_settings }),
+            with(Render { seed: seed + 1, ..render_settings }),
             RenderSettings { dof: !dof, ..settings },
-            RenderSettings { seed: seed + 1, ..settings },
             RenderSettings { view: View::Uv, ..settings },
         ];
+        // The same samples: more of them, shown in another way, or found by another tree.
+        for same in [
+            Render { samples: samples + 1, ..render_settings },
+            Render { exposure: exposure + 1.0, ..render_settings },
+            Render { tonemap: Tonemap::Aces, ..render_settings },
+            Render { accel: Accel::KdTree, ..render_settings },
+        ] {
+            assert_eq!(of(&with(same)), of(&settings), "{same:?}");
+        }
         let mut keys: Vec<Key> = others.iter().chain([&settings]).map(of).collect();
         let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
         keys.push(render(Fingerprint::new("w").finish(), &settings, Some(crop)));

@@ -18,6 +18,7 @@ use super::preview::Screen;
 use super::{Staged, Stop};
 use crate::film::{Film, Rect};
 use crate::integrators::{RayCounters, RenderSettings};
+use crate::scene::description::Render;
 
 /// At most this often.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
@@ -51,7 +52,7 @@ pub(in crate::pipeline) fn render(
     films: &mut Films,
     order: &Order<'_>,
 ) -> Result<Staged<RayCounters>, Stop> {
-    let wanted = order.plan.samples;
+    let wanted = order.plan.settings.render.samples;
     let is_other = films.current().is_some_and(|current| current.key != key);
     films.select(key, |kept| !order.force && kept.done.iter().all(|done| *done <= wanted));
     if films.current().is_none() {
@@ -101,7 +102,7 @@ struct Painter<'a> {
 impl<'a> Painter<'a> {
     fn new(canvas: &'a mut Canvas, order: &'a Order<'a>) -> Self {
         let units = canvas.units(|tile| canvas.done[tile]);
-        let total_units = canvas.units(|_| order.plan.samples);
+        let total_units = canvas.units(|_| order.plan.settings.render.samples);
         let bounds = (order.take_preview)().unwrap_or(order.preview);
         Self {
             is_first: !canvas.is_covered(),
@@ -132,8 +133,8 @@ impl<'a> Painter<'a> {
             self.show();
             self.tick();
         }
-        while !self.canvas.is_complete(self.order.plan.samples) && !self.is_over_time {
-            self.pass(next_pass(self.canvas.samples(), self.order.plan.samples))?;
+        while !self.canvas.is_complete(self.order.plan.settings.render.samples) && !self.is_over_time {
+            self.pass(next_pass(self.canvas.samples(), self.order.plan.settings.render.samples))?;
         }
         self.show();
         self.say_progress(true);
@@ -193,7 +194,7 @@ impl<'a> Painter<'a> {
             elapsed_seconds,
             eta_seconds: if is_last { Some(0.0) } else { eta_seconds },
             samples: (self.units / self.canvas.film.crop().area() as u64) as u32,
-            total_samples: self.order.plan.samples,
+            total_samples: self.order.plan.settings.render.samples,
         });
     }
 
@@ -215,13 +216,14 @@ impl<'a> Painter<'a> {
     /// A first picture with one sample at the preview's own resolution, where that is much less work than one pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let plan = self.order.plan;
-        let (full_width, full_height) = (plan.settings.width, plan.settings.height);
+        let (full_width, full_height) = (plan.settings.render.width, plan.settings.render.height);
         let Some((width, height)) = self.screen.size() else { return Ok(()) };
         let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
         if pixels(width, height) * 2 > pixels(full_width, full_height) {
             return Ok(());
         }
-        let settings = RenderSettings { width, height, ..plan.settings };
+        let render = Render { width, height, ..plan.settings.render };
+        let settings = RenderSettings { render, ..plan.settings };
         let crop = plan.crop.map(|rect| scale(rect, (full_width, full_height), (width, height)));
         let film = Film::new(width, height, crop).map_err(Stop::work)?;
         let jobs = jobs(&film, |_| 0..1);

@@ -10,6 +10,7 @@ use super::super::sink::Sink;
 use super::super::watch::content::{Content, Contents};
 use super::canvas::Canvas;
 use super::{Staged, Stop};
+use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::SampleStats;
@@ -46,7 +47,11 @@ pub(in crate::pipeline) fn check_targets(writing: Writing, plan: &Plan, sink: &S
 fn find_targets(plan: &Plan) -> Result<(), OutputError> {
     let check = |path: &PathBuf| {
         let format = output::check_target(path)?;
-        format.check_picture(plan.settings.width, plan.settings.height, BitDepth::try_from(plan.bit_depth)?)
+        format.check_picture(
+            plan.settings.render.width,
+            plan.settings.render.height,
+            BitDepth::try_from(plan.bit_depth)?,
+        )
     };
     plan.outputs.iter().try_for_each(check)
 }
@@ -147,11 +152,11 @@ fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
     let pairs = [
         ("glimt:scene", plan.name.clone()),
         ("glimt:samples", samples),
-        ("glimt:integrator", settings.integrator.to_owned()),
-        ("glimt:shadows", settings.shadows.to_owned()),
-        ("glimt:max_depth", plan.settings.max_depth.to_string()),
+        ("glimt:integrator", settings.integrator.name().to_owned()),
+        ("glimt:shadows", settings.shadows.name().to_owned()),
+        ("glimt:max_depth", plan.settings.render.max_depth.to_string()),
         ("glimt:dof", settings.dof.to_string()),
-        ("glimt:view", settings.view.to_owned()),
+        ("glimt:view", settings.view.name().to_owned()),
         ("glimt:seed", settings.seed.to_string()),
         ("glimt:exposure", plan.tone.exposure_stops.to_string()),
     ];

@@ -15,6 +15,7 @@ use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
 use super::value::{Value, found, limited, whole, wrong_type};
+use crate::choice::Choice;
 use crate::math::{DVec3, Vec2};
 
 /// A key that was asked for.
@@ -97,26 +98,22 @@ impl<'a> Key<'a> {
         text
     }
 
-    /// One of some words. `unavailable` are words that other versions know.
-    pub(super) fn choice<T: Copy>(
-        &self,
-        words: &[(&'static str, T)],
-        unavailable: &[&'static str],
-    ) -> Option<T> {
-        let list = words.iter().map(|(word, _)| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
-        let list = if words.len() == 1 { list } else { format!("one of {list}") };
+    /// A value by its name.
+    pub(super) fn choice<C: Choice>(&self) -> Option<C> {
+        let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
+        let list = if C::ALL.len() == 1 { list } else { format!("one of {list}") };
         let text = self.text(&list)?;
-        if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == text) {
-            return Some(*meaning);
+        if let Some(meant) = C::named(text) {
+            return Some(meant);
         }
         let (span, name, shown) = (self.span()?, self.name, shortened(text, 32));
-        let mut issue = if unavailable.contains(&text) {
+        let mut issue = if C::UNAVAILABLE.contains(&text) {
             let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
             Issue::error(span, message)
         } else {
             Issue::error(span, format!("`{name}` cannot be \"{shown}\"")).help(format!("expected {list}"))
         };
-        if let Some(near) = nearest(text, words.iter().map(|(word, _)| *word)) {
+        if let Some(near) = nearest(text, C::ALL.iter().map(|one| one.name())) {
             issue = issue.label(format!("did you mean \"{near}\"?"));
         }
         self.context.report(issue);

@@ -6,6 +6,7 @@ use super::key::Key;
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
+use crate::choice;
 use crate::math::Vec3;
 
 /// The materials of a file.
@@ -23,11 +24,6 @@ impl Materials {
     pub(super) fn is_emissive(&self, index: usize) -> bool {
         self.emissive.get(index).copied().unwrap_or(false)
     }
-
-    /// Whether a material emits light.
-    pub(super) fn emits(material: &Material) -> bool {
-        matches!(material.kind, MaterialKind::Phong { emission, .. } if emission != Vec3::ZERO)
-    }
 }
 
 pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
@@ -35,23 +31,27 @@ pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
     let names = Names::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read: Vec<Option<Material>> =
         tables.into_iter().map(|(name, _, table)| material(name, &table?, textures)).collect();
-    let emissive = read.iter().map(|material| material.as_ref().is_some_and(Materials::emits)).collect();
+    let emits = |material: &Material| material.kind.emission() != Vec3::ZERO;
+    let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
     Materials { names, list: read.into_iter().collect(), emissive }
 }
 
-#[derive(Clone, Copy)]
-enum Kind {
-    Phong,
-    Mirror,
-    Glass,
+choice! {
+    /// What a material does.
+    enum Kind {
+        /// Diffuse and glossy.
+        Phong = "phong",
+        /// A perfect mirror.
+        Mirror = "mirror",
+        /// A smooth dielectric.
+        Glass = "glass",
+    }
 }
-
-const KINDS: [(&str, Kind); 3] = [("phong", Kind::Phong), ("mirror", Kind::Mirror), ("glass", Kind::Glass)];
 
 fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Material> {
     let key = table.optional("type");
     // Without knowing the type, no key can be called unknown.
-    let kind = if key.is_given() { key.choice(&KINDS, &[])? } else { Kind::Phong };
+    let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
     let kind = match kind {
         Kind::Phong => phong(table, textures),
         Kind::Mirror => mirror(table),

@@ -284,7 +284,7 @@ fn no_split_of_the_work_changes_a_bit() {
         }
     }
     let mut other = settings;
-    other.seed = 5;
+    other.render.seed = 5;
     let rect = Rect { x: 0, y: 0, width: 24, height: 20 };
     let reseeded = render_tile(&world, &other, rect, 0..6, &token).expect("nobody cancels").0.radiance;
     assert_ne!(whole, reseeded);

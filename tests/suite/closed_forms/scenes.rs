@@ -44,10 +44,10 @@ pub fn scene() -> Build {
         tonemap: Tonemap::None,
         accel: Accel::Bvh,
         seed: 0,
-        output: None,
     };
     let scene = Scene {
         render,
+        output: None,
         camera: look_at(DVec3::ZERO, DVec3::NEG_Z, NARROW),
         photons: Photons { enabled: false, count: 1, radius: 0.0, bounces: 1 },
         textures: Vec::new(),
@@ -186,18 +186,8 @@ impl Build {
     }
 
     pub fn settings(&self, seed: u32) -> RenderSettings {
-        let render = &self.scene.render;
-        RenderSettings {
-            width: render.width,
-            height: render.height,
-            max_depth: render.max_depth,
-            shadows: render.shadows,
-            shadow_samples: render.shadow_samples,
-            filter: render.filter,
-            dof: true,
-            seed,
-            view: self.view,
-        }
+        let render = Render { seed, ..self.scene.render };
+        RenderSettings { render, dof: true, view: self.view }
     }
 
     /// The whole picture, means of the samples.
