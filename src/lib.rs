@@ -36,18 +36,18 @@
 //! choice      ->
 //! math        ->
 //! control     ->
-//! geometry    -> math
+//! geometry    -> sampling math
 //! accel       -> geometry math control
 //! sampling    -> math choice
 //! materials   -> math choice
 //! lights      -> geometry sampling math choice
-//! scene       -> materials lights sampling film math choice system
+//! scene       -> geometry materials lights sampling film math choice system
 //! assets      -> geometry materials math control system
 //! world       -> scene assets accel materials lights geometry math control
 //! film        -> math choice
 //! integrators -> world scene materials lights geometry sampling film math choice control
 //! output      -> film math control system
-//! pipeline    -> integrators world assets scene film output materials math choice control
+//! pipeline    -> integrators world assets scene film output lights materials math choice control
 //! tui         -> pipeline scene film math choice
 //! cli         -> pipeline tui output scene film choice
 //! ```

@@ -102,7 +102,7 @@ impl<'a> PhongVertex<'a> {
 pub(super) fn light(wave: &mut Wave<'_>, vertex: &PhongVertex<'_>) {
     let (world, settings) = (wave.tracer.world, wave.tracer.settings);
     let mut arrivals = Arrivals::new(wave, vertex);
-    for (number, light) in (0_u32..).zip(&world.lights) {
+    for (number, light) in world.lights.iter() {
         if settings.render.shadows == Shadows::Hard {
             if let Some(sample) = light.middle(vertex.surface.point) {
                 arrivals.push(&sample.into(), 1.0);

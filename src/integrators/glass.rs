@@ -28,13 +28,13 @@ pub fn absorption(
     let from_inside = || surface.normal.dot(path.ray.direction) > 0.0;
     let glass = match path.medium.innermost() {
         Some(inside) => glass_of(world, inside),
-        None => material.glass().filter(|_| from_inside()),
+        None => material.bsdf.glass().filter(|_| from_inside()),
     };
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
 fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
-    world.materials[inside.material as usize].glass()
+    world.materials[inside.material as usize].bsdf.glass()
 }
 
 /// Index of refraction of what a ray is in.

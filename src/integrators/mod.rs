@@ -18,6 +18,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::{Rect, TileSamples};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::Render;
+use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use crate::world::World;
 
 /// Camera rays that go through the queues together.
@@ -44,6 +45,13 @@ impl RenderSettings {
         let Render { width, height, .. } = self.render;
         let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
         DVec2::new(from_corner.x - half_width, half_height - from_corner.y) / half_height
+    }
+}
+
+impl Fingerprinted for RenderSettings {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        let Self { render, dof, view } = *self;
+        key.add(&render, of).flag(dof).choice(view);
     }
 }
 

@@ -26,7 +26,7 @@ pub fn shade(
             FirstHit::Depth => Vec3::splat(nearness(tracer, &surface)),
             FirstHit::Barycentric => surface.barycentric,
             FirstHit::Uv => fraction(surface.uv).extend(0.0),
-            FirstHit::Albedo => albedo(material, surface.uv, counters),
+            FirstHit::Albedo => material.bsdf.albedo(surface.uv, &mut counters.texture_lookups),
         };
         radiance[path.slot as usize] = value * path.throughput;
     }
@@ -34,11 +34,7 @@ pub fn shade(
 }
 
 fn normal(surface: &SurfacePoint, material: &Material, counters: &mut RayCounters) -> Vec3 {
-    let map = match material {
-        Material::Phong(phong) => phong.normal_map.as_ref(),
-        Material::Mirror(_) | Material::Glass(_) => None,
-    };
-    let Some(map) = map else { return surface.shading_normal };
+    let Some(map) = &material.normal_map else { return surface.shading_normal };
     counters.texture_lookups += 1;
     map.bend(surface.uv, surface.shading_normal, surface.dpdu, surface.dpdv)
 }
@@ -52,12 +48,4 @@ fn nearness(tracer: &Tracer<'_>, surface: &SurfacePoint) -> f32 {
 
 fn fraction(uv: Vec2) -> Vec2 {
     uv - uv.floor()
-}
-
-fn albedo(material: &Material, uv: Vec2, counters: &mut RayCounters) -> Vec3 {
-    match material {
-        Material::Phong(phong) => phong.diffuse.at(uv, &mut counters.texture_lookups),
-        Material::Mirror(mirror) => mirror.reflectance,
-        Material::Glass(glass) => glass.tint,
-    }
 }

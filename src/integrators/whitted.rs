@@ -10,7 +10,7 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::lights::LightSamples;
 use crate::materials::mirror::reflect;
-use crate::materials::{Material, Mirror, Phong};
+use crate::materials::{Bsdf, Mirror, NormalMap, Phong};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET};
@@ -117,7 +117,7 @@ impl Wave<'_> {
         let index = world.material_index(hit);
         let material = &world.materials[index];
         path.throughput *= glass::absorption(world, &path, hit.shape.t, &surface, material);
-        let emission = material.emission();
+        let emission = material.emission;
         let front = surface.normal.dot(path.ray.direction) < 0.0;
         if emission != Vec3::ZERO && front && self.tracer.settings.view == View::Beauty {
             self.add(path.slot, path.throughput * emission);
@@ -125,17 +125,23 @@ impl Wave<'_> {
         if !self.may_scatter() {
             return;
         }
-        match material {
-            Material::Phong(phong) => self.shade_phong(&path, &surface, phong),
-            Material::Mirror(mirror) => self.shade_mirror(&path, &surface, mirror),
-            Material::Glass(glass) => {
+        match &material.bsdf {
+            Bsdf::Phong(phong) => self.shade_phong(&path, &surface, phong, material.normal_map.as_ref()),
+            Bsdf::Mirror(mirror) => self.shade_mirror(&path, &surface, mirror),
+            Bsdf::Glass(glass) => {
                 let part = Inside { object: hit.object, material: index as u32 };
                 self.shade_glass(&path, part, &surface, glass);
             }
         }
     }
 
-    fn shade_phong(&mut self, path: &PathRay, surface: &SurfacePoint, phong: &Phong) {
+    fn shade_phong(
+        &mut self,
+        path: &PathRay,
+        surface: &SurfacePoint,
+        phong: &Phong,
+        map: Option<&NormalMap>,
+    ) {
         let bsdf = phong.at(surface.uv, &mut self.counters.texture_lookups);
         let view = self.tracer.settings.view;
         let ambient = self.tracer.settings.render.ambient;
@@ -146,7 +152,7 @@ impl Wave<'_> {
             return;
         }
         let mut shading_normal = surface.shading_normal;
-        if let Some(map) = &phong.normal_map {
+        if let Some(map) = map {
             self.counters.texture_lookups += 1;
             shading_normal = map.bend(surface.uv, shading_normal, surface.dpdu, surface.dpdv);
         }

@@ -3,12 +3,14 @@
 pub mod emitter;
 pub mod point;
 pub mod rectangle;
-pub mod round;
+mod set;
 pub mod sphere;
+pub mod surface;
 pub mod triangles;
 
-pub use emitter::{AreaLight, SeenLight};
+pub use emitter::{AreaLight, Part, SeenLight, area_lights};
 pub use point::PointLight;
+pub use set::Lights;
 
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3};

@@ -31,6 +31,11 @@ impl TriangleEmitter {
         Some(Self { triangles, by_area, center, vector_area })
     }
 
+    /// The numbers that its triangles have in their object.
+    pub fn primitives(&self) -> impl Iterator<Item = u32> {
+        self.triangles.iter().map(|(_, primitive)| *primitive)
+    }
+
     /// Uniform over the area of all.
     pub fn sample(&self, point: Vec3, u: [f32; 2], radiance: Vec3, object: u32) -> Option<LightSample> {
         let (index, rest) = self.by_area.sample(u[0]);

@@ -8,7 +8,7 @@ use crate::film::Rect;
 use crate::film::tone::ToneMapping;
 use crate::integrators::{RenderSettings, Shown};
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Camera, Scene, Tonemap};
+use crate::scene::description::{Accel, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -36,9 +36,7 @@ pub(super) struct Plan {
 pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
     let render = overrides.applied(&scene.render);
     check_crop(overrides.crop, render.width, render.height)?;
-    let aperture = match &scene.camera {
-        Camera::LookAt { aperture, .. } | Camera::Orbiter { aperture, .. } => *aperture,
-    };
+    let aperture = scene.camera.aperture();
     let settings = RenderSettings {
         render,
         dof: overrides.dof != Some(false) && aperture > 0.0,

@@ -1,9 +1,9 @@
 //! A film with what it is of, and how far it is.
 
-use super::super::fingerprint::Key;
 use super::super::plan::Plan;
 use super::super::trace::Job;
 use crate::film::{Film, FilmError, Previewer, RadianceImage};
+use crate::scene::fingerprint::Key;
 
 /// A film that is being rendered, or that was.
 #[derive(Debug)]

@@ -6,7 +6,6 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::fingerprint::Key;
 use super::super::pace::{Clock, Pace};
 use super::super::plan::Plan;
 use super::super::protocol::{PreviewSize, RenderProgress};
@@ -19,6 +18,7 @@ use super::{Staged, Stop};
 use crate::film::{Film, Rect};
 use crate::integrators::{RayCounters, RenderSettings};
 use crate::scene::description::Render;
+use crate::scene::fingerprint::Key;
 
 /// At most this often.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);

@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::super::fingerprint::{Fingerprint, Key};
 use super::super::plan::Plan;
 use super::super::protocol::{Failure, Writing};
 use super::super::sink::Sink;
@@ -15,6 +14,7 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::SampleStats;
 use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
+use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// What was written where, and what the file held then.
 #[derive(Debug, Default)]

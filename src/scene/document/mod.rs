@@ -94,7 +94,7 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
         return;
     }
     let own_materials = scene.objects.iter().any(|object| object.material.is_none());
-    let emits = |index: usize| scene.materials[index].kind.emission() != Vec3::ZERO;
+    let emits = |index: usize| scene.materials[index].emits();
     let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
     if scene.lights.is_empty() && !own_materials && !lamps && scene.render.ambient == Vec3::ZERO {
         let help = "add a [[light]], give a material in use `emission`, or set `ambient` in [render]";

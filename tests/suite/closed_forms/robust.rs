@@ -334,7 +334,7 @@ fn the_tree_finds_what_a_look_at_every_shape_finds() {
         let direction = if i % 2 == 0 { DVec3::NEG_Z } else { v(random.signed(), random.signed(), -1.0) };
         let ray = Ray::new(origin.as_vec3(), direction.normalize().as_vec3());
         let one_by_one = (0_u32..)
-            .zip(world.geometry.shapes())
+            .zip(world.geometry.objects())
             .filter_map(|(object, shape)| Some(Hit { shape: shape.closest(&ray, &ray.to_f64())?, object }));
         let nearest = one_by_one.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         found += u32::from(nearest.is_some());
