@@ -31,9 +31,13 @@ choice! {
 impl View {
     /// What its numbers are.
     pub fn shown(self) -> Shown {
+        let of = |parts: Parts| Shown::Light(Measure::Radiance(parts));
         match self {
-            Self::Beauty | Self::Ambient | Self::Diffuse | Self::Specular => Shown::Light,
-            Self::Shadow => Shown::ArrivingShare,
+            Self::Beauty => of(Parts::ALL),
+            Self::Ambient => of(Parts { ambient: true, ..Parts::NONE }),
+            Self::Diffuse => of(Parts { diffuse: true, ..Parts::NONE }),
+            Self::Specular => of(Parts { specular: true, ..Parts::NONE }),
+            Self::Shadow => Shown::Light(Measure::ArrivingShare),
             Self::Normal => Shown::FirstHit(FirstHit::Normal),
             Self::Depth => Shown::FirstHit(FirstHit::Depth),
             Self::Barycentric => Shown::FirstHit(FirstHit::Barycentric),
@@ -46,12 +50,39 @@ impl View {
 /// What the numbers of a view are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
-    /// Radiance, of all light or of a part.
-    Light,
-    /// The share, from 0 to 1, of the light that could arrive.
-    ArrivingShare,
+    /// A measure of light.
+    Light(Measure),
     /// A number about the first hit, to be displayed as it is: no exposure or tone curve applies.
     FirstHit(FirstHit),
+}
+
+/// A measure of the light that a sample sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// Radiance, of these parts.
+    Radiance(Parts),
+    /// The share, from 0 to 1, of what could arrive from the lights that does.
+    ArrivingShare,
+}
+
+/// Parts of the light that a sample sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parts {
+    /// Sent out by surfaces, and by what is behind everything.
+    pub emitted: bool,
+    /// The ambient part of Phong.
+    pub ambient: bool,
+    /// The diffuse part of what lights send.
+    pub diffuse: bool,
+    /// The glossy part of it.
+    pub specular: bool,
+}
+
+impl Parts {
+    /// All of it.
+    pub const ALL: Self = Self { emitted: true, ambient: true, diffuse: true, specular: true };
+    /// Nothing.
+    pub const NONE: Self = Self { emitted: false, ambient: false, diffuse: false, specular: false };
 }
 
 /// A number about the first hit.

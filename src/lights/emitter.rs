@@ -4,7 +4,7 @@ use super::rectangle::{QuadEmitter, SeenQuad};
 use super::sphere::{SeenSphere, SphereEmitter};
 use super::surface::SurfaceEmitter;
 use super::triangles::TriangleEmitter;
-use super::{LightSample, LightSamples, Source};
+use super::{LightSample, LightSamples, Met, Source};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
 use crate::math::Vec3;
@@ -84,6 +84,19 @@ impl AreaLight {
             Emitter::Surface(surface) => SeenShape::Surface(surface, point),
         };
         Some(SeenLight::Area(self, shape))
+    }
+
+    /// [`Light::pdf`](super::Light::pdf).
+    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        if !(met.normal.dot(met.direction) < 0.0) {
+            return 0.0;
+        }
+        match &self.shape {
+            Emitter::Sphere(sphere) => sphere.pdf(from),
+            Emitter::Quad(quad) => quad.pdf(from, met),
+            Emitter::Triangles(triangles) => met.pdf_by_area(triangles.area()),
+            Emitter::Surface(surface) => met.pdf_by_area(surface.area()),
+        }
     }
 
     /// All of it as if it came from the middle.

@@ -1,6 +1,6 @@
 //! Point lights.
 
-use super::{LightSample, Source};
+use super::{End, LightSample, Source};
 use crate::choice;
 use crate::math::{DVec3, Vec3};
 
@@ -38,7 +38,7 @@ impl PointLight {
             Falloff::None => self.intensity,
         };
         Some(LightSample {
-            target: self.position.as_vec3(),
+            end: End::At(self.position.as_vec3()),
             direction: (to_light / distance_squared.sqrt()).as_vec3(),
             weight,
             source: Source::Nothing,

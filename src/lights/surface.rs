@@ -1,6 +1,6 @@
 //! Shapes that shine from their fronts, sampled by area.
 
-use super::{LightSample, Source};
+use super::{End, LightSample, Source};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{AreaPoint, Shape};
 use crate::math::{DVec3, Vec2, Vec3};
@@ -34,7 +34,7 @@ impl SurfaceEmitter {
             None => (place.point.as_vec3(), Source::Object(object)),
         };
         (cosine > 0.0).then(|| LightSample {
-            target,
+            end: End::At(target),
             direction: direction.as_vec3(),
             weight: radiance * (self.area() * cosine / distance_squared) as f32,
             source,
@@ -54,7 +54,7 @@ impl SurfaceEmitter {
         let direction = offset / distance_squared.sqrt();
         let shown = self.shape.shown(-direction);
         (!self.shape.contains(from) && shown > 0.0).then(|| LightSample {
-            target: middle.as_vec3(),
+            end: End::At(middle.as_vec3()),
             direction: direction.as_vec3(),
             weight: radiance * (shown / distance_squared) as f32,
             source: Source::Object(object),

@@ -10,7 +10,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::cache::{Memo, Pool};
 use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
-use super::report::{Outcome, report};
+use super::report::{Finished, report};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel, needed};
 use super::stages::canvas::Canvas;
@@ -18,12 +18,12 @@ use super::stages::films::Films;
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
 use super::stages::preview::Screen;
-use super::stages::render::{Order, render};
+use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::world::{Keyed, world};
 use super::stages::write::{Written, check_targets, write, write_if_wanted};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
-use super::table::Table;
+use super::table::StageTable;
 use super::trace::{Kernel, Tracer};
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
@@ -169,7 +169,7 @@ impl Engine {
         findings: &mut Findings,
     ) -> Result<Report, Stop> {
         let begin = Instant::now();
-        let mut table = Table { sink, stages: Vec::new() };
+        let mut table = StageTable { sink, stages: Vec::new() };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
         let ready = self.prepare(request, &mut table, reading, findings)?;
@@ -181,7 +181,7 @@ impl Engine {
         let token = meanwhile.token;
         let is_written = table.run(Stage::Write, || self.write(request, &ready.plan, sink, token))?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let outcome = Outcome {
+        let finished = Finished {
             scene: &ready.parsed.loaded.path,
             plan: &ready.plan,
             world: &ready.world.1,
@@ -191,14 +191,14 @@ impl Engine {
             texels_loaded: ready.texels_loaded,
             is_written,
         };
-        Ok(report(&outcome, table.stages, begin.elapsed().as_secs_f64()))
+        Ok(report(&finished, table.stages, begin.elapsed().as_secs_f64()))
     }
 
     /// All stages before photons and light.
     fn prepare(
         &mut self,
         request: &Request,
-        table: &mut Table<'_>,
+        table: &mut StageTable<'_>,
         (contents, token): (&Snapshot, &CancelToken),
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
@@ -230,7 +230,7 @@ impl Engine {
         &mut self,
         parsed: &Parsed,
         findings: &mut Findings,
-        table: &mut Table<'_>,
+        table: &mut StageTable<'_>,
         reading: &Reading<'_>,
     ) -> Result<(Meshes, Textures), Stop> {
         let loaded = &parsed.loaded;
@@ -269,7 +269,7 @@ impl Engine {
                 say_if_failed(sink, write(canvas, plan, &mut written, contents, sink, &CancelToken::new()));
             }
         };
-        let order = Order {
+        let rendering = Rendering {
             tracer: Tracer {
                 kernel: self.means.kernel,
                 pool: &pool,
@@ -286,7 +286,7 @@ impl Engine {
             take_preview: &|| orders.take_preview(),
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
-        render(key, &mut self.films, &order)
+        render(key, &mut self.films, &rendering)
     }
 
     /// Whether the picture is on disk then.

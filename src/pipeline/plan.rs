@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::settings::{Effective, Overrides, View};
 use crate::film::Rect;
 use crate::film::tone::ToneMapping;
-use crate::integrators::{RenderSettings, Shown};
+use crate::integrators::{Measure, RenderSettings, Shown};
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -115,10 +115,12 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 /// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
 fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
     match view.shown() {
-        Shown::Light => ToneMapping { exposure_stops: exposure, curve, ..Default::default() },
+        Shown::Light(Measure::Radiance(_)) => {
+            ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
+        }
         Shown::FirstHit(_) => ToneMapping::DATA,
         // It is linear, but no exposure makes it more than it is.
-        Shown::ArrivingShare => ToneMapping::default(),
+        Shown::Light(Measure::ArrivingShare) => ToneMapping::default(),
     }
 }
 

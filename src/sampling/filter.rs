@@ -46,13 +46,13 @@ fn tent(u: f32) -> f32 {
     if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
 }
 
-static GAUSSIAN: LazyLock<Table> = LazyLock::new(|| {
+static GAUSSIAN: LazyLock<Tabulated> = LazyLock::new(|| {
     let at = |x: f64| (-2.0 * x * x).exp();
-    Table::new(1.5, |x| at(x) - at(1.5))
+    Tabulated::new(1.5, |x| at(x) - at(1.5))
 });
 
-static MITCHELL: LazyLock<Table> = LazyLock::new(|| {
-    Table::new(2.0, |x| {
+static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
+    Tabulated::new(2.0, |x| {
         let x = x.abs();
         // B = C = 1/3 in the general cubic.
         if x < 1.0 {
@@ -64,7 +64,7 @@ static MITCHELL: LazyLock<Table> = LazyLock::new(|| {
 });
 
 /// A tabulated even function in one dimension, sampled by its absolute value.
-struct Table {
+struct Tabulated {
     radius: f64,
     sums: Vec<f64>,
     signs: Vec<f64>,
@@ -72,7 +72,7 @@ struct Table {
     excess: f64,
 }
 
-impl Table {
+impl Tabulated {
     const CELLS: usize = 1024;
 
     fn new(radius: f64, f: impl Fn(f64) -> f64) -> Self {
