@@ -7,7 +7,7 @@
 //!
 //! | room | what it knows |
 //! | --- | --- |
-//! | [`system`] | the operating system's errors in plain words |
+//! | [`system`] | the operating system's errors in plain words, which files have an end |
 //! | [`choice`] | values that are chosen by name |
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
@@ -47,7 +47,7 @@
 //! film        -> math choice
 //! integrators -> world scene materials lights geometry sampling film math choice control
 //! output      -> film math control system
-//! pipeline    -> integrators world assets scene film output lights materials math choice control
+//! pipeline    -> integrators world assets scene film output lights materials math choice control system
 //! tui         -> pipeline scene film math choice
 //! cli         -> pipeline tui output scene film choice
 //! ```

@@ -24,6 +24,14 @@ impl Bounds {
         Self { min, minus_max: -max }
     }
 
+    /// Around references.
+    pub fn around(references: &[Reference]) -> Self {
+        references.iter().fold(Self::EMPTY, |mut all, reference| {
+            all.grow(&reference.bounds);
+            all
+        })
+    }
+
     /// The greatest corner.
     #[inline(always)]
     pub fn max(&self) -> Vec4 {
@@ -118,33 +126,58 @@ impl Reference {
         self.bounds.extent().truncate().is_finite()
     }
 
-    /// What is in each half, by boxes that are as small as rounding outwards lets them be.
+    /// What is on each side of a plane through the box: the box around that part of the whole triangle, as small as rounding
+    /// outwards lets it be, as far as it is in the box; all of the box on that side where rounding leaves nothing.
+    #[inline]
     pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
-        self.bounds.halves(axis, at).map(|half| Self { bounds: clipped(corners, &half) })
+        let mut parts = [Bounds::EMPTY; 2];
+        let mut before = corners[2];
+        for corner in corners {
+            let (from, to) = (before.to_array()[axis], corner.to_array()[axis]);
+            if (from < at && at < to) || (to < at && at < from) {
+                let (start, way) = (before.as_dvec3(), corner.as_dvec3() - before.as_dvec3());
+                let part = (f64::from(at) - f64::from(from)) / (f64::from(to) - f64::from(from));
+                let crossing = around_rounded(start + way * part);
+                parts[0].grow(&crossing);
+                parts[1].grow(&crossing);
+            }
+            let own = Bounds::new(corner.extend(0.0), corner.extend(0.0));
+            if to <= at {
+                parts[0].grow(&own);
+            }
+            if to >= at {
+                parts[1].grow(&own);
+            }
+            before = corner;
+        }
+        let [left, right] = self.bounds.halves(axis, at);
+        [self.within(left, &parts[0]), self.within(right, &parts[1])]
+    }
+
+    /// The same triangle where two boxes overlap; in the first where they do not.
+    #[inline(always)]
+    fn within(&self, half: Bounds, part: &Bounds) -> Self {
+        let mut both = Bounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
+        both = if both.extent().truncate().cmpge(Vec3::ZERO).all() { both } else { half };
+        both.min.w = self.bounds.min.w;
+        Self { bounds: both }
     }
 }
 
-/// The box around what of a triangle is inside `bounds`; `bounds` itself where rounding leaves nothing.
-fn clipped(corners: [Vec3; 3], bounds: &Bounds) -> Bounds {
-    let (inside_min, inside_max) = Polygon::clipped(corners, &bounds.aabb()).extent();
-    let down = |exact: f64| {
-        let near = exact as f32;
-        if f64::from(near) > exact { near.next_down() } else { near }
-    };
-    let up = |exact: f64| {
-        let near = exact as f32;
-        if f64::from(near) < exact { near.next_up() } else { near }
-    };
-    let min = Vec3::new(down(inside_min.x), down(inside_min.y), down(inside_min.z));
-    let max = Vec3::new(up(inside_max.x), up(inside_max.y), up(inside_max.z));
-    let min = min.extend(bounds.min.w).max(bounds.min);
-    let max = max.extend(0.0).min(bounds.max());
-    if !min.truncate().cmple(max.truncate()).all() {
-        return *bounds;
+/// A box around a point that is rounded.
+#[inline(always)]
+fn around_rounded(exact: DVec3) -> Bounds {
+    let near = exact.as_vec3();
+    let off = exact - near.as_dvec3();
+    let [mut min, mut max] = [near; 2];
+    for axis in 0..3 {
+        if off[axis] < 0.0 {
+            min[axis] = near[axis].next_down();
+        } else if off[axis] > 0.0 {
+            max[axis] = near[axis].next_up();
+        }
     }
-    let mut clipped = Bounds::new(min, max);
-    clipped.min.w = bounds.min.w;
-    clipped
+    Bounds::new(min.extend(0.0), max.extend(0.0))
 }
 
 /// A triangle cut by up to six planes (Sutherland, Hodgman, *Reentrant Polygon Clipping*, 1974), in double precision.

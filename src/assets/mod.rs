@@ -61,6 +61,8 @@ pub struct LoadedMesh {
     /// Files that were read besides the mesh file, or should have been: material libraries. When one of them
     /// changes, so does this value.
     pub companions: Vec<PathBuf>,
+    /// Pictures that the material libraries name, looked up or not.
+    pub pictures: Vec<PathBuf>,
 }
 
 impl LoadedMesh {

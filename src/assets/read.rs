@@ -1,11 +1,12 @@
 //! Reading files without surprises: only regular files, never more than a limit, watched and stoppable.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::AssetError;
 use crate::control::{CancelToken, Cancelled, Progress};
+use crate::system::file::{self, Kind};
 pub(crate) use crate::system::in_words;
 
 /// Bytes between two polls of the token.
@@ -30,18 +31,14 @@ impl Watch<'_> {
 /// before they are opened, so that nothing blocks.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
-    let found = fs::metadata(path).map_err(unreadable)?;
-    if found.is_dir() {
-        return Err(AssetError::unreadable(path, "it is a folder, not a file"));
-    }
-    if !found.is_file() {
-        return Err(AssetError::unreadable(path, "it is a pipe or a device, not a regular file"));
-    }
+    let refused =
+        |kind: Kind| AssetError::unreadable(path, format!("it is {}, not a regular file", kind.words()));
+    let (file, found) = file::open(path).map_err(unreadable)?.map_err(refused)?;
     if found.len() > limit {
         let reason = format!("it has {} bytes, more than the {} MiB that are read", found.len(), limit >> 20);
         return Err(AssetError::unreadable(path, reason));
     }
-    Ok((File::open(path).map_err(unreadable)?, found.len()))
+    Ok((file, found.len()))
 }
 
 /// Bytes at the start of a file that tell text from other things.
@@ -95,6 +92,7 @@ fn bytes_if(
 mod tests {
     use super::*;
     use crate::control::unwatched;
+    use std::fs;
     use std::sync::Mutex;
 
     fn watch(token: &CancelToken) -> Watch<'_> {
@@ -141,6 +139,8 @@ mod tests {
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
         assert!(says(&pipe).contains("pipe"));
         assert!(says(Path::new("/dev/zero")).contains("device"));
+        #[cfg(target_os = "linux")]
+        assert!(says(Path::new("/proc/kmsg")).contains("file of the kernel"));
         let turn = folder.path().join("turn");
         std::os::unix::fs::symlink(&turn, &turn).expect("a link");
         assert!(says(&turn).contains("symbolic links lead in a circle"), "{}", says(&turn));

@@ -70,7 +70,7 @@ pub enum Subcommand {
     },
     /// Write a commented scene to start from; refuses to overwrite
     New {
-        /// The file to write
+        /// The file to write; - is stdout
         file: PathBuf,
     },
 }
@@ -159,6 +159,7 @@ impl RenderArgs {
     pub(super) fn overrides(&self) -> Overrides {
         Overrides {
             outputs: self.outputs.clone(),
+            report: self.report.clone(),
             width: self.width,
             height: self.height,
             samples: self.samples,

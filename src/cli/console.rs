@@ -32,15 +32,20 @@ impl Console {
         Self { style: if colored { Style::Ansi } else { Style::Plain }, is_terminal: is_terminal && !is_dumb }
     }
 
-    /// Lines on stderr.
+    /// A line on stderr; a line end within the text becomes visible.
     pub(super) fn say(&self, text: &str) {
-        let lines: String = text.lines().map(|line| format!("{}\n", visible(line))).collect();
-        let _ = std::io::stderr().lock().write_all(lines.as_bytes());
+        let line = format!("{}\n", visible(text));
+        let _ = std::io::stderr().lock().write_all(line.as_bytes());
     }
 
     /// A line on stdout.
     pub(super) fn answer(&self, text: &str) {
         let _ = writeln!(std::io::stdout().lock(), "{}", visible(text));
+    }
+
+    /// A text of our own on stdout, as it is.
+    pub(super) fn text(&self, text: &str) {
+        let _ = std::io::stdout().lock().write_all(text.as_bytes());
     }
 
     /// `error: …` on stderr.

@@ -1,14 +1,13 @@
 //! The terminal UI: worker, watcher and front end wired together.
 
-use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
-use super::report;
-use crate::pipeline::protocol::{Event, Failure};
+use crate::pipeline::protocol::{Command, Event, Failure};
 use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
 use crate::scene::NO_SUCH_FILE;
@@ -28,32 +27,43 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
 fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
     let mut worker = start().map_err(no_thread)?;
-    let (sender, changes) = channel();
-    let watcher = Watcher::start(order.poll, worker.contents(), move |changed| {
-        // A front end that is gone wants no changes.
-        let _ = sender.send(changed);
+    let (sender, news) = channel();
+    let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
+        // A front end that is gone wants no news.
+        let _ = sender.send(said);
     })
     .map_err(no_thread)?;
     let (forward, events) = channel();
     let from_worker = std::mem::replace(&mut worker.events, channel().1);
-    let report = order.report.clone();
-    let tap = move || tap(&from_worker, report.as_deref(), &watcher, |event| forward.send(event).is_ok());
-    std::thread::Builder::new().name("glimt-events".to_owned()).spawn(tap).map_err(no_thread)?;
+    let writes = Writes::default();
+    let heard = writes.clone();
+    let tap = move || tap(&from_worker, &watcher, &heard, |event| forward.send(event).is_ok());
+    let tap = std::thread::Builder::new().name("glimt-events".to_owned()).spawn(tap).map_err(no_thread)?;
     let remote = worker.remote();
+    let asked = writes.clone();
     let outcome = tui::run(Options {
         scene: order.scene,
         overrides: order.overrides,
         color: order.color,
         preview: order.preview,
         cell_aspect: None,
-        commands: Box::new(move |command| remote.send(command)),
+        commands: Box::new(move |command| {
+            if matches!(command, Command::Write) {
+                asked.lines().clear();
+            }
+            remote.send(command);
+        }),
         events,
         previews: worker.previews.clone(),
-        changes,
+        news,
     });
-    worker.finish(PATIENCE);
-    if outcome.as_ref().is_ok_and(|ended| ended.is_write_postponed) {
-        console.say("the image was not written: glimt was ended before every pixel had a sample");
+    let has_ended = worker.finish(PATIENCE);
+    if outcome.as_ref().is_ok_and(|ended| ended.is_write_unanswered) {
+        if has_ended {
+            // It ends with the worker; a panic of it has nothing more to say.
+            let _ = tap.join();
+        }
+        writes.said().iter().for_each(|line| console.say(line));
     }
     outcome.map(|ended| Exit(ended.status.0)).map_err(|error| {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
@@ -61,22 +71,53 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// Hand events on, and see to files and reports on the way.
-fn tap(events: &Receiver<Event>, report: Option<&Path>, watcher: &Watcher, forward: impl Fn(Event) -> bool) {
+/// What came of the last order to write.
+#[derive(Clone, Debug, Default)]
+struct Writes(Arc<Mutex<Vec<String>>>);
+
+impl Writes {
+    fn lines(&self) -> MutexGuard<'_, Vec<String>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn hear(&self, event: &Event) {
+        match event {
+            Event::Written { path, .. } => self.lines().push(format!("wrote {}", path.display())),
+            Event::WriteFailed { message, .. } => self.lines().push(format!("error: {message}")),
+            Event::Refused { conflicts, .. } => {
+                let lines = conflicts.iter().map(|conflict| format!("error: {}", conflict.message));
+                self.lines().extend(lines);
+            }
+            _ => {}
+        }
+    }
+
+    /// A line for each picture.
+    fn said(&self) -> Vec<String> {
+        let lines = self.lines();
+        if lines.is_empty() {
+            vec!["the image was not written: glimt was ended first".to_owned()]
+        } else {
+            lines.clone()
+        }
+    }
+}
+
+/// Hand events on, and see on the way to what is watched and to what is written.
+fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: impl Fn(Event) -> bool) {
+    let mut is_heard = true;
     for mut event in events {
+        writes.hear(&event);
+        // The front end is gone: only what is still written counts.
+        if !is_heard {
+            continue;
+        }
         match &mut event {
             Event::Files { files, .. } => watcher.set_files(files.clone()),
-            Event::Done { report: made, generation, .. } => {
-                if let Some(Err(message)) = report.map(|path| report::write(path, made)) {
-                    forward(Event::WriteFailed { generation: *generation, message });
-                }
-            }
             Event::Failed { failure: Failure::Scene(all), .. } => all.iter_mut().for_each(await_scene),
             _ => {}
         }
-        if !forward(event) {
-            return;
-        }
+        is_heard = forward(event);
     }
 }
 

@@ -13,7 +13,6 @@ pub(super) struct Order {
     pub(super) scene: PathBuf,
     pub(super) overrides: Overrides,
     pub(super) is_once: bool,
-    pub(super) report: Option<PathBuf>,
     pub(super) progress: Progress,
     pub(super) preview: PreviewChoice,
     pub(super) color: ColorChoice,
@@ -32,7 +31,6 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         scene,
         overrides,
         is_once: args.once,
-        report: args.report,
         progress: args.progress,
         preview: args.preview,
         color: args.color,
@@ -89,6 +87,7 @@ mod tests {
         .expect("right");
         let expected = Overrides {
             outputs: vec!["a.png".into(), "b.exr".into()],
+            report: Some("r.json".into()),
             width: Some(3),
             height: Some(4),
             samples: Some(5),
@@ -107,7 +106,6 @@ mod tests {
         };
         assert_eq!(order.overrides, expected);
         assert!(order.is_once && order.poll);
-        assert_eq!(order.report, Some("r.json".into()));
         assert_eq!((order.progress, order.color), (Progress::Json, ColorChoice::Indexed256));
     }
 

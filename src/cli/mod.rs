@@ -11,7 +11,6 @@ mod lower;
 mod new;
 mod once;
 mod progress;
-mod report;
 mod signals;
 
 use std::ffi::OsString;
@@ -55,14 +54,13 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
         let message = format!("{second:?} is one scene too many: glimt renders one at a time");
         return console.fail(Exit::WRONG, &message);
     }
-    let is_plain = |argument: &OsString| {
-        let text = argument.to_string_lossy();
-        visible(&text) == text
-    };
-    if arguments.iter().all(is_plain) {
-        let _ = error.print();
-    } else {
-        console.say(&error.render().to_string());
+    // The message has the arguments in it: made again of what may be shown of them.
+    let shown = arguments.iter().map(|argument| visible(&argument.to_string_lossy()).into_owned());
+    match Args::try_parse_from(shown) {
+        Err(error) if error.use_stderr() => {
+            let _ = error.print();
+        }
+        _ => console.say(&error.render().to_string()),
     }
     Exit::WRONG
 }

@@ -1,4 +1,4 @@
-//! `glimt new`: a scene to start from.
+//! `glimt new`: a scene to start from, as a file or on stdout.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -6,10 +6,14 @@ use std::path::Path;
 
 use super::console::Console;
 use super::exit::Exit;
-use crate::output::OutputError;
+use crate::output::{FileIdentity, OutputError};
 use crate::scene::starter;
 
 pub(super) fn run(file: &Path, console: &Console) -> Exit {
+    if file == Path::new("-") {
+        console.text(starter());
+        return Exit::DONE;
+    }
     let name = file.display();
     match create(file, starter().as_bytes()) {
         Ok(()) => {
@@ -19,7 +23,10 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
             Exit::DONE
         }
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            console.fail(Exit::WRONG, &format!("{name} exists already, and is left as it is"))
+            let dangles = !file.exists();
+            let what =
+                if dangles { "is a symbolic link to a file that does not exist" } else { "exists already" };
+            console.fail(Exit::WRONG, &format!("{name} {what}, and is left as it is"))
         }
         Err(source) => {
             let error = OutputError::File { path: file.to_owned(), source };
@@ -32,8 +39,8 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
 fn create(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    if written.is_err() {
-        // It is ours, and what went wrong is said in any case.
+    if written.is_err() && FileIdentity::of(path).is_some_and(|there| there.is_of(&file)) {
+        // It is still ours, and what went wrong is said in any case.
         let _ = std::fs::remove_file(path);
     }
     written

@@ -8,9 +8,7 @@ use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
-use super::report;
 use super::signals;
-use crate::output::check_place;
 use crate::pipeline::protocol::{Command, Event, Failure, Report, Request, Writing};
 use crate::pipeline::settings::{Effective, Overrides};
 use crate::pipeline::{Handle, start};
@@ -22,9 +20,6 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(50);
 
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
-    if let Some(Err(error)) = order.report.as_deref().map(check_place) {
-        return console.fail(Exit::FAILED, &error.to_string());
-    }
     let worker = match start() {
         Ok(worker) => worker,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")),
@@ -44,12 +39,28 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     })));
     let mut reporter = progress::reporter(order.progress, console);
     let mut deadline = Deadline::default();
-    let exit = follow(&worker, order, console, &mut *reporter, || {
+    let mut written = Vec::new();
+    let exit = follow(&worker, order, console, &mut *reporter, &mut written, || {
         ended.by().is_some() && deadline.is_over(Instant::now())
     });
     reporter.end();
+    if !reporter.says_diagnostics()
+        && let Some(signal) = ended.by().and_then(signals::name)
+    {
+        console.say(&format!("ended by {signal}: {}", outcome(exit, &written)));
+    }
     worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
+}
+
+/// What there is when a signal ends the program.
+fn outcome(exit: Exit, written: &[PathBuf]) -> String {
+    let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
+    match names.as_slice() {
+        [] => "no picture was written".to_owned(),
+        _ if exit == Exit::DONE => "everything was written before".to_owned(),
+        names => format!("only {} was written", names.join(", ")),
+    }
 }
 
 /// When the program ends whatever the worker is at: [`PATIENCE`] after it was first asked for.
@@ -73,9 +84,10 @@ fn follow(
     order: &Order,
     console: &Console,
     reporter: &mut dyn Reporter,
+    written: &mut Vec<PathBuf>,
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
-    let mut written: Vec<PathBuf> = Vec::new();
+    let mut unwritten: Option<String> = None;
     let mut idle: Vec<Diagnostic> = Vec::new();
     loop {
         if is_over() {
@@ -94,12 +106,14 @@ fn follow(
         reporter.event(&event);
         match event {
             Event::Written { path, .. } => written.push(path),
+            // A picture that cannot be written fails the request: this is the report.
+            Event::WriteFailed { message, .. } => unwritten = Some(message),
             Event::Done { report, warnings, .. } => {
                 reporter.end();
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(order, &report, &written, console, reporter);
+                return done(&report, written, unwritten.as_deref(), console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
@@ -133,18 +147,19 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
 }
 
 fn done(
-    order: &Order,
     report: &Report,
     written: &[PathBuf],
+    unwritten: Option<&str>,
     console: &Console,
     reporter: &dyn Reporter,
 ) -> Exit {
     if reporter.says_results() {
         written.iter().for_each(|path| console.say(&wrote(path, report)));
     }
-    match order.report.as_deref().map(|path| report::write(path, report)) {
-        Some(Err(message)) => console.fail(Exit::FAILED, &message),
-        _ => Exit::DONE,
+    match unwritten {
+        Some(_) if reporter.says_diagnostics() => Exit::FAILED,
+        Some(message) => console.fail(Exit::FAILED, message),
+        None => Exit::DONE,
     }
 }
 

@@ -16,6 +16,15 @@ impl Ended {
     }
 }
 
+/// The name of a signal that a person or a program sent; after SIGHUP nobody reads it.
+pub(super) fn name(number: i32) -> Option<&'static str> {
+    match number {
+        SIGINT => Some("SIGINT"),
+        SIGTERM => Some("SIGTERM"),
+        _ => None,
+    }
+}
+
 /// From now on these signals call `on_signal` on a thread of their own rather than end the process.
 ///
 /// # Errors

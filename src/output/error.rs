@@ -61,6 +61,12 @@ pub enum OutputError {
         /// What to do.
         way_out: &'static str,
     },
+    /// What is there must stay.
+    #[error("{reason}")]
+    Refused {
+        /// Which file, why, and the way out.
+        reason: String,
+    },
     /// The work was told to stop.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),

@@ -1,13 +1,15 @@
 //! Pictures to bytes, bytes to files.
 //!
 //! [`check_target`] before hours of work, [`encode`] into memory, [`write::atomic`] to disk: a file is whole, or it is
-//! the one that was there before.
+//! the one that was there before. [`FileIdentity`] tells whether two paths lead to one file.
 
 mod error;
 mod exr;
 mod format;
 mod hdr;
+mod identity;
 mod jpeg;
+mod origin;
 mod place;
 mod png;
 mod ppm;
@@ -19,6 +21,8 @@ use std::path::Path;
 
 pub use error::OutputError;
 pub use format::{BitDepth, Format};
+pub use identity::FileIdentity;
+pub use origin::{holds_foreign_picture, holds_foreign_report};
 
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
@@ -26,6 +30,8 @@ use crate::film::tone::ToneMapping;
 
 /// What a file says of the program that wrote it.
 const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
+/// The first word of that.
+const PROGRAM: &str = "glimt";
 
 /// How a picture becomes a file.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -43,25 +43,29 @@ pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(is_directory(path));
     }
+    match follow(path).map_err(|error| OutputError::file(path, error))? {
+        (target, None) => new_file(path, target),
+        (_, Some(metadata)) if metadata.is_symlink() => Ok(Place::InPlace(path.to_owned())),
+        (target, Some(metadata)) => existing(path, target, metadata),
+    }
+}
+
+/// What is behind the links of a path, and what is there now. A link to an open descriptor (/dev/stdout leads to one)
+/// is not followed: what it names may be no path at all.
+pub(super) fn follow(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     let mut target = path.to_owned();
     for _ in 0..LINKS {
         let metadata = match fs::symlink_metadata(&target) {
             Ok(metadata) => metadata,
-            Err(error) if error.kind() == ErrorKind::NotFound => return new_file(path, target),
-            Err(error) => return Err(OutputError::file(path, error)),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok((target, None)),
+            Err(error) => return Err(error),
         };
-        let kind = metadata.file_type();
-        if !kind.is_symlink() {
-            return existing(path, target, metadata);
+        if !metadata.is_symlink() || target.starts_with("/proc") {
+            return Ok((target, Some(metadata)));
         }
-        if target.starts_with("/proc") {
-            // An open descriptor (/dev/stdout is a link to one), whose name may be no path at all.
-            return Ok(Place::InPlace(path.to_owned()));
-        }
-        let link = fs::read_link(&target).map_err(|error| OutputError::file(path, error))?;
-        target = directory_of(&target).join(link);
+        target = directory_of(&target).join(fs::read_link(&target)?);
     }
-    Err(OutputError::file(path, Errno::ELOOP))
+    Err(Errno::ELOOP.into())
 }
 
 fn new_file(path: &Path, target: PathBuf) -> Result<Place, OutputError> {
@@ -113,7 +117,7 @@ fn is_directory(path: &Path) -> OutputError {
 }
 
 /// The directory that a path is in; the working directory for a mere name.
-fn directory_of(path: &Path) -> &Path {
+pub(super) fn directory_of(path: &Path) -> &Path {
     match path.parent() {
         Some(directory) if !directory.as_os_str().is_empty() => directory,
         _ => Path::new("."),

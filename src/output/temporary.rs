@@ -70,12 +70,12 @@ impl Drop for Temporary {
 }
 
 /// Removes the temporary files that writers left in a directory when they were killed. Files of living writers are
-/// locked and stay. What cannot be removed stays too: it is no reason not to write.
-pub(super) fn remove_stale(directory: &Path) {
+/// locked and stay, and so do those that are kept. What cannot be removed stays too: it is no reason not to write.
+pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     for entry in entries.flatten() {
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if is_file && is_temporary(&entry.file_name()) {
+        if is_file && is_temporary(&entry.file_name()) && !is_kept(&entry.path()) {
             let _ = remove_if_stale(&entry.path());
         }
     }
@@ -147,7 +147,7 @@ mod tests {
         fs::write(&stale, "half").expect("a file");
         let other = directory.path().join(".b.png.tmp");
         fs::write(&other, "not ours").expect("a file");
-        remove_stale(directory.path());
+        remove_stale(directory.path(), &|_| false);
         assert!(living.path.exists() && other.exists());
         assert!(!stale.exists());
     }

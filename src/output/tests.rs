@@ -256,6 +256,8 @@ fn what_a_format_cannot_hold_is_said() {
     assert_eq!(BitDepth::try_from(16).expect("known"), BitDepth::Sixteen);
 }
 
+const NOTHING_KEPT: write::Guard<'_> = write::Guard { is_kept: &|_| false, may_replace: &|_| Ok(()) };
+
 #[test]
 fn what_is_cancelled_is_neither_encoded_nor_written() {
     let token = CancelToken::new();
@@ -267,8 +269,27 @@ fn what_is_cancelled_is_neither_encoded_nor_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
     std::fs::write(&path, "old").expect("written");
-    let stopped = write::atomic_until(&path, b"new", &token);
+    let stopped = write::atomic_until(&path, b"new", &NOTHING_KEPT, &token);
     assert!(matches!(stopped, Err(OutputError::Cancelled(_))));
     assert_eq!(std::fs::read(&path).expect("read"), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
+}
+
+#[test]
+fn a_guard_is_asked_of_the_real_file_when_the_new_one_is_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (link, real) = (folder.path().join("link.png"), folder.path().join("real.png"));
+    std::fs::write(&real, "old").expect("written");
+    std::os::unix::fs::symlink("real.png", &link).expect("a link");
+    let entries = || std::fs::read_dir(folder.path()).expect("a folder").count();
+    let asked = std::cell::Cell::new(0);
+    let may_replace = |path: &std::path::Path| {
+        asked.set(asked.get() + 1);
+        assert_eq!((path, entries()), (real.as_path(), 3), "beside its temporary file");
+        Err(OutputError::Refused { reason: "it stays".to_owned() })
+    };
+    let guard = write::Guard { may_replace: &may_replace, ..NOTHING_KEPT };
+    let refused = write::atomic_until(&link, b"new", &guard, &CancelToken::new()).expect_err("refused");
+    assert_eq!((refused.to_string().as_str(), asked.get(), entries()), ("it stays", 1, 2));
+    assert_eq!(std::fs::read(&real).expect("read"), b"old");
 }

@@ -26,20 +26,41 @@ use crate::control::CancelToken;
 /// Names the path, what the system said and the way out; the old file is untouched then, and no temporary file is
 /// left.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    atomic_until(path, bytes, &CancelToken::new())
+    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()) };
+    atomic_until(path, bytes, &guard, &CancelToken::new())
 }
 
-/// [`atomic`] that can be stopped as long as the new file is not whole.
+/// What a write must leave as it is. Both are asked at the last moment and of the real path, links followed.
+pub struct Guard<'a> {
+    /// Whether a file stays that has the name of a killed writer's temporary file.
+    pub is_kept: &'a dyn Fn(&Path) -> bool,
+    /// Whether the new file may take the place of this one, there or not; or whether it may be written to in place.
+    pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
+}
+
+/// [`atomic`] that can be stopped as long as the new file is not whole, and that a guard watches.
 ///
 /// # Errors
-/// As [`atomic`], and [`OutputError::Cancelled`].
-pub fn atomic_until(path: &Path, bytes: &[u8], token: &CancelToken) -> Result<(), OutputError> {
+/// As [`atomic`], those of the guard, and [`OutputError::Cancelled`].
+pub fn atomic_until(
+    path: &Path,
+    bytes: &[u8],
+    guard: &Guard<'_>,
+    token: &CancelToken,
+) -> Result<(), OutputError> {
     prepare_process();
-    let written = match place::find(path)? {
-        Place::File(target) => replace(&target, bytes, token),
-        Place::InPlace(place) => in_place(&place, bytes, token),
-    };
-    stoppable::or_cancelled(written, |error| OutputError::file(path, error))
+    let named = |error| OutputError::file(path, error);
+    match place::find(path)? {
+        Place::File(target) => {
+            let new = stoppable::or_cancelled(beside(&target, bytes, guard, token), named)?;
+            (guard.may_replace)(&target.path)?;
+            new.rename_to(&target.path).and_then(|()| sync_directory(target.directory())).map_err(named)
+        }
+        Place::InPlace(place) => {
+            (guard.may_replace)(&place)?;
+            stoppable::or_cancelled(in_place(&place, bytes, token), named)
+        }
+    }
 }
 
 /// Makes a file that would grow beyond `ulimit -f` an error instead of the end of the process (SIGXFSZ). [`atomic`]
@@ -53,9 +74,10 @@ pub fn prepare_process() {
     });
 }
 
-fn replace(target: &Target, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
+/// The new file, whole and beside the one that it is to replace.
+fn beside(target: &Target, bytes: &[u8], guard: &Guard<'_>, token: &CancelToken) -> io::Result<Temporary> {
     let directory = target.directory();
-    temporary::remove_stale(directory);
+    temporary::remove_stale(directory, guard.is_kept);
     let mode = target.existing.as_ref().map_or(0o666, |existing| existing.mode() & 0o777);
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
     let new = Temporary::create(directory, name, mode)?;
@@ -65,8 +87,7 @@ fn replace(target: &Target, bytes: &[u8], token: &CancelToken) -> io::Result<()>
         new.file.set_permissions(fs::Permissions::from_mode(existing.mode() & 0o7777))?;
     }
     new.file.sync_all()?;
-    new.rename_to(&target.path)?;
-    sync_directory(directory)
+    Ok(new)
 }
 
 /// As far as this process may: root writes other people's files.

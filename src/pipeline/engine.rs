@@ -1,6 +1,7 @@
 //! One request from the scene file to pictures on disk: the stages in their order, and all that is kept between
 //! requests.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -8,9 +9,11 @@ use std::time::Instant;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::cache::{Memo, Pool};
+use super::inputs::Inputs;
 use super::plan::{Plan, cores, plan};
-use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
-use super::report::{Finished, report};
+use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
+use super::report::{Finished, report, write_report};
+use super::settings::Overrides;
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel, needed};
 use super::stages::canvas::Canvas;
@@ -21,9 +24,10 @@ use super::stages::preview::Screen;
 use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::world::{Keyed, world};
-use super::stages::write::{Written, check_targets, write, write_if_wanted};
+use super::stages::write::{Destination, Written, check_targets, write_by_hand, write_if_wanted};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
 use super::table::StageTable;
+use super::targets::{NamedBy, conflicts};
 use super::trace::{Kernel, Tracer};
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
@@ -64,6 +68,8 @@ pub(super) struct Engine {
     pool: Option<Arc<ThreadPool>>,
     /// The assets of the last scene that could be read: they stay watched while it is broken.
     assets: Vec<FileRead>,
+    /// All files that must not be written: what the last scene that could be read is made of, and what was named since.
+    inputs: Inputs,
 }
 
 /// Orders that come while a request is under way.
@@ -106,6 +112,7 @@ impl Engine {
             plan: None,
             pool: None,
             assets: Vec::new(),
+            inputs: Inputs::default(),
         }
     }
 
@@ -119,6 +126,11 @@ impl Engine {
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.read_named(diagnostics, &request.scene, &self.contents, meanwhile.token);
         }
+        // What is watched cannot be written.
+        self.inputs.add_read(&findings.files);
+        if let Ok(report) = &outcome {
+            self.write_report(report, &findings, sink);
+        }
         self.say_files(&findings, sink);
         self.sweep(outcome.is_ok());
         sink.send(match outcome {
@@ -126,7 +138,8 @@ impl Engine {
                 let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
                 let is_same = self.films.current().map(|canvas| canvas.key) == before;
                 let unchanged = is_same && settled(Stage::Render) && settled(Stage::Write);
-                Event::Done { generation, report: Box::new(report), warnings: findings.warnings, unchanged }
+                let warnings = [findings.conflicts, findings.warnings].concat();
+                Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
             Err(Stop::Cancelled) => Event::Cancelled { generation },
             Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
@@ -147,11 +160,9 @@ impl Engine {
             let message = "nothing is written: the render was stopped before every pixel had a sample";
             return sink.write_failed(message.to_owned());
         }
-        self.written.forget();
-        let (written, contents) = (&mut self.written, &self.contents);
-        // A token that nobody cancels: this picture was asked for by hand.
-        let token = CancelToken::new();
-        say_if_failed(sink, pool.install(|| write(canvas, plan, written, contents, sink, &token)));
+        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let written = &mut self.written;
+        pool.install(|| write_by_hand(canvas, to, written));
     }
 
     /// Show the picture as it is at another size, outside of a request.
@@ -179,7 +190,10 @@ impl Engine {
         self.plan = Some(ready.plan.clone());
         let rays = table.run(Stage::Render, || self.render(request, &ready, sink, meanwhile))?;
         let token = meanwhile.token;
-        let is_written = table.run(Stage::Write, || self.write(request, &ready.plan, sink, token))?;
+        // Links and files may have changed during the render.
+        self.look_for_conflicts(request, &ready.plan, findings, sink)?;
+        let is_written =
+            table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, token))?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let finished = Finished {
             scene: &ready.parsed.loaded.path,
@@ -208,10 +222,19 @@ impl Engine {
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         let settings = Box::new(plan.effective.clone());
         table.sink.send(Event::Settings { generation: request.generation, settings });
-        check_targets(request.write, &plan, table.sink)?;
+        let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed.loaded));
+        let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
+        // The picture at hand, which may yet be written, is of the scene before.
+        self.inputs.add(before);
+        looked?;
+        if findings.conflicts.is_empty() {
+            check_targets(request.write, &plan, table.sink)?;
+        }
         let pool = self.pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool };
         let (meshes, textures) = self.load(&parsed, findings, table, &reading)?;
+        self.inputs = inputs(&parsed, &meshes, findings);
+        self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let scene = &plan.scene;
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter's numbers are few: their text stands for them.
@@ -223,6 +246,41 @@ impl Engine {
         let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
         let texels_loaded = textures.texels_loaded;
         Ok(Ready { parsed, plan, world, texels_loaded })
+    }
+
+    /// Whether a file that is to be written must not be. Where that need not end the request, it is said, and the
+    /// findings have it.
+    ///
+    /// # Errors
+    /// All conflicts, where the picture must be written.
+    fn look_for_conflicts(
+        &self,
+        request: &Request,
+        plan: &Plan,
+        findings: &mut Findings,
+        sink: &Sink,
+    ) -> Result<(), Stop> {
+        let found = conflicts(plan, &self.inputs);
+        if found.is_empty() {
+            findings.conflicts = found;
+            return Ok(());
+        }
+        if request.write == Writing::Must {
+            findings.errors.extend(found);
+            return Err(Stop::Failed(findings.take_failure()));
+        }
+        if found != findings.conflicts {
+            sink.refused(found.clone());
+        }
+        findings.conflicts = found;
+        Ok(())
+    }
+
+    fn write_report(&self, report: &Report, findings: &Findings, sink: &Sink) {
+        let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
+        if let Err(error) = write_report(plan, &self.inputs, report) {
+            sink.write_failed(error.to_string());
+        }
     }
 
     /// All files that the scene names; every one is tried before the first error ends it.
@@ -241,6 +299,8 @@ impl Engine {
         self.assets = findings.files.clone();
         if findings.errors.is_empty() {
             self.say_files(findings, table.sink);
+            let (generation, warnings) = (table.sink.generation, findings.warnings.clone());
+            table.sink.send(Event::Warnings { generation, warnings });
             Ok((found, texels))
         } else {
             Err(Stop::Failed(findings.take_failure()))
@@ -255,7 +315,8 @@ impl Engine {
         meanwhile: &Meanwhile<'_>,
     ) -> Result<Staged<RayCounters>, Stop> {
         let pool = self.pool(ready.plan.threads)?;
-        let (plan, contents, orders) = (&ready.plan, &self.contents, meanwhile.orders);
+        let (plan, orders) = (&ready.plan, meanwhile.orders);
+        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
         let written = std::cell::RefCell::new(&mut self.written);
         let is_postponed = std::cell::Cell::new(false);
         let pulse = |canvas: &Canvas, is_covered: bool| {
@@ -264,9 +325,7 @@ impl Engine {
                     sink.send(Event::WritePostponed { generation: sink.generation });
                 }
             } else if orders.take_write() {
-                let mut written = written.borrow_mut();
-                written.forget();
-                say_if_failed(sink, write(canvas, plan, &mut written, contents, sink, &CancelToken::new()));
+                write_by_hand(canvas, to, &mut written.borrow_mut());
             }
         };
         let rendering = Rendering {
@@ -294,13 +353,18 @@ impl Engine {
         &mut self,
         request: &Request,
         plan: &Plan,
+        findings: &Findings,
         sink: &Sink,
         token: &CancelToken,
     ) -> Result<Staged<bool>, Stop> {
+        if let Some(conflict) = findings.conflicts.first() {
+            return Ok(Staged::skipped(false, conflict.message.clone()));
+        }
         let pool = self.pool(plan.threads)?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let (written, contents) = (&mut self.written, &self.contents);
-        pool.install(|| write_if_wanted(request.write, canvas, plan, written, contents, sink, token))
+        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let written = &mut self.written;
+        pool.install(|| write_if_wanted(request.write, canvas, to, written, token))
     }
 
     /// The pool of this many threads; kept while the number stays.
@@ -320,11 +384,8 @@ impl Engine {
 
     fn say_files(&self, findings: &Findings, sink: &Sink) {
         let mut files = findings.files.clone();
-        for asset in &self.assets {
-            if files.iter().all(|file| file.path != asset.path) {
-                files.push(asset.clone());
-            }
-        }
+        let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
+        files.extend(self.assets.iter().filter(|asset| !known.contains(asset.path.as_path())).cloned());
         sink.files(files);
     }
 
@@ -352,6 +413,12 @@ impl Engine {
             let mut wanted = needed(loaded, &found);
             add_declared(loaded, &mut wanted);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
+            let plan = plan(&loaded.scene, path, &Overrides::default())
+                .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
+            if plan.named_by == NamedBy::Scene {
+                let inputs = inputs(&parsed, &found, &findings);
+                findings.errors.extend(conflicts(&plan, &inputs));
+            }
             Ok((parsed, found, texels))
         };
         match all() {
@@ -365,10 +432,12 @@ impl Engine {
     }
 }
 
-fn say_if_failed(sink: &Sink, written: Result<Staged<()>, Stop>) {
-    if let Err(Stop::Failed(Failure::Work(message))) = written {
-        sink.write_failed(message);
-    }
+/// All files that the scene names, and what else was read.
+fn inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
+    let mut inputs = Inputs::of_scene(&parsed.loaded);
+    inputs.add_meshes(&parsed.loaded, meshes);
+    inputs.add_read(&findings.files);
+    inputs
 }
 
 #[cfg(test)]

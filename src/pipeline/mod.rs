@@ -8,6 +8,7 @@
 mod cache;
 mod check;
 mod engine;
+mod inputs;
 mod pace;
 mod plan;
 pub mod protocol;
@@ -16,6 +17,7 @@ pub mod settings;
 mod sink;
 mod stages;
 mod table;
+mod targets;
 mod trace;
 pub mod watch;
 pub mod words;

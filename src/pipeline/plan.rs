@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::settings::{Effective, Overrides, View};
+use super::targets::NamedBy;
 use crate::film::Rect;
 use crate::film::tone::ToneMapping;
 use crate::integrators::{Measure, RenderSettings, Shown};
@@ -26,6 +27,8 @@ pub(super) struct Plan {
     pub(super) tone: ToneMapping,
     pub(super) bit_depth: u8,
     pub(super) outputs: Vec<PathBuf>,
+    pub(super) named_by: NamedBy,
+    pub(super) report: Option<PathBuf>,
     pub(super) effective: Effective,
 }
 
@@ -43,7 +46,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         view: overrides.view.unwrap_or(View::Beauty),
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
-    let outputs = outputs(scene.output.as_ref(), path, overrides);
+    let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     outputs.iter().try_for_each(|path| check_format(path, (render.width, render.height), bit_depth))?;
     Ok(Plan {
@@ -56,6 +59,8 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         bit_depth,
         effective: Effective::new(&settings, threads, &outputs),
         outputs,
+        named_by,
+        report: overrides.report.clone(),
         scene: with_accel(scene, render.accel),
     })
 }
@@ -70,16 +75,16 @@ fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
 }
 
 /// The command line's files, else the scene's, else the scene's name with `.png` in the working directory.
-fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> Vec<PathBuf> {
+fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (Vec<PathBuf>, NamedBy) {
     if !overrides.outputs.is_empty() {
-        return overrides.outputs.clone();
+        return (overrides.outputs.clone(), NamedBy::Call);
     }
-    let default = || {
-        let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
-        name.push(".png");
-        PathBuf::from(name)
-    };
-    vec![of_scene.cloned().unwrap_or_else(default)]
+    if let Some(of_scene) = of_scene {
+        return (vec![of_scene.clone()], NamedBy::Scene);
+    }
+    let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
+    name.push(".png");
+    (vec![PathBuf::from(name)], NamedBy::Nobody)
 }
 
 fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Diagnostic>> {

@@ -54,8 +54,8 @@ pub struct Request {
 pub enum Writing {
     /// It is not.
     No,
-    /// It is; where that is not possible, [`Event::WriteFailed`] says so, at the beginning and at the end, and the
-    /// picture is rendered and shown all the same.
+    /// It is; where that is not possible, [`Event::WriteFailed`] or [`Event::Refused`] says so, at the beginning and at
+    /// the end, and the picture is rendered and shown all the same.
     Try,
     /// It is; a file that cannot be written fails the request, before anything is rendered if that can be told.
     Must,
@@ -93,6 +93,13 @@ pub enum Event {
         /// The scene and everything that it names.
         files: Vec<FileRead>,
     },
+    /// Everything that is there to warn of is known; the picture is yet to be rendered.
+    Warnings {
+        /// Of which request.
+        generation: u64,
+        /// The same as [`Event::Done`] will have.
+        warnings: Vec<Diagnostic>,
+    },
     /// An asset is loading.
     Asset {
         /// Of which request.
@@ -128,12 +135,20 @@ pub enum Event {
         /// Its size.
         bytes: u64,
     },
-    /// A picture could not be written; a render under way goes on.
+    /// A picture or a report could not be written; a render under way goes on.
     WriteFailed {
         /// Of which request.
         generation: u64,
         /// Which file, and why.
         message: String,
+    },
+    /// No file is written as long as one of them must not be: it is an input, another of them, or something that a person
+    /// did not mean to lose. A render under way goes on.
+    Refused {
+        /// Of which request.
+        generation: u64,
+        /// One for each such file, with the way out.
+        conflicts: Vec<Diagnostic>,
     },
     /// [`Command::Write`] waits until every pixel has a sample.
     WritePostponed {
@@ -146,7 +161,7 @@ pub enum Event {
         generation: u64,
         /// What it took.
         report: Box<Report>,
-        /// Warnings.
+        /// Warnings, and the conflicts of [`Event::Refused`] that still hold.
         warnings: Vec<Diagnostic>,
         /// Whether the request found everything as it was, so that nothing was rendered and the same picture shown.
         unchanged: bool,

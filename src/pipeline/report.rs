@@ -1,12 +1,16 @@
-//! The report of a finished request.
+//! The report of a finished request, and its file.
 
 use std::path::{Path, PathBuf};
 
+use super::inputs::Inputs;
 use super::plan::Plan;
 use super::protocol::{Counters, ImageReport, Report, SampleCounts, StageReport};
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
+use super::targets::guarded;
+use crate::control::CancelToken;
 use crate::integrators::RayCounters;
+use crate::output::{OutputError, write::atomic_until};
 use crate::world::World;
 
 /// What a request came to.
@@ -32,6 +36,19 @@ pub(super) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds:
         seconds,
         peak_memory_bytes: peak_memory_bytes(),
     }
+}
+
+/// Write it where the plan says.
+///
+/// # Errors
+/// Why not, with the file's name.
+pub(super) fn write_report(plan: &Plan, inputs: &Inputs, report: &Report) -> Result<(), OutputError> {
+    let Some(path) = &plan.report else { return Ok(()) };
+    let unwritable =
+        |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
+    let mut text = serde_json::to_vec_pretty(report).map_err(unwritable)?;
+    text.push(b'\n');
+    guarded(plan, inputs, path, |guard| atomic_until(path, &text, guard, &CancelToken::new()))
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {

@@ -13,6 +13,8 @@ use crate::scene::description::{Accel, Integrator, Render, Shadows};
 pub struct Overrides {
     /// Files to write; empty: the scene's own.
     pub outputs: Vec<PathBuf>,
+    /// Where the report of each finished request is written, as JSON.
+    pub report: Option<PathBuf>,
     /// Pixels across.
     pub width: Option<u32>,
     /// Pixels down.

@@ -8,6 +8,7 @@ use std::sync::{Arc, PoisonError};
 use super::protocol::{AssetProgress, Event, LatestPreview, PreviewSlot, RenderProgress, StageReport};
 use super::watch::content::FileRead;
 use crate::film::Picture;
+use crate::scene::diagnostic::Diagnostic;
 
 /// Sends the events of one request. A front end that is gone is no error.
 #[derive(Clone, Debug)]
@@ -40,6 +41,10 @@ impl Sink {
 
     pub(super) fn write_failed(&self, message: String) {
         self.send(Event::WriteFailed { generation: self.generation, message });
+    }
+
+    pub(super) fn refused(&self, conflicts: Vec<Diagnostic>) {
+        self.send(Event::Refused { generation: self.generation, conflicts });
     }
 
     pub(super) fn preview(&self, picture: Picture) {

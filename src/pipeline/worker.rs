@@ -141,6 +141,7 @@ impl Remote {
             }
             Command::Quit => {
                 mailbox.token.cancel();
+                mailbox.request = None;
                 mailbox.quit = true;
             }
         }
@@ -182,12 +183,13 @@ impl Remote {
     fn next(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
-            if mailbox.quit {
-                return Task::Quit;
-            }
+            // An order to write that came before the end is carried out.
             if mailbox.write && !(mailbox.is_write_postponed && mailbox.request.is_some()) {
                 mailbox.write = false;
                 return Task::Write;
+            }
+            if mailbox.quit {
+                return Task::Quit;
             }
             mailbox.is_write_postponed = false;
             if let Some(request) = mailbox.request.take() {
@@ -298,6 +300,20 @@ mod tests {
         remote.send(Command::Pause(true));
         remote.send(render(3));
         assert!(!token(&remote).is_paused(), "a request that comes later is not held");
+    }
+
+    #[test]
+    fn a_write_that_was_asked_for_before_the_end_is_carried_out() {
+        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        remote.send(render(1));
+        let token = token(&remote);
+        remote.send(render(2));
+        remote.send(Command::Write);
+        remote.send(Command::Quit);
+        assert!(token.is_cancelled());
+        assert!(matches!(remote.next(), Task::Write));
+        assert!(!remote.postpone_write(), "there is no request left that it could wait for");
+        assert!(matches!(remote.next(), Task::Quit));
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod nearest;
 mod read;
 pub mod report;
 pub mod sanitize;
+mod toml;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,5 @@
 //! Bytes of a scene file, read without ever blocking or filling the memory.
 
-use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,6 +8,7 @@ use super::diagnostic::{Diagnostic, Place, Severity};
 use super::nearest::nearest;
 use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE};
+use crate::system::file::{self, Kind};
 use crate::system::in_words;
 
 /// The text. The error is one diagnostic that names the file.
@@ -46,10 +46,10 @@ type Refusal = (String, Option<String>);
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     let unreadable = |error: io::Error| unreadable(path, &error);
-    regular(&std::fs::metadata(path).map_err(unreadable)?)?;
-    let file = open(path).map_err(unreadable)?;
-    // The name may lead elsewhere by now.
-    regular(&file.metadata().map_err(unreadable)?)?;
+    let (file, metadata) = file::open(path).map_err(unreadable)?.map_err(not_regular)?;
+    if metadata.len() > MAX_FILE_BYTES {
+        return Err(too_large());
+    }
     let mut bytes = Vec::new();
     file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
@@ -66,32 +66,14 @@ fn parts(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
-/// Opens a file for reading; a pipe without a writer does not block.
-fn open(path: &Path) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    options.read(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, nix::libc::O_NONBLOCK);
-    options.open(path)
-}
-
-fn regular(metadata: &Metadata) -> Result<(), Refusal> {
-    if metadata.is_dir() {
-        return Err((
-            "this is a folder, not a scene file".to_owned(),
-            Some("name a scene file, such as scene.toml".to_owned()),
-        ));
-    }
-    if !metadata.is_file() {
-        return Err((
-            "this is a pipe, a socket or a device, not a scene file".to_owned(),
-            Some("a scene is read from a regular file, so that it can be watched".to_owned()),
-        ));
-    }
-    if metadata.len() > MAX_FILE_BYTES {
-        return Err(too_large());
-    }
-    Ok(())
+fn not_regular(kind: Kind) -> Refusal {
+    let help = match kind {
+        Kind::Folder => "name a scene file, such as scene.toml",
+        Kind::Regular | Kind::Special | Kind::Kernel => {
+            "a scene is read from a regular file, so that it can be watched"
+        }
+    };
+    (format!("this is {}, not a scene file", kind.words()), Some(help.to_owned()))
 }
 
 fn too_large() -> Refusal {
@@ -107,23 +89,26 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
         return ("this is a symbolic link to a file that does not exist".to_owned(), None);
     }
     if error.kind() == io::ErrorKind::NotFound {
-        let help = neighbour(path).map(|near| format!("did you mean {}?", visible(&near.to_string_lossy())));
+        let help = neighbour(path, may_be_scene)
+            .map(|near| format!("did you mean {}?", visible(&near.to_string_lossy())));
         let start = || "`glimt new FILE` writes a scene to start from".to_owned();
         return (NO_SUCH_FILE.to_owned(), Some(help.unwrap_or_else(start)));
     }
     (format!("cannot read the scene file: {}", in_words(error)), None)
 }
 
-/// The file beside a missing one whose name is nearest to it.
-pub(super) fn neighbour(path: &Path) -> Option<PathBuf> {
-    const MOST_FILES: usize = 2_000;
+/// Files of a folder that are looked at.
+pub(super) const MOST_FILES: usize = 2_000;
+
+/// The file beside a missing one whose name is nearest to it, of those that may be meant.
+pub(super) fn neighbour(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let folder = path.parent()?;
     let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let names: Vec<String> = std::fs::read_dir(listed)
         .ok()?
         .take(MOST_FILES)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| is_alike(Path::new(name), path))
+        .filter(|name| is_alike(Path::new(name), path) && may_be_meant(Path::new(name)))
         .collect();
     let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
     Some(folder.join(near))
@@ -136,6 +121,11 @@ fn is_alike(found: &Path, meant: &Path) -> bool {
         && (found.extension() == meant.extension() || found.file_stem() == meant.file_stem())
 }
 
+/// Whether a file may be a scene by its name.
+fn may_be_scene(found: &Path) -> bool {
+    found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
 /// Whether a name that leads to no file is a link all the same.
 pub(super) fn is_link(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink())
@@ -144,6 +134,7 @@ pub(super) fn is_link(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs::File;
 
     fn message(path: &Path) -> Diagnostic {
         *text(path).expect_err("a diagnostic")
@@ -157,7 +148,8 @@ mod tests {
         let pipe = folder.path().join("pipe");
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
         assert!(message(&pipe).message.contains("pipe"));
-        assert_eq!(open(&pipe).expect("does not block").metadata().expect("metadata").len(), 0);
+        #[cfg(target_os = "linux")]
+        assert!(message(Path::new("/proc/kmsg")).message.contains("file of the kernel"));
         let circle = folder.path().join("circle.toml");
         std::os::unix::fs::symlink(&circle, &circle).expect("a link");
         assert!(message(&circle).message.contains("circle"));
@@ -175,6 +167,10 @@ mod tests {
         let dangling = folder.path().join("link.toml");
         std::os::unix::fs::symlink(folder.path().join("gone"), &dangling).expect("a link");
         assert!(message(&dangling).message.contains("symbolic link to a file that does not exist"));
+        // A picture is no scene.
+        std::fs::write(folder.path().join("my_hall.png"), "").expect("written");
+        let picture = message(&folder.path().join("my_hall.toml"));
+        assert!(picture.help.expect("a way out").contains("glimt new"));
         let lonely = message(&folder.path().join("zebra"));
         assert!(lonely.help.expect("a way out").contains("glimt new"));
     }

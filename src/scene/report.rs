@@ -87,6 +87,7 @@ fn one(
     let path = diagnostic.path.to_string_lossy();
     let mut origin = Origin::path(visible(&path));
     let mut snippet = None;
+    let mut note = None;
     if let Some(place) = &diagnostic.place {
         if index.as_ref().is_none_or(|(source, _)| !Arc::ptr_eq(source, &place.source)) {
             *index = Some((Arc::clone(&place.source), LineIndex::new(&place.source)));
@@ -96,7 +97,11 @@ fn one(
         origin = origin.line(line).char_column(column);
         let whole = lines.span(line - 1, source).unwrap_or_default();
         let excerpt = Excerpt::new(source, whole, &place.span);
-        let label = (!place.label.is_empty()).then(|| visible(&place.label).into_owned());
+        let label = visible(&place.label);
+        let fits = excerpt.label_column(line) + columns(&label) <= width;
+        // The renderer wraps no labels, only notes.
+        note = (!fits).then_some(place.label.as_str());
+        let label = (fits && !label.is_empty()).then(|| label.into_owned());
         let annotation = AnnotationKind::Primary.span(excerpt.span).label(label);
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
     }
@@ -106,6 +111,9 @@ fn one(
     let mut group: Group<'_> = if has_origin { title.element(origin) } else { Group::with_title(title) };
     if let Some(snippet) = snippet {
         group = group.element(snippet);
+    }
+    if let Some(note) = note {
+        group = group.element(Level::NOTE.message(wrapped(note, width.saturating_sub(14))));
     }
     if let Some(help) = &diagnostic.help {
         group = group.element(Level::HELP.message(wrapped(help, width.saturating_sub(14))));
@@ -147,6 +155,18 @@ impl Excerpt {
         let from = before.len();
         Self { span: from..from + inside.len(), text: format!("{before}{inside}{after}") }
     }
+
+    /// Columns before the label of the place: the number of the line, ` | `, the text and the carets under the place
+    /// with a blank behind them.
+    fn label_column(&self, line: usize) -> usize {
+        let frame = line.to_string().len() + " | ".len();
+        frame + columns(&self.text[..self.span.start]) + columns(&self.text[self.span.clone()]).max(1) + 1
+    }
+}
+
+/// Columns that a text takes in a terminal.
+fn columns(text: &str) -> usize {
+    unicode_width::UnicodeWidthStr::width(text)
 }
 
 fn floor_char(source: &str, offset: usize) -> usize {
@@ -168,10 +188,15 @@ impl LineIndex {
         Self { starts: std::iter::once(0).chain(after).collect() }
     }
 
+    /// The line of a byte, from 1.
+    pub(super) fn line(&self, offset: usize) -> usize {
+        self.starts.partition_point(|start| *start <= offset)
+    }
+
     /// Line and column from 1. A byte order mark has no column.
     pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
         let offset = floor_char(source, offset);
-        let line = self.starts.partition_point(|start| *start <= offset);
+        let line = self.line(offset);
         let before = &source[self.starts[line - 1]..offset];
         let before = before.strip_prefix('\u{feff}').unwrap_or(before);
         (line, before.chars().count() + 1)

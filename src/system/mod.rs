@@ -1,4 +1,6 @@
-//! What the operating system says, in plain words.
+//! What the operating system says, in plain words, and which files have an end.
+
+pub mod file;
 
 use std::io::{Error, ErrorKind};
 

@@ -8,7 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::fixtures::{asset, diagnostic, done, settings, stage};
-use super::{Changed, ColorChoice, Options, PreviewChoice, run};
+use super::{Changed, ColorChoice, News, Options, PreviewChoice, run};
 use crate::film::Picture;
 use crate::pipeline::protocol::{
     Command, Event, Failure, LatestPreview, PreviewSlot, RenderProgress, Request, Stage, Status,
@@ -22,7 +22,7 @@ fn by_hand() {
     let scene = PathBuf::from(std::env::var("GLIMT_BY_HAND").unwrap_or_default());
     let (commands, orders) = channel();
     let (sender, events) = channel();
-    let (watcher, changes) = channel();
+    let (watcher, news) = channel();
     let previews = PreviewSlot::default();
     let slot = Arc::clone(&previews);
     thread::spawn(move || work(&orders, &sender, &slot));
@@ -40,7 +40,7 @@ fn by_hand() {
         }),
         events,
         previews,
-        changes,
+        news,
     });
     match outcome {
         Ok(ended) => std::process::exit(i32::from(ended.status.0)),
@@ -51,14 +51,15 @@ fn by_hand() {
     }
 }
 
-fn watch(scene: &PathBuf, changes: &Sender<Changed>) {
+fn watch(scene: &PathBuf, news: &Sender<News>) {
     let mut last = std::fs::read(scene).ok();
     loop {
         thread::sleep(Duration::from_millis(30));
         let now = std::fs::read(scene).ok();
         if now != last {
             last = now;
-            if changes.send(Changed { noticed: Instant::now() }).is_err() {
+            let changed = News::Changed(Changed { noticed: Instant::now() });
+            if [changed, News::Settled].into_iter().any(|said| news.send(said).is_err()) {
                 return;
             }
         }

@@ -26,10 +26,14 @@ choice! {
 
 /// What the terminal gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ColorDepth {
+pub enum ColorDepth {
+    /// 24 bits.
     TrueColor,
+    /// The 6×6×6 cube and the greys of xterm.
     Indexed256,
+    /// The 16 colours of xterm.
     Ansi16,
+    /// None at all.
     None,
 }
 
@@ -78,7 +82,7 @@ fn is_true_color(term: &str, program: &str) -> bool {
 }
 
 /// The levels of a channel in the 6×6×6 cube.
-const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
+pub(super) const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
 
 /// The 16 colours as xterm draws them by default; people change them.
 const ANSI: [([u8; 3], Color); 16] = [

@@ -1,11 +1,14 @@
 //! Everything that can happen to the front end: one closed set.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::options::Changed;
+use super::input::Answer;
+use super::options::{Changed, News};
+use super::state::FrameReport;
 use crate::film::Picture;
 use crate::pipeline::protocol;
 
@@ -14,6 +17,16 @@ use crate::pipeline::protocol;
 pub(super) enum Event {
     /// A key was pressed.
     Key(KeyPress),
+    /// Text was pasted.
+    Paste,
+    /// The terminal answered a question.
+    Answer(Answer),
+    /// The system took so many bytes for the terminal.
+    Written { bytes: usize },
+    /// The terminal cannot be written to.
+    Unwritable(ErrorKind),
+    /// A picture has been sent.
+    Frame(FrameReport),
     /// The window has this size now.
     Resize(Window),
     /// The worker says something. Pictures come as [`Event::Picture`].
@@ -22,6 +35,8 @@ pub(super) enum Event {
     Picture { generation: u64, picture: Arc<Picture> },
     /// A file that the scene depends on was written.
     Changed(Changed),
+    /// Nobody is writing the files that were said to have changed.
+    Settled,
     /// A signal, or what amounts to one.
     Signal(Signal),
     /// A frame with the picture of this generation is on the screen.
@@ -32,6 +47,16 @@ pub(super) enum Event {
     NoShell,
     /// A source of events ended.
     Lost(Source),
+}
+
+impl Event {
+    /// What the watcher says.
+    pub(super) fn of_watcher(news: News) -> Self {
+        match news {
+            News::Changed(changed) => Self::Changed(changed),
+            News::Settled => Self::Settled,
+        }
+    }
 }
 
 /// A key with its modifiers.
@@ -72,12 +97,16 @@ pub(super) struct Window {
 pub(super) enum Signal {
     Interrupt,
     Terminate,
+    /// SIGQUIT.
+    Quit,
     /// SIGHUP, or the terminal is gone without one.
     Hangup,
     /// SIGTSTP.
     Suspend,
     /// SIGCONT.
     Continue,
+    /// SIGWINCH.
+    Resize,
 }
 
 /// Where events come from.
@@ -103,6 +132,8 @@ pub(super) enum Effect {
     Suspend,
     /// SIGCONT came: take the terminal again and draw everything.
     Redraw,
+    /// Ask how large the window is.
+    Measure,
 }
 
 /// A picture that was written.

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use ratatui::Terminal;
-use ratatui::backend::TestBackend;
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 
 use super::color::ColorDepth;
 use super::event::{Effect, Event, KeyPress, Window};
@@ -101,10 +100,9 @@ impl Desk {
     /// What is on the screen.
     pub(super) fn screen(&mut self) -> Buffer {
         self.state.dirty = false;
-        let backend = TestBackend::new(self.state.window.columns, self.state.window.rows);
-        let mut terminal = Terminal::new(backend).expect("a test backend");
-        terminal.draw(|frame| view::draw(&self.state, frame)).expect("a test backend");
-        terminal.backend().buffer().clone()
+        let mut buffer = Buffer::empty(Rect::new(0, 0, self.state.window.columns, self.state.window.rows));
+        view::draw(&self.state, &mut buffer);
+        buffer
     }
 
     pub(super) fn text(&mut self) -> String {

@@ -6,15 +6,20 @@
 
 mod action;
 mod color;
+mod display;
 mod event;
+mod input;
 mod keymap;
+mod line;
 mod options;
+pub mod paint;
 mod run;
 mod signals;
 mod state;
 mod terminal;
 mod update;
 mod view;
+mod writer;
 
 #[cfg(test)]
 mod by_hand;
@@ -23,6 +28,6 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
-pub use color::ColorChoice;
-pub use options::{Changed, Ended, ExitStatus, Options, PreviewChoice, TuiError};
+pub use color::{ColorChoice, ColorDepth};
+pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};
 pub use run::run;

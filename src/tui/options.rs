@@ -7,7 +7,7 @@ use super::color::ColorChoice;
 use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::Changed;
+pub use crate::pipeline::watch::{Changed, News};
 
 choice! {
     /// How the preview is drawn.
@@ -42,7 +42,7 @@ pub struct Options {
     /// Where the worker puts pictures.
     pub previews: PreviewSlot,
     /// What the watcher says. Its end is said in the message line.
-    pub changes: Receiver<Changed>,
+    pub news: Receiver<News>,
 }
 
 /// How the program is to end: its exit code.
@@ -54,6 +54,8 @@ impl ExitStatus {
     pub const QUIT: Self = Self(0);
     /// SIGHUP: the terminal is gone.
     pub const HANGUP: Self = Self(129);
+    /// SIGQUIT.
+    pub const ABORTED: Self = Self(131);
     /// SIGINT or ctrl-c.
     pub const INTERRUPTED: Self = Self(130);
     /// SIGTERM.
@@ -65,8 +67,8 @@ impl ExitStatus {
 pub struct Ended {
     /// How the program is to end.
     pub status: ExitStatus,
-    /// Whether a picture was asked for that was still to be written, as not every pixel had a sample.
-    pub is_write_postponed: bool,
+    /// Whether a picture was asked for and the person does not know yet what came of it.
+    pub is_write_unanswered: bool,
 }
 
 /// Why the front end could not go on.

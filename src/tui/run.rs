@@ -1,23 +1,32 @@
 //! The loop: the one owner of the terminal and the one place where effects happen.
 
+use std::collections::VecDeque;
 use std::io;
-use std::sync::PoisonError;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{Arc, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crossterm::event::{Event as TerminalEvent, KeyEvent, KeyEventKind};
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 
 use super::color::{self, ColorDepth};
-use super::event::{Effect, Event, KeyPress, Source};
+use super::display::Display;
+use super::event::{Effect, Event, Source};
+use super::input;
 use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
+use super::paint::Fidelity;
 use super::signals::{self, Listener};
 use super::state::{PreviewKind, Setup, State};
 use super::terminal::{self, Screen};
 use super::update::{start, update};
+use super::view;
+use super::view::layout::Layout;
+use super::writer;
+use crate::film::Picture;
 use crate::pipeline::protocol::{self, Command, PreviewSlot};
 
-/// At most 20 frames a second.
+/// At most 20 frames a second, keys aside.
 const FRAME: Duration = Duration::from_millis(50);
 
 /// Runs the front end until it is quit, by a key or a signal, and gives the terminal back. The worker is sent
@@ -42,18 +51,23 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
         depth,
     };
     forward("worker-events", options.events, &sender, Event::Worker, Source::Worker)?;
-    forward("changes", options.changes, &sender, Event::Changed, Source::Watcher)?;
-    read_keys(options.cell_aspect, &sender)?;
+    forward("news", options.news, &sender, Event::of_watcher, Source::Watcher)?;
+    input::start(&sender).map_err(failed("read keys from"))?;
+    writer::start(&sender).map_err(failed("write to"))?;
 
     let ui = Ui {
         screen,
+        display: Display::new(depth, is_multiplexed(|name| std::env::var(name).ok()), Instant::now()),
+        drawn: Drawn::default(),
+        events,
+        postponed: VecDeque::new(),
         state: State::new(setup, Instant::now()),
         commands: options.commands,
         previews: options.previews,
         cell_aspect: options.cell_aspect,
         next_frame: Instant::now(),
     };
-    let outcome = ui.run(&events);
+    let outcome = ui.run();
     drop(listener);
     outcome
 }
@@ -93,39 +107,39 @@ fn forward<T: Send + 'static>(
     Ok(())
 }
 
-fn read_keys(cell_aspect: Option<f32>, events: &Sender<Event>) -> Result<(), TuiError> {
-    let events = events.clone();
-    let read = move || {
-        while let Ok(event) = crossterm::event::read() {
-            let Some(event) = translated(&event, cell_aspect) else { continue };
-            if events.send(event).is_err() {
-                return;
-            }
-        }
-        let _ = events.send(Event::Lost(Source::Keys));
-    };
-    thread::Builder::new().name("keys".to_owned()).spawn(read).map_err(failed("read keys from"))?;
-    Ok(())
-}
-
-fn translated(event: &TerminalEvent, cell_aspect: Option<f32>) -> Option<Event> {
-    match event {
-        TerminalEvent::Key(KeyEvent { code, modifiers, kind: KeyEventKind::Press, .. }) => {
-            Some(Event::Key(KeyPress { code: *code, modifiers: *modifiers }))
-        }
-        TerminalEvent::Resize(..) => Some(Event::Resize(terminal::window(cell_aspect))),
-        _ => None,
-    }
+/// Inside tmux or screen: they answer in the terminal's place.
+fn is_multiplexed(variable: impl Fn(&str) -> Option<String>) -> bool {
+    let is_set = |name| variable(name).is_some_and(|value| !value.is_empty());
+    let term = variable("TERM").unwrap_or_default();
+    is_set("TMUX") || is_set("STY") || term.starts_with("tmux") || term.starts_with("screen")
 }
 
 struct Ui {
     screen: Screen,
+    display: Display,
+    drawn: Drawn,
+    events: Receiver<Event>,
+    /// What came while answers were waited for.
+    postponed: VecDeque<Event>,
     state: State,
     commands: Box<dyn FnMut(Command)>,
     previews: PreviewSlot,
     cell_aspect: Option<f32>,
     /// No frame before this.
     next_frame: Instant,
+}
+
+/// The picture that was drawn last.
+#[derive(Default)]
+struct Drawn {
+    picture: Option<Arc<Picture>>,
+    generation: u64,
+    /// Whether there is a newer one of the same request in the slot, to be taken when this one has been sent.
+    is_old: bool,
+    /// Whether it is the first one of its request.
+    is_first: bool,
+    /// Whether anything of it may have been sent.
+    is_shown: bool,
 }
 
 /// How the loop ends.
@@ -135,11 +149,11 @@ enum End {
 }
 
 impl Ui {
-    fn run(mut self, events: &Receiver<Event>) -> Result<Ended, TuiError> {
+    fn run(mut self) -> Result<Ended, TuiError> {
         let effects = start(&mut self.state);
         let mut end = self.perform(effects);
         while end.is_none() {
-            end = self.draw_if_due().or_else(|| self.wait(events));
+            end = self.draw_if_due().or_else(|| self.pump()).or_else(|| self.wait());
         }
         (self.commands)(Command::Quit);
         let status = match end {
@@ -151,17 +165,37 @@ impl Ui {
                 ExitStatus::HANGUP
             }
             Some(End::Error(error)) => return Err(error),
-            Some(End::Quit(status)) => status,
+            Some(End::Quit(status)) => {
+                self.leave();
+                status
+            }
             None => ExitStatus::QUIT,
         };
-        Ok(Ended { status, is_write_postponed: self.state.is_write_postponed })
+        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write })
+    }
+
+    /// Gives the screen back and waits a little for the answers that the terminal owes: a shell would take them for
+    /// something typed.
+    fn leave(&mut self) {
+        self.screen.leave();
+        let deadline = self.display.patience().map(|patience| Instant::now() + patience);
+        while let Some(deadline) = deadline.filter(|_| self.display.patience().is_some()) {
+            match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(Event::Answer(answer)) => self.display.answered(answer, Instant::now()),
+                Ok(event) => self.postponed.push_back(event),
+                Err(_) => return,
+            }
+        }
     }
 
     /// Everything that has happened, or the next thing that does.
-    fn wait(&mut self, events: &Receiver<Event>) -> Option<End> {
-        let first = match next_wake(&self.state, self.next_frame) {
-            Some(wake) => events.recv_timeout(wake.saturating_duration_since(Instant::now())),
-            None => events.recv().map_err(RecvTimeoutError::from),
+    fn wait(&mut self) -> Option<End> {
+        let now = Instant::now();
+        let wake = [next_wake(&self.state, self.next_frame), self.display.wake(now)];
+        let first = match (self.postponed.pop_front(), wake.into_iter().flatten().min()) {
+            (Some(event), _) => Ok(event),
+            (None, Some(wake)) => self.events.recv_timeout(wake.saturating_duration_since(now)),
+            (None, None) => self.events.recv().map_err(RecvTimeoutError::from),
         };
         let first = match first {
             Ok(event) => event,
@@ -173,18 +207,43 @@ impl Ui {
             if let Some(end) = self.handle(event) {
                 return Some(end);
             }
-            next = events.try_recv().ok();
+            next = self.postponed.pop_front().or_else(|| self.events.try_recv().ok());
         }
         None
     }
 
     fn handle(&mut self, event: Event) -> Option<End> {
-        if let Event::Worker(protocol::Event::Preview { .. }) = event {
-            let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take();
-            let latest = latest?;
-            return self.apply(Event::Picture { generation: latest.generation, picture: latest.picture });
+        match event {
+            Event::Worker(protocol::Event::Preview { generation }) => return self.preview(generation),
+            Event::Answer(answer) => self.display.answered(answer, Instant::now()),
+            Event::Written { bytes } => self.display.written(bytes),
+            Event::Unwritable(kind) => return Some(unwritable(kind.into())),
+            Event::Key(_) => {
+                let end = self.apply(event);
+                self.state.urgent |= self.state.dirty;
+                return end;
+            }
+            event => return self.apply(event),
         }
-        self.apply(event)
+        None
+    }
+
+    /// There is a newer picture. While one of the same request is under way it stays in the slot, where a still newer
+    /// one takes its place: the line carries whole pictures, and never a queue of them.
+    fn preview(&mut self, generation: u64) -> Option<End> {
+        let is_under_way = self.drawn.picture.is_some() && !self.display.is_complete();
+        if is_under_way && generation == self.drawn.generation {
+            self.drawn.is_old = true;
+            return None;
+        }
+        self.take_preview()
+    }
+
+    fn take_preview(&mut self) -> Option<End> {
+        self.drawn.is_old = false;
+        let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let latest = latest?;
+        self.apply(Event::Picture { generation: latest.generation, picture: latest.picture })
     }
 
     fn apply(&mut self, event: Event) -> Option<End> {
@@ -208,12 +267,14 @@ impl Ui {
                 return signals::stop_job().err().map(failed("stop the job of")).map(End::Error);
             }
             Effect::Suspend if signals::has_shell() => {
+                self.leave();
                 self.screen.suspend();
                 // Stopped here; SIGCONT then asks for a redraw.
                 signals::stop();
             }
             Effect::Suspend => {}
             Effect::Redraw => return self.redraw(),
+            Effect::Measure => return self.measure(),
         }
         None
     }
@@ -222,9 +283,15 @@ impl Ui {
         if let Err(error) = self.screen.resume() {
             return Some(unwritable(error));
         }
+        self.display.restart(Instant::now());
+        self.measure()
+    }
+
+    fn measure(&mut self) -> Option<End> {
         self.apply(Event::Resize(terminal::window(self.cell_aspect)))
     }
 
+    /// Aims the screen at the state as it is now.
     fn draw_if_due(&mut self) -> Option<End> {
         if !self.state.dirty || (!self.state.urgent && Instant::now() < self.next_frame) {
             return None;
@@ -235,12 +302,58 @@ impl Ui {
             return None;
         }
         self.state.dirty = false;
-        if let Err(error) = self.screen.draw(&self.state) {
-            return Some(unwritable(error));
+        let window = self.state.window;
+        let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
+        view::draw(&self.state, &mut buffer);
+        let is_new = self.note_picture();
+        // It is all there, and no better one has come since.
+        self.drawn.is_first &= is_new || !self.display.is_complete();
+        self.display.aim(&buffer, Layout::of(&self.state).preview, self.fidelity(), is_new);
+        None
+    }
+
+    /// Keeps which picture is drawn; whether it is another one than before.
+    fn note_picture(&mut self) -> bool {
+        let Some(shown) = &self.state.picture else { return false };
+        if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {
+            return false;
         }
-        self.next_frame = Instant::now() + FRAME;
-        let generation = self.state.picture.as_ref()?.generation;
-        self.apply(Event::Shown { generation })
+        let is_first = self.drawn.generation != shown.generation;
+        let picture = Some(shown.picture.clone());
+        self.drawn = Drawn { picture, generation: shown.generation, is_first, ..Drawn::default() };
+        true
+    }
+
+    fn fidelity(&self) -> Fidelity {
+        match () {
+            () if !self.state.is_running() || self.state.paused => Fidelity::Still,
+            () if self.drawn.is_first => Fidelity::First,
+            () => Fidelity::Moving,
+        }
+    }
+
+    /// Sends what the line has room for.
+    fn pump(&mut self) -> Option<End> {
+        if !self.screen.is_taken() {
+            return None;
+        }
+        let has_sent = self.display.pump(Instant::now());
+        if let Some(report) = self.display.take_report() {
+            let end = self.apply(Event::Frame(report));
+            if end.is_some() {
+                return end;
+            }
+        }
+        if self.drawn.is_old && self.display.is_complete() {
+            let end = self.take_preview();
+            if end.is_some() {
+                return end;
+            }
+        }
+        if self.drawn.picture.is_none() || !has_sent || std::mem::replace(&mut self.drawn.is_shown, true) {
+            return None;
+        }
+        self.apply(Event::Shown { generation: self.drawn.generation })
     }
 }
 
@@ -261,19 +374,8 @@ fn next_wake(state: &State, next_frame: Instant) -> Option<Instant> {
 
 #[cfg(test)]
 mod tests {
-    use crossterm::event::{KeyCode, KeyModifiers};
-
     use super::*;
     use crate::tui::fixtures::state;
-
-    #[test]
-    fn keys_act_on_press_only() {
-        let key =
-            |kind| TerminalEvent::Key(KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, kind));
-        assert!(translated(&key(KeyEventKind::Press), None).is_some());
-        assert!(translated(&key(KeyEventKind::Release), None).is_none());
-        assert!(translated(&key(KeyEventKind::Repeat), None).is_none());
-    }
 
     #[test]
     fn an_idle_state_is_not_woken() {
@@ -288,6 +390,20 @@ mod tests {
     }
 
     #[test]
+    fn a_multiplexer_is_known_by_its_variables() {
+        let is_in = |pairs: &[(&str, &str)]| {
+            is_multiplexed(|name| {
+                pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+            })
+        };
+        assert!(!is_in(&[("TERM", "xterm-256color"), ("TMUX", "")]));
+        assert!(is_in(&[("TERM", "xterm-256color"), ("TMUX", "/tmp/tmux-0/default,1,0")]));
+        assert!(is_in(&[("TERM", "tmux-256color")]));
+        assert!(is_in(&[("TERM", "screen.xterm-256color")]));
+        assert!(is_in(&[("STY", "1234.pts-0")]));
+    }
+
+    #[test]
     fn without_colours_the_preview_is_a_ramp() {
         assert_eq!(preview_kind(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
         assert_eq!(preview_kind(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
@@ -299,10 +415,10 @@ mod tests {
     fn a_source_that_ends_is_reported_after_its_messages() {
         let (from, receiver) = mpsc::channel();
         let (sender, events) = mpsc::channel();
-        forward("test", receiver, &sender, Event::Changed, Source::Watcher).expect("a thread");
-        from.send(super::super::Changed { noticed: Instant::now() }).expect("a receiver");
+        forward("test", receiver, &sender, Event::of_watcher, Source::Watcher).expect("a thread");
+        from.send(super::super::News::Settled).expect("a receiver");
         drop(from);
-        assert!(matches!(events.recv(), Ok(Event::Changed(_))));
+        assert!(matches!(events.recv(), Ok(Event::Settled)));
         assert!(matches!(events.recv(), Ok(Event::Lost(Source::Watcher))));
     }
 }

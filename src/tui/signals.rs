@@ -1,8 +1,7 @@
 //! Signals, and a terminal that goes away without one.
 //!
 //! They are heard on threads of their own, because the loop can be stuck: in a write to a terminal that takes
-//! nothing, or behind keys that never end (crossterm's reader spins once its terminal is gone). What has to end
-//! the program ends it from here when the loop does not.
+//! nothing, or behind keys that never end. What has to end the program ends it from here when the loop does not.
 
 use std::io;
 use std::sync::Arc;
@@ -13,7 +12,7 @@ use std::time::Duration;
 
 use nix::sys::signal::{Signal as Number, kill};
 use nix::unistd::{Pid, getpid, getppid, getsid};
-use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM, SIGTSTP};
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level;
 
@@ -37,7 +36,7 @@ impl Listener {
     /// Starts to listen; what is heard goes to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
-        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGTSTP, SIGCONT])?;
+        let mut signals = Signals::new([SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH])?;
         let ear = Ear { over: Arc::clone(&over), events: events.clone() };
         thread::Builder::new().name("signals".to_owned()).spawn(move || {
             for number in signals.forever() {
@@ -70,8 +69,10 @@ impl Ear {
         let signal = match number {
             SIGINT => Signal::Interrupt,
             SIGTERM => Signal::Terminate,
+            SIGQUIT => Signal::Quit,
             SIGHUP => Signal::Hangup,
             SIGTSTP => Signal::Suspend,
+            SIGWINCH => Signal::Resize,
             _ => Signal::Continue,
         };
         self.tell(signal);
@@ -102,8 +103,9 @@ fn ends(signal: Signal) -> Option<ExitStatus> {
     match signal {
         Signal::Interrupt => Some(ExitStatus::INTERRUPTED),
         Signal::Terminate => Some(ExitStatus::TERMINATED),
+        Signal::Quit => Some(ExitStatus::ABORTED),
         Signal::Hangup => Some(ExitStatus::HANGUP),
-        Signal::Suspend | Signal::Continue => None,
+        Signal::Suspend | Signal::Continue | Signal::Resize => None,
     }
 }
 
@@ -148,8 +150,10 @@ mod tests {
     fn the_signals_that_end_have_their_codes() {
         assert_eq!(ends(Signal::Interrupt), Some(ExitStatus(130)));
         assert_eq!(ends(Signal::Terminate), Some(ExitStatus(143)));
+        assert_eq!(ends(Signal::Quit), Some(ExitStatus(131)));
         assert_eq!(ends(Signal::Hangup), Some(ExitStatus(129)));
         assert_eq!(ends(Signal::Suspend), None);
         assert_eq!(ends(Signal::Continue), None);
+        assert_eq!(ends(Signal::Resize), None);
     }
 }

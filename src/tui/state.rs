@@ -35,6 +35,8 @@ pub(super) enum Activity {
     Running { since: Instant },
     /// Finished.
     Done,
+    /// Could not be done, perhaps because the file is not whole yet.
+    Waiting,
     /// Could not be done.
     Broken,
     /// Stopped.
@@ -80,6 +82,14 @@ impl AssetBar {
     pub(super) fn end(&self) -> Option<Instant> {
         self.finished.map(|finished| finished + Self::LINGER)
     }
+}
+
+/// What the last picture took on its way to the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FrameReport {
+    pub bytes: usize,
+    /// How long the terminal takes to answer; none: it does not.
+    pub round_trip: Option<Duration>,
 }
 
 /// The picture on the screen and the request that it is of.
@@ -129,14 +139,18 @@ pub(super) struct State {
     pub renders: u64,
     /// Whether the next picture that is written is one that was asked for.
     pub asked_to_write: bool,
-    /// Whether the picture that was asked for waits until every pixel has a sample.
-    pub is_write_postponed: bool,
     pub written: Vec<Written>,
     pub picture: Option<Shown>,
 
     /// None while the file is whole.
     pub problems: Option<Problems>,
+    /// What is wrong with a file that may still be being written.
+    pub held: Option<Vec<Diagnostic>>,
+    /// Whether nobody is writing the files.
+    pub is_settled: bool,
     pub warnings: Vec<Diagnostic>,
+    /// Whether they are those of the newest request.
+    pub are_warnings_known: bool,
     pub pane: Pane,
     pub help: bool,
     pub message: Option<String>,
@@ -145,11 +159,14 @@ pub(super) struct State {
     /// From the last save to its first changed cell.
     pub first_change: Option<Duration>,
 
+    pub frame: Option<FrameReport>,
+
     /// The time of the newest event.
     pub now: Instant,
     /// Whether the screen is out of date.
     pub dirty: bool,
-    /// Whether the next frame is the first picture of a request, which does not wait for its turn.
+    /// Whether the next frame is the first picture of a request or the answer to a key, which do not wait for their
+    /// turn.
     pub urgent: bool,
 }
 
@@ -176,16 +193,19 @@ impl State {
             unchanged: false,
             renders: 0,
             asked_to_write: false,
-            is_write_postponed: false,
             written: Vec::new(),
             picture: None,
             problems: None,
+            held: None,
+            is_settled: true,
             warnings: Vec::new(),
+            are_warnings_known: false,
             pane: Pane::default(),
             help: false,
             message: None,
             change: None,
             first_change: None,
+            frame: None,
             now,
             dirty: true,
             urgent: false,

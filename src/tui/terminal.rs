@@ -3,70 +3,61 @@
 //! One [`Screen`] owns it. It is given back when the screen is dropped, when the front end's thread panics (by a
 //! hook that is chained once), before the program stops, and by [`rescue`] when the front end is stuck.
 
-use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
 use std::sync::{Mutex, Once, PoisonError};
-use std::thread::ThreadId;
+use std::thread::{self, ThreadId};
+use std::time::Duration;
 
 use crossterm::cursor::{Hide, Show};
+use crossterm::event::{DisableBracketedPaste, EnableBracketedPaste};
 use crossterm::style::ResetColor;
 use crossterm::terminal::{
     Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode,
     enable_raw_mode,
 };
 use crossterm::{execute, terminal};
-use ratatui::Terminal;
-use ratatui::backend::CrosstermBackend;
+use nix::sys::termios::{FlushArg, tcflush};
 
 use super::event::Window;
 use super::options::TuiError;
-use super::state::State;
-use super::view;
+use super::writer;
 
-/// Whether the terminal is taken.
+/// Whether the screen is taken.
 static TAKEN: AtomicBool = AtomicBool::new(false);
+/// Whether keys come raw.
+static RAW: AtomicBool = AtomicBool::new(false);
 /// The thread whose panic gives the terminal back; those of other threads are kept in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
 /// What the last panic of another thread said.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// A frame goes out in few writes.
-const FRAME_BUFFER_BYTES: usize = 1 << 17;
 /// Half blocks are about square at this height over width of a cell.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
+/// How long a terminal that takes nothing is waited for, at each step of giving it back.
+const STUCK: Duration = Duration::from_millis(60);
 
 /// The terminal, taken.
-pub(super) struct Screen {
-    /// None once it was abandoned.
-    terminal: Option<Terminal<CrosstermBackend<BufWriter<Stdout>>>>,
-}
+pub(super) struct Screen(());
 
 impl Screen {
     /// Takes the terminal: raw mode, alternate screen, no cursor.
     pub(super) fn open() -> Result<Self, TuiError> {
         chain_panic_hook();
         take().map_err(|source| TuiError::Terminal { action: "set up", source })?;
-        let backend = CrosstermBackend::new(BufWriter::with_capacity(FRAME_BUFFER_BYTES, io::stdout()));
-        match Terminal::new(backend) {
-            Ok(terminal) => Ok(Self { terminal: Some(terminal) }),
-            Err(source) => {
-                give_back();
-                Err(TuiError::Terminal { action: "ask for the size of", source })
-            }
-        }
-    }
-
-    /// Draws what differs from the frame before.
-    pub(super) fn draw(&mut self, state: &State) -> io::Result<()> {
-        match &mut self.terminal {
-            Some(terminal) => terminal.draw(|frame| view::draw(state, frame)).map(|_| ()),
-            None => Ok(()),
-        }
+        Ok(Self(()))
     }
 
     /// Whether it may be drawn on.
     pub(super) fn is_taken(&self) -> bool {
-        TAKEN.load(Ordering::Acquire) && self.terminal.is_some()
+        TAKEN.load(Ordering::Acquire)
+    }
+
+    /// Gives the screen back and keeps the keys, until [`Screen::resume`] or the end: what the terminal still answers
+    /// must not be echoed.
+    pub(super) fn leave(&mut self) {
+        leave_screen();
     }
 
     /// Gives the terminal back until [`Screen::resume`].
@@ -74,23 +65,19 @@ impl Screen {
         give_back();
     }
 
-    /// Takes the terminal again, whoever changed its modes, and forgets what was on it.
+    /// Takes the terminal again, whoever changed its modes.
     pub(super) fn resume(&mut self) -> io::Result<()> {
-        let Some(terminal) = &mut self.terminal else { return Ok(()) };
         // What a shell set while the program was stopped is no longer what was saved when it was taken.
-        if TAKEN.swap(false, Ordering::AcqRel) {
+        if RAW.swap(false, Ordering::AcqRel) {
             disable_raw_mode()?;
         }
-        take()?;
-        // Not `Terminal::clear`, which asks the terminal where the cursor is and would wait for the keys' thread.
-        let area = terminal.size()?;
-        terminal.resize(area.into())
+        take()
     }
 
     /// The terminal is gone: nothing more is written to it.
-    pub(super) fn abandon(mut self) {
+    pub(super) fn abandon(self) {
         TAKEN.store(false, Ordering::Release);
-        std::mem::forget(self.terminal.take());
+        RAW.store(false, Ordering::Release);
     }
 }
 
@@ -102,25 +89,51 @@ impl Drop for Screen {
 
 fn take() -> io::Result<()> {
     enable_raw_mode()?;
+    RAW.store(true, Ordering::Release);
     TAKEN.store(true, Ordering::Release);
-    *OWNER.lock().unwrap_or_else(PoisonError::into_inner) = Some(std::thread::current().id());
+    *OWNER.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current().id());
     enter(&mut io::stdout()).inspect_err(|_| give_back())
 }
 
 /// Gives the terminal back, if it is taken. Errors are of no use: there is nobody left to tell.
 fn give_back() {
-    if TAKEN.swap(false, Ordering::AcqRel) {
-        let _ = leave(&mut io::stdout());
+    leave_screen();
+    if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
     }
 }
 
-/// Gives the terminal back from another thread while the owner may be stuck in a write and hold the lock of
-/// standard output. Returns at once; a terminal that takes nothing keeps the writer waiting, not the caller.
+/// Gives the screen back, if it is taken. What has not been sent is dropped; a terminal that takes nothing loses what
+/// the system keeps for it as well, and is waited for no longer than three times [`STUCK`].
+fn leave_screen() {
+    if !TAKEN.swap(false, Ordering::AcqRel) {
+        return;
+    }
+    let drop_kept = || tcflush(io::stdout(), FlushArg::TCOFLUSH);
+    if !writer::discard(STUCK) {
+        let _ = drop_kept();
+        writer::discard(STUCK);
+    }
+    let (sender, written) = channel();
+    thread::spawn(move || {
+        let _ = writer::output().and_then(|mut out| leave(&mut out));
+        let _ = sender.send(());
+    });
+    if written.recv_timeout(STUCK).is_err() {
+        let _ = drop_kept();
+        let _ = written.recv_timeout(STUCK);
+    }
+}
+
+/// Gives the terminal back from another thread while the owner may be stuck. Returns at once; a terminal that takes
+/// nothing keeps the writer waiting, not the caller.
 pub(super) fn rescue() {
-    if TAKEN.swap(false, Ordering::AcqRel) {
+    if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
-        std::thread::spawn(|| {
+    }
+    if TAKEN.swap(false, Ordering::AcqRel) {
+        writer::discard(Duration::ZERO);
+        thread::spawn(|| {
             let tty = std::fs::OpenOptions::new().write(true).open("/dev/tty");
             tty.and_then(|mut tty| leave(&mut tty))
         });
@@ -129,12 +142,12 @@ pub(super) fn rescue() {
 
 /// The bytes that take the screen.
 fn enter(out: &mut impl Write) -> io::Result<()> {
-    execute!(out, EnterAlternateScreen, Hide, Clear(ClearType::All))
+    execute!(out, EnterAlternateScreen, Hide, EnableBracketedPaste, Clear(ClearType::All))
 }
 
 /// The bytes that give it back, from any state that a frame can be cut in.
 fn leave(out: &mut impl Write) -> io::Result<()> {
-    execute!(out, EndSynchronizedUpdate, ResetColor, LeaveAlternateScreen, Show)
+    execute!(out, EndSynchronizedUpdate, ResetColor, DisableBracketedPaste, LeaveAlternateScreen, Show)
 }
 
 /// While the terminal is taken, a panic of its owner gives it back and is then reported as always; a panic of
@@ -216,7 +229,7 @@ mod tests {
     fn leaving_undoes_entering() {
         let enter = bytes(enter);
         let leave = bytes(leave);
-        for mode in ["?1049", "?25"] {
+        for mode in ["?1049", "?25", "?2004"] {
             assert!(enter.contains(mode) && leave.contains(mode), "{mode}: {enter:?} {leave:?}");
         }
         assert!(enter.contains("\x1b[?1049h") && enter.contains("\x1b[?25l"), "{enter:?}");

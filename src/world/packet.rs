@@ -201,7 +201,7 @@ mod tests {
         }
     }
 
-    /// Spheres, boxes and quads in a grid, three instances of a fan of triangles, a floor.
+    /// Spheres, boxes and quads in a grid, four instances of a fan of triangles, one of them where it was made, a floor.
     fn geometry(accel: Accel) -> Geometry {
         let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO], ..TriangleMesh::default() };
         for i in 0..40_u32 {
@@ -222,10 +222,11 @@ mod tests {
                 _ => Shape::Sphere(Sphere { center, radius: 0.6 }),
             }));
         }
-        for i in 0..3 {
+        let placed = |i: i32| {
             let at = DVec3::new(f64::from(i) - 1.0, f64::from(i) * 0.7, 0.3);
-            let transform =
-                Transform::scale_rotate_translate(DVec3::splat(1.3), DVec3::splat(20.0 * f64::from(i)), at);
+            Transform::scale_rotate_translate(DVec3::splat(1.3), DVec3::splat(20.0 * f64::from(i)), at)
+        };
+        for transform in [Transform::IDENTITY, placed(0), placed(1), placed(2)] {
             objects.push(Object::Mesh(Box::new(MeshInstance {
                 tree: Arc::clone(&tree),
                 transform,

@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
+use std::process::Command as Process;
 use std::time::{Duration, Instant};
 
 use super::desk::{Desk, SCENE};
@@ -269,6 +270,100 @@ fn pictures_that_lie_about_their_size() {
         desk.write(name, content);
         desk.write("scene.toml", scene("a.png").0.replace("a.png", name));
         refused(&desk, "scene.toml", &[name, "scene.toml:25:8"]);
+    }
+}
+
+#[test]
+fn what_stands_beside_a_picture_takes_no_memory() {
+    const BOMB: usize = 256 << 20;
+    type Add = fn(&mut png::Encoder<'_, &mut Vec<u8>>, String) -> Result<(), png::EncodingError>;
+    let zeros = || "0".repeat(BOMB);
+    let encoded = |info: png::Info<'static>, add: Option<Add>| {
+        let mut file = Vec::new();
+        let mut encoder = png::Encoder::with_info(&mut file, info).expect("an encoder");
+        encoder.set_compression(png::Compression::Fast);
+        if let Some(add) = add {
+            add(&mut encoder, zeros()).expect("added");
+        }
+        let mut writer = encoder.write_header().expect("a header");
+        writer.write_image_data(&[7]).expect("written");
+        writer.finish().expect("written");
+        file
+    };
+    let mut profiled = png::Info::with_size(1, 1);
+    profiled.icc_profile = Some(zeros().into_bytes().into());
+    let plain = || png::Info::with_size(1, 1);
+    for (name, file) in [
+        ("iCCP", encoded(profiled, None)),
+        ("zTXt", encoded(plain(), Some(|encoder, text| encoder.add_ztxt_chunk("a".to_owned(), text)))),
+        ("iTXt", encoded(plain(), Some(|encoder, text| encoder.add_itxt_chunk("a".to_owned(), text)))),
+        ("tEXt", encoded(plain(), Some(|encoder, text| encoder.add_text_chunk("a".to_owned(), text)))),
+    ] {
+        let desk = Desk::new();
+        desk.write("a.png", file);
+        desk.write("scene.toml", scene("a.png").0);
+        // By a shell: what a process took counts for the program that takes its place.
+        let program = desk.glimt("").get_program().to_owned();
+        let mut shell = Process::new("sh");
+        let line = "\"$0\" scene.toml --once -o out.png --report report.json; exit $?";
+        let status = shell
+            .args(["-c", line])
+            .arg(program)
+            .current_dir(desk.0.path())
+            .output()
+            .expect("it runs")
+            .status;
+        assert!(status.success(), "{name}: {status}");
+        let report: serde_json::Value = serde_json::from_slice(&desk.bytes("report.json")).expect("JSON");
+        let bytes = report["peak_memory_bytes"].as_u64().expect("bytes");
+        assert!(bytes < BOMB as u64 / 4, "{name}: {bytes}");
+        assert_eq!(report["counters"]["texels_loaded"], 1, "{name}");
+    }
+}
+
+#[test]
+fn a_line_end_in_a_name_ends_no_line() {
+    let desk = Desk::new();
+    let run = |arguments: &[&str]| {
+        let mut process = desk.glimt("");
+        process.args(arguments).output().expect("it runs")
+    };
+    let forged = |ending: &str| format!("a\nwrote forged.png\r\nerror: b{ending}");
+    let (toml, png, obj) = (forged(".toml"), forged(".png"), forged(".obj"));
+    desk.write(&toml, SCENE);
+    let mesh = |file: &str| format!("{SCENE}\n[[mesh]]\nfile = {file:?}\n");
+    desk.write("wrong.toml", mesh("none\nforged.obj"));
+    desk.write("no_materials.toml", mesh(&obj));
+    desk.write(&obj, TRIANGLE);
+    for (arguments, code) in [
+        (vec![toml.as_str(), "--once"], 0),
+        (vec![&toml, "--once", "--progress", "plain"], 0),
+        (vec!["ball.toml", "--once", "-o", &png], 0),
+        (vec!["ball.toml", "--once", "-o", "missing\nforged/a.png"], 1),
+        (vec!["ball.toml", "--once", "-o", &forged(".xyz")], 2),
+        (vec!["ball.toml", "--once", "-o", &png, "-o", &png], 2),
+        (vec!["ball.toml", "--once", "--report", "missing\nforged/a.json"], 1),
+        (vec!["ball.toml", "--once", "--samples", "1\nforged"], 2),
+        (vec!["ball.toml", "--once", "--view", "a\nforged"], 2),
+        (vec!["ball.toml", "--forged\nforged"], 2),
+        (vec!["ball.toml", "forged\nforged"], 2),
+        (vec!["check", &toml], 0),
+        (vec!["check", "none\nforged.toml"], 2),
+        (vec!["check", "wrong.toml"], 2),
+        (vec!["check", "no_materials.toml"], 2),
+        (vec!["new", &forged(".new")], 0),
+        (vec!["new", &toml], 2),
+        (vec![&toml, "--once", "--progress", "json"], 0),
+    ] {
+        let output = run(&arguments);
+        let said = String::from_utf8([output.stdout, output.stderr].concat()).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}\n{said}");
+        assert!(said.contains("forged"), "{arguments:?}\n{said}");
+        for line in said.lines() {
+            let is_split =
+                ["forged", "wrote forged.png", "error: b"].iter().any(|start| line.starts_with(start));
+            assert!(!is_split && !line.contains('\r'), "{arguments:?}\n{said}");
+        }
     }
 }
 

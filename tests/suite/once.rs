@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::process::{Command as Process, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::desk::{Desk, SCENE};
 
@@ -342,6 +342,51 @@ fn signals_end_it_with_their_code_and_leave_the_picture() {
         assert_eq!(fs::read(desk.path("ball.png")).expect("there"), b"the old one");
         assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 2, "no temporary file");
     }
+}
+
+#[test]
+fn an_end_by_a_signal_is_said() {
+    for (name, code, words) in [
+        ("INT", 130, "ended by SIGINT: no picture was written\n"),
+        ("TERM", 143, "ended by SIGTERM: no picture was written\n"),
+        ("HUP", 129, ""),
+    ] {
+        for progress in ["plain", "none"] {
+            let desk = Desk::new();
+            let stderr = fs::File::create(desk.path("stderr")).expect("a file");
+            let mut child = desk
+                .glimt(&format!("ball.toml --once --samples 4000000 --threads 1 --progress {progress}"))
+                .stderr(stderr)
+                .spawn()
+                .expect("it runs");
+            let said = || fs::read_to_string(desk.path("stderr")).expect("there");
+            // Silent progress shows no sign of when the handlers are set up.
+            let sign = if progress == "plain" { "photons" } else { "" };
+            let start = Instant::now();
+            while !said().contains(sign) || start.elapsed() < Duration::from_millis(500) {
+                assert!(start.elapsed() < Duration::from_secs(30), "it does not begin");
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
+            assert!(killed.expect("kill runs").success());
+            assert_eq!(child.wait().expect("it ends").code(), Some(code), "{name} {progress}");
+            let last = said().lines().last().map_or(String::new(), |line| format!("{line}\n"));
+            assert_eq!(said().matches("ended by").count(), usize::from(!words.is_empty()), "{}", said());
+            assert!(words.is_empty() || last == words, "{}", said());
+        }
+    }
+}
+
+#[test]
+fn new_writes_to_stdout_where_the_file_is_a_dash() {
+    let desk = Desk::new();
+    let output = desk.run("new -");
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(output.stdout, glimt::scene::starter().as_bytes());
+    assert!(output.stderr.is_empty());
+    assert!(!desk.path("-").exists());
+    desk.expect("new ./-", 0);
+    assert_eq!(desk.bytes("-"), glimt::scene::starter().as_bytes());
 }
 
 /// Until the process says this on stderr; what comes after is read and dropped.

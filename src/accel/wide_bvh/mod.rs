@@ -11,7 +11,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-pub use simd::{Instructions, Loops};
+pub use simd::{Instructions, Loops, pages};
 
 use crate::accel::{Ends, PACKET};
 

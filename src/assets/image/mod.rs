@@ -3,12 +3,15 @@
 mod apart;
 mod convert;
 mod counting;
+mod exr;
 mod jpeg;
+mod png;
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader, Seek};
 use std::path::{Path, PathBuf};
 
+use ::image::error::LimitErrorKind;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::contain::contain;
@@ -18,6 +21,8 @@ use crate::control::{CancelToken, Progress, unwatched};
 use crate::materials::texels::Texels;
 use apart::Reporter;
 use counting::Counting;
+use exr::ExrDecoder;
+use png::PngDecoder;
 
 /// Most bytes of an image file.
 const FILE_LIMIT: u64 = 4 << 30;
@@ -43,9 +48,9 @@ pub struct ImageLimits {
 }
 
 impl Default for ImageLimits {
-    /// 16384 a side, 2 GiB.
+    /// As many a side as a picture may have; 2 GiB.
     fn default() -> Self {
-        Self { side: 16384, memory_bytes: 2 << 30 }
+        Self { side: 65536, memory_bytes: 2 << 30 }
     }
 }
 
@@ -128,7 +133,7 @@ impl Source {
     }
 
     /// A decoder of an image within the limits, and the bytes that its texels will take.
-    fn decoder(self, report: Reporter) -> Result<(impl ImageDecoder, u64), String> {
+    fn decoder(self, report: Reporter) -> Result<(Box<dyn ImageDecoder>, u64), String> {
         let reader = BufReader::new(Counting::new(self.file, self.length, report));
         let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
         if reader.format().is_none() {
@@ -138,15 +143,11 @@ impl Source {
         }
         let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
         if is_jpeg {
-            jpeg::check_whole(&self.path, FILE_LIMIT, &self.token)?;
+            jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?;
         }
-        let mut decoder_limits = Limits::default();
-        decoder_limits.max_image_width = Some(self.limits.side);
-        decoder_limits.max_image_height = Some(self.limits.side);
-        decoder_limits.max_alloc = Some(self.limits.memory_bytes);
-        reader.limits(decoder_limits);
-        let decoder = reader.into_decoder().map_err(|error| reason(&error))?;
-        let texel_bytes = check_size(&decoder, self.limits)?;
+        let decoder = choose(reader, self.limits.memory_bytes).map_err(|error| reason(&error))?;
+        let held_bytes = if is_jpeg { self.length } else { 0 };
+        let texel_bytes = check_size(&*decoder, held_bytes, self.limits)?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible(width, height, self.length)?;
@@ -155,8 +156,27 @@ impl Source {
     }
 }
 
-/// Refuse before anything of that size is allocated; gives the bytes of the texels.
-fn check_size(decoder: &impl ImageDecoder, limits: ImageLimits) -> Result<u64, String> {
+/// The decoder of the format that was found.
+fn choose<R: BufRead + Seek + 'static>(
+    mut reader: ImageReader<R>,
+    memory_bytes: u64,
+) -> Result<Box<dyn ImageDecoder>, ImageError> {
+    match reader.format() {
+        Some(ImageFormat::Png) => Ok(Box::new(PngDecoder::new(reader.into_inner(), memory_bytes)?)),
+        Some(ImageFormat::OpenExr) => Ok(Box::new(ExrDecoder::new(reader.into_inner(), memory_bytes)?)),
+        _ => {
+            // Width and height are checked by who knows how to say it.
+            let mut limits = Limits::default();
+            limits.max_alloc = Some(memory_bytes);
+            reader.limits(limits);
+            Ok(Box::new(reader.into_decoder()?))
+        }
+    }
+}
+
+/// Refuse before anything of that size is allocated; gives the bytes of the texels. Bytes of the file that the decoder
+/// holds count too.
+fn check_size(decoder: &dyn ImageDecoder, held_bytes: u64, limits: ImageLimits) -> Result<u64, String> {
     let (width, height) = decoder.dimensions();
     let size = format!("it has {width} × {height} pixels");
     if width == 0 || height == 0 {
@@ -169,9 +189,12 @@ fn check_size(decoder: &impl ImageDecoder, limits: ImageLimits) -> Result<u64, S
     let sample_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
     let texel_bytes = if sample_bytes == 1 { 3 } else { 12 };
     let texels = u64::from(width) * u64::from(height) * texel_bytes;
-    let needed = decoder.total_bytes().saturating_add(texels);
+    let needed = decoder.total_bytes().saturating_add(texels).saturating_add(held_bytes);
     if needed > limits.memory_bytes {
-        return Err(format!("{size}, which take {needed} bytes, more than {}", limits.memory_bytes));
+        let (needed, most) = (needed.div_ceil(1 << 20), limits.memory_bytes >> 20);
+        return Err(format!(
+            "{size}, which take {needed} MiB of memory, more than the {most} MiB that one image may take"
+        ));
     }
     Ok(texels)
 }
@@ -180,15 +203,21 @@ fn unknown_format() -> String {
     "its content is no image that can be read: png, jpg, ppm, tga, bmp, hdr, exr or webp".to_owned()
 }
 
+/// What a decoder says, in few words: it may have much of the file in it.
 fn reason(error: &ImageError) -> String {
-    match error {
+    const MOST: usize = 200;
+    let words = match error {
         ImageError::Unsupported(_) => format!("{}: {error}", unknown_format()),
         ImageError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
             "the file ends before the image does".to_owned()
         }
         ImageError::IoError(error) => in_words(error),
+        ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
+            "it takes more memory than an image may take".to_owned()
+        }
         _ => error.to_string(),
-    }
+    };
+    if words.chars().count() <= MOST { words } else { words.chars().take(MOST).chain(['…']).collect() }
 }
 
 #[cfg(test)]

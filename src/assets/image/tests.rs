@@ -8,6 +8,9 @@ use crate::materials::texels::TexelData;
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
+mod exr;
+mod png;
+
 fn load_with(path: &Path, encoding: ImageEncoding) -> Result<Texels, AssetError> {
     load(path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new())
 }
@@ -25,7 +28,7 @@ fn says(name: &str, bytes: &[u8]) -> String {
 
 const PIXELS: [u8; 12] = [255, 0, 0, 0, 255, 0, 0, 0, 255, 10, 20, 30];
 
-fn png() -> Vec<u8> {
+fn small_png() -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
     save_buffer(&path, &PIXELS, 2, 2, ExtendedColorType::Rgb8).expect("written");
@@ -48,8 +51,8 @@ fn every_lossless_format_gives_the_same_texels() {
 
 #[test]
 fn the_content_counts_before_the_ending() {
-    assert!(load_bytes("a.jpg", &png(), ImageEncoding::Color).is_ok());
-    assert!(load_bytes("none", &png(), ImageEncoding::Color).is_ok());
+    assert!(load_bytes("a.jpg", &small_png(), ImageEncoding::Color).is_ok());
+    assert!(load_bytes("none", &small_png(), ImageEncoding::Color).is_ok());
     assert!(
         says("a.txt", b"some words that are no image")
             .contains("a.txt: its content is no image that can be read")
@@ -106,7 +109,7 @@ fn grey_and_alpha_become_rgb() {
 
 /// A PNG whose header says another size; its checksum is right.
 fn lying_png(width: u32, height: u32) -> Vec<u8> {
-    let mut file = png();
+    let mut file = small_png();
     file[16..20].copy_from_slice(&width.to_be_bytes());
     file[20..24].copy_from_slice(&height.to_be_bytes());
     // CRC-32 (ISO 3309) over the chunk's type and data.
@@ -121,7 +124,7 @@ fn lying_png(width: u32, height: u32) -> Vec<u8> {
 fn lies_about_the_size_are_errors_that_name_the_file() {
     assert!(load_bytes("a.png", &lying_png(2, 2), ImageEncoding::Color).is_ok());
     assert!(says("a.png", &lying_png(16000, 16000)).contains("a.png: it claims 16000 × 16000 pixels"));
-    assert!(says("a.png", &lying_png(20000, 2)).contains("a.png: "));
+    assert!(says("a.png", &lying_png(20000, 2)).contains("a.png: it claims 20000 × 2 pixels"));
     assert!(
         says("a.ppm", b"P6 9000 9000 255\n123")
             .contains("a.ppm: it claims 9000 × 9000 pixels: the file ends")
@@ -129,6 +132,49 @@ fn lies_about_the_size_are_errors_that_name_the_file() {
     assert!(says("a.ppm", b"P6 4000000000 4000000000 255\n123").contains("a.ppm: "));
     assert!(says("a.ppm", b"P6 0 0 255\n").contains("a.ppm: "));
     assert!(says("a.png", b"").contains("empty"));
+}
+
+#[test]
+fn a_side_of_many_pixels_is_read_and_too_many_are_named() {
+    let wide = [b"P5 16385 1 255\n".as_slice(), &[7; 16385]].concat();
+    assert_eq!(load_bytes("a.ppm", &wide, ImageEncoding::Color).expect("read").width, 16385);
+    let widest = [b"P5 1 65536 255\n".as_slice(), &[7; 65536]].concat();
+    assert_eq!(load_bytes("a.ppm", &widest, ImageEncoding::Color).expect("read").height, 65536);
+    let bmp =
+        [b"BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\x01\0\x01\0\0\0\x01\0\x18\0".as_slice(), &[0; 24]]
+            .concat();
+    for (name, bytes) in [
+        ("a.png", lying_png(65537, 1)),
+        ("a.ppm", b"P6 65537 1 255\n123".to_vec()),
+        ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 65537\nabc".to_vec()),
+    ] {
+        let said = says(name, &bytes);
+        assert!(
+            said.ends_with(&format!("{name}: it has 65537 × 1 pixels, more than 65536 a side")),
+            "{said}"
+        );
+    }
+    // The decoder's own limit comes first.
+    assert!(
+        says("a.bmp", &bmp).ends_with("one of (65537, 1) > soft limit of 65535)"),
+        "{}",
+        says("a.bmp", &bmp)
+    );
+    let said = says("a.ppm", b"P6 60000 60000 255\n123");
+    let reason = "it has 60000 × 60000 pixels, which take 20600 MiB of memory, more than the 2048 MiB that one image may take";
+    assert!(said.ends_with(reason), "{said}");
+}
+
+#[test]
+fn a_reason_is_short_whatever_the_file_says() {
+    let header = |line: &str| format!("P7\n{line} {}\n", "x".repeat(100_000));
+    for line in ["WIDTH", "FOO", "TUPLTYPE"] {
+        let said = says("a.ppm", header(line).as_bytes());
+        assert!(said.len() < 500, "{line}: {} bytes", said.len());
+    }
+    let hdr = format!("#?RADIANCE\nFORMAT={}\n\n-Y 1 +X 1\nabcd", "x".repeat(100_000));
+    assert!(says("a.hdr", hdr.as_bytes()).len() < 500);
+    assert!(says("a.hdr", hdr.replace('\n', "").as_bytes()).len() < 500);
 }
 
 #[test]
@@ -151,7 +197,7 @@ fn a_jpeg_that_is_cut_or_lies_is_an_error() {
 fn the_memory_limit_holds() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
-    fs::write(&path, png()).expect("written");
+    fs::write(&path, small_png()).expect("written");
     let limits = ImageLimits { side: 16384, memory_bytes: 23 };
     let error =
         load(&path, ImageEncoding::Color, limits, &unwatched, &CancelToken::new()).expect_err("24 bytes");
@@ -160,7 +206,7 @@ fn the_memory_limit_holds() {
 
 #[test]
 fn every_truncation_is_an_error_or_an_image_and_no_panic() {
-    let whole = png();
+    let whole = small_png();
     for length in 0..whole.len() {
         let _ = load_bytes("a.png", &whole[..length], ImageEncoding::Color);
     }
@@ -194,7 +240,7 @@ proptest::proptest! {
     #[test]
     fn garbage_never_panics(bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..300)) {
         for (name, start) in [
-            ("a.png", &png()[..33]),
+            ("a.png", &small_png()[..33]),
             ("a.ppm", b"P6 2 2 255\n"),
             ("a.ppm", b"P3 2 2 "),
             ("a.tga", b"\0\0\x02"),

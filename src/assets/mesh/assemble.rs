@@ -63,11 +63,13 @@ pub(super) struct Parsed {
     pub(super) materials: Vec<FileMaterial>,
     pub(super) warnings: Vec<String>,
     pub(super) companions: Vec<PathBuf>,
+    pub(super) pictures: Vec<PathBuf>,
 }
 
 /// Cut, drop, compact, complete.
 pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
-    let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings, companions } = parsed;
+    let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings, companions, pictures } =
+        parsed;
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
     let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
     cutter.cut_all(source, &faces)?;
@@ -82,7 +84,7 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
         *uv = Vec2::ZERO;
     }
     complete_normals(&mut mesh, source.watch.token)?;
-    Ok(LoadedMesh { mesh, materials, dropped, warnings, companions })
+    Ok(LoadedMesh { mesh, materials, dropped, warnings, companions, pictures })
 }
 
 fn no_usable_face(faces: usize, dropped: Dropped) -> String {

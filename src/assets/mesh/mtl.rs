@@ -1,6 +1,6 @@
 //! MTL by `tobj`, with the checks that it leaves to its caller.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::assets::read::{self, Watch};
 use crate::assets::{AssetError, FileMaterial};
@@ -16,13 +16,33 @@ const FILE_LIMIT: u64 = 64 << 20;
 pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>, AssetError> {
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
-    let text = String::from_utf8_lossy(&bytes);
-    for (index, line) in text.lines().enumerate() {
+    let mut text = String::with_capacity(bytes.len());
+    for (index, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
+        let line = without_comment(line);
         check(line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
+        text.push_str(line);
+        text.push('\n');
     }
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())
         .map_err(|error| AssetError::malformed(path, None, error.to_string()))?;
     Ok(materials)
+}
+
+/// A comment may follow numbers. In names `#` is a letter like others; what is a comment there is told by who looks
+/// them up.
+fn without_comment(line: &str) -> &str {
+    let is_numeric = matches!(
+        line.split_whitespace().next(),
+        Some("Ka" | "Kd" | "Ks" | "Ke" | "Ns" | "Ni" | "d" | "illum")
+    );
+    if is_numeric { line.split('#').next().unwrap_or(line) } else { line }
+}
+
+/// The text whole, then without its last comment, and so on.
+pub(super) fn cut_at_comments(text: &str) -> impl Iterator<Item = &str> {
+    let is_comment = |(at, _): &(usize, &str)| text[..*at].ends_with([' ', '\t']);
+    let cuts = text.rmatch_indices('#').filter(is_comment).map(|(at, _)| text[..at].trim_end());
+    std::iter::once(text).chain(cuts).filter(|text| !text.is_empty())
 }
 
 /// `tobj` panics on a colour of one number and takes `nan`.
@@ -55,7 +75,12 @@ fn check_words(keyword: &str, argument: Option<&str>) -> Result<(), String> {
 /// A material as the renderer knows it; files are relative to `folder`, the MTL's. What the file leaves out is as
 /// the format's readers have it: diffuse 0.6 grey without a texture, white with one.
 pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
-    let file = |name: Option<&str>| name.and_then(file_name).map(|name| folder.join(name));
+    let file = |statement: Option<&str>| {
+        let files =
+            cut_at_comments(statement?).filter_map(|statement| Some(folder.join(file_name(statement)?)));
+        let files: Vec<_> = files.collect();
+        files.iter().find(|file| file.exists()).or(files.first()).cloned()
+    };
     let extra = |key: &str| found.unknown_param.get(key).map(String::as_str);
     let diffuse_texture = file(found.diffuse_texture.as_deref());
     let plain = if diffuse_texture.is_some() { 1.0 } else { 0.6 };
@@ -71,6 +96,31 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
         specular_texture: file(found.specular_texture.as_deref()),
         normal_texture: file(extra("norm").or(extra("map_Kn")).or(found.normal_texture.as_deref())),
     }
+}
+
+/// The files of all maps of a material, also of those that nothing looks up.
+pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
+    let known = [
+        &found.ambient_texture,
+        &found.diffuse_texture,
+        &found.specular_texture,
+        &found.normal_texture,
+        &found.shininess_texture,
+        &found.dissolve_texture,
+    ];
+    let is_map =
+        |key: &str| key.starts_with("map_") || ["norm", "bump", "disp", "decal", "refl"].contains(&key);
+    let others = found.unknown_param.iter().filter(|(key, _)| is_map(key)).map(|(_, value)| value);
+    let mut names: Vec<String> = known
+        .into_iter()
+        .flatten()
+        .chain(others)
+        .flat_map(|text| cut_at_comments(text))
+        .filter_map(file_name)
+        .collect();
+    names.sort();
+    names.dedup();
+    names.into_iter().map(|name| folder.join(name)).collect()
 }
 
 /// Negative components are 0.
@@ -106,7 +156,6 @@ fn file_name(statement: &str) -> Option<String> {
 mod tests {
     use super::*;
     use crate::control::{CancelToken, unwatched};
-    use std::path::PathBuf;
 
     fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
         let folder = tempfile::tempdir().expect("a folder");
@@ -142,11 +191,49 @@ mod tests {
     }
 
     #[test]
+    fn the_pictures_of_all_maps_are_known() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.mtl");
+        let maps =
+            ["map_Ka", "map_Kd", "map_Ks", "map_Ns", "map_d", "map_Bump", "norm", "map_Ke", "disp", "decal"];
+        let statements = maps.map(|map| format!("{map} {map}.png\n")).concat();
+        std::fs::write(&path, format!("newmtl a\n{statements}refl -type sphere map_Kd.png\n"))
+            .expect("written");
+        let token = CancelToken::new();
+        let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+        let mut expected = maps.map(|map| PathBuf::from(format!("models/{map}.png")));
+        expected.sort();
+        assert_eq!(pictures(&found[0], Path::new("models")), expected);
+    }
+
+    #[test]
+    fn a_comment_may_follow_a_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("wall.png"), "").expect("written");
+        std::fs::write(folder.path().join("Map #1.png"), "").expect("written");
+        let file = |name: &str| Some(folder.path().join(name));
+        let text =
+            "newmtl a\nmap_Kd -s 2 2 2 wall.png # of brick\nmap_Ks Map #1.png # as it came\nnorm no #2.png\n";
+        let path = folder.path().join("a.mtl");
+        std::fs::write(&path, text).expect("written");
+        let token = CancelToken::new();
+        let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+        let found = material(&found[0], folder.path());
+        assert_eq!(found.diffuse_texture, file("wall.png"));
+        assert_eq!(found.specular_texture, file("Map #1.png"));
+        assert_eq!(found.normal_texture, file("no #2.png"), "as the file has it, where there is none");
+    }
+
+    #[test]
     fn errors_name_the_line() {
         let says = |text: &str| read(text).expect_err("refused").to_string();
         assert!(says("newmtl a\nKd 0.5\n").ends_with("a.mtl:2: `Kd` is followed by three finite numbers"));
         assert!(says("newmtl a\n\nNs nan\n").ends_with("a.mtl:3: `Ns` is followed by a finite number"));
         assert!(says("newmtl\n").ends_with("a.mtl:1: `newmtl` is followed by a name"));
+        assert!(
+            says("newmtl a # b\nKd 1 0 # 0\n").ends_with("a.mtl:2: `Kd` is followed by three finite numbers")
+        );
+        assert!(read("newmtl a\nKd 1 0 0# red\nillum 2#x\nNs 3#\n").is_ok());
         assert!(says("illum x\n").contains("whole number"));
         assert!(says("map_Kd\n").contains("followed by a file"));
     }

@@ -33,7 +33,7 @@ impl Reader<'_> {
         let header = self.header()?;
         let vertices = self.count("vertices")?;
         let faces = self.count("faces")?;
-        self.cursor.end_line();
+        self.end_counts()?;
         self.plausible(vertices, faces)?;
         let mut parsed = Parsed::default();
         self.vertices(header, vertices, &mut parsed)?;
@@ -86,12 +86,38 @@ impl Reader<'_> {
 
     fn count(&mut self, of: &str) -> Result<u64, AssetError> {
         if !self.cursor.skip_blank() {
-            return self.wrong(format!("the file ends before the number of {of}"));
+            let reason = format!("the file ends before the number of {of}");
+            return Err(self.source.wrong_at(self.source.bytes.trim_ascii_end().len(), reason));
         }
-        match self.cursor.integer().map(u64::try_from) {
-            Some(Ok(count)) => Ok(count),
-            _ => self.unexpected(&format!("the number of {of}")),
+        self.number(of)
+    }
+
+    /// The whole number ≥ 0 that starts here.
+    fn number(&mut self, of: &str) -> Result<u64, AssetError> {
+        match self.cursor.integer() {
+            Some(number) => match u64::try_from(number) {
+                Ok(number) => Ok(number),
+                Err(_) => self.wrong(format!("the number of {of} is {number}")),
+            },
+            None => self.unexpected(&format!("the number of {of}")),
         }
+    }
+
+    /// The number of edges, which nothing needs, may be missing.
+    fn end_counts(&mut self) -> Result<(), AssetError> {
+        if self.cursor.skip_in_line() {
+            self.number("edges")?;
+        }
+        if self.cursor.skip_in_line() {
+            let mut ahead = self.cursor;
+            return self.wrong(format!(
+                "expected the line's end behind the three counts, found {}; each vertex and each face stands on a line \
+                 of its own",
+                shown(ahead.word())
+            ));
+        }
+        self.cursor.end_line();
+        Ok(())
     }
 
     /// A vertex takes at least 6 bytes, a face at least 2: a header that claims more lies.
@@ -99,9 +125,18 @@ impl Reader<'_> {
         let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
         let remaining = self.cursor.remaining() as u64;
         if needed > remaining + 1 || vertices > u64::from(u32::MAX) {
-            let reason = format!(
-                "the header claims {vertices} vertices and {faces} faces, and only {remaining} bytes follow"
+            let count = |number: u64, one: &str, many: &str| {
+                format!("{number} {}", if number == 1 { one } else { many })
+            };
+            let claim = format!(
+                "the header claims {} and {}",
+                count(vertices, "vertex", "vertices"),
+                count(faces, "face", "faces")
             );
+            let reason = match remaining {
+                0 => format!("{claim}, and the file ends behind it"),
+                _ => format!("{claim}, and only {} follow", count(remaining, "byte", "bytes")),
+            };
             return Err(self.source.wrong_at(self.cursor.at().saturating_sub(1), reason));
         }
         Ok(())
@@ -168,10 +203,7 @@ impl Reader<'_> {
     }
 
     fn face(&mut self, vertices: u64, faces: &mut Faces) -> Result<(), AssetError> {
-        let arity = match self.cursor.integer().map(usize::try_from) {
-            Some(Ok(arity)) => arity,
-            _ => return self.unexpected("a number of corners"),
-        };
+        let arity = usize::try_from(self.number("corners")?).unwrap_or(usize::MAX);
         if arity.saturating_mul(2) > self.cursor.remaining() {
             return self.wrong(format!("a face claims {arity} corners, more than the file can hold"));
         }
@@ -271,7 +303,28 @@ mod tests {
         assert!(says("solid\n").starts_with("a.off:1: expected OFF, found \"solid\""));
         assert!(says("nOFF 3\n").contains("no kind of OFF"));
         assert!(says("OFF BINARY\n").contains("binary"));
-        assert!(says("OFF\n-1 2 0\n").contains("a.off:2: expected the number of vertices"));
+        for (text, reason) in [
+            ("OFF\n-1 2 0\n", "a.off:2: the number of vertices is -1"),
+            ("OFF -3 1 0\n", "a.off:1: the number of vertices is -3"),
+            ("OFF\n3 -1 0\n", "a.off:2: the number of faces is -1"),
+            ("OFF\n1.5 2 0\n", "a.off:2: expected the number of vertices, found \"1.5\""),
+            ("OFF\n3 x 0\n", "a.off:2: expected the number of faces, found \"x\""),
+            ("OFF 3\n", "a.off:1: the file ends before the number of faces"),
+            ("OFF", "a.off:1: the file ends before the number of vertices"),
+            ("OFF 3 1 0", "a.off:1: the header claims 3 vertices and 1 face, and the file ends behind it"),
+            ("OFF 3 1 x\n", "a.off:1: expected the number of edges, found \"x\""),
+            (
+                "OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2\n",
+                "a.off:1: expected the line's end behind the three counts, found \"0\"; each vertex and each face stands on a line of its own",
+            ),
+        ] {
+            assert_eq!(says(text), reason);
+        }
+        assert_eq!(says(&format!("{start}-3 0 1 2\n")), "a.off:7: the number of corners is -3");
+        assert_eq!(
+            says(&format!("{start}x 0 1 2\n")),
+            "a.off:7: expected the number of corners, found \"x\""
+        );
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //! | `asset` | `name`, `fraction` |
 //! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples` |
 //! | `written` | `path`, `bytes` |
+//! | `write_failed` | `message`: the report could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
 //! | `cancelled` | |
@@ -64,6 +65,7 @@ fn value(event: &Event) -> Option<Value> {
             "event": "done", "unchanged": unchanged, "seconds": report.seconds,
             "complete": report.image.complete, "diagnostics": diagnostics(warnings),
         }),
+        Event::WriteFailed { message, .. } => json!({ "event": "write_failed", "message": message }),
         Event::Failed { failure, .. } => failed(failure),
         Event::Cancelled { .. } => json!({ "event": "cancelled" }),
         _ => return None,
@@ -76,7 +78,7 @@ fn failed(failure: &Failure) -> Value {
             json!({ "event": "failed", "kind": "work", "message": message, "diagnostics": [] })
         }
         Failure::Scene(all) => json!({
-            "event": "failed", "kind": "scene", "message": "the scene is wrong", "diagnostics": diagnostics(all),
+            "event": "failed", "kind": "scene", "message": "the scene or the call is wrong", "diagnostics": diagnostics(all),
         }),
     }
 }

@@ -8,27 +8,41 @@ use crate::pipeline::protocol::{Event, RenderProgress, StageReport, Status};
 
 /// Longest silence of a render.
 const INTERVAL: Duration = Duration::from_secs(5);
-/// A line at every such part of a render.
-const STEP: f64 = 0.1;
+/// Lines of a whole render, beside those after a long silence.
+const STEPS: f64 = 10.0;
 
 pub(super) struct Plain {
     console: Console,
+    /// Steps of the render that were said.
     said: f64,
     last: Instant,
+    last_line: String,
 }
 
 impl Plain {
     pub(super) fn new(console: Console) -> Self {
-        Self { console, said: 0.0, last: Instant::now() }
+        Self { console, said: 0.0, last: Instant::now(), last_line: String::new() }
     }
 
     fn progress(&mut self, progress: &RenderProgress) {
-        let is_due = progress.fraction >= self.said + STEP || self.last.elapsed() >= INTERVAL;
-        if is_due && progress.fraction < 1.0 {
-            self.said = (progress.fraction / STEP).floor() * STEP;
-            self.last = Instant::now();
-            self.console.say(&line(progress));
+        if let Some(line) = self.due(progress) {
+            self.console.say(&line);
         }
+    }
+
+    /// The line to say now, never one twice.
+    fn due(&mut self, progress: &RenderProgress) -> Option<String> {
+        let step = (progress.fraction * STEPS).floor();
+        if progress.fraction >= 1.0 || (step <= self.said && self.last.elapsed() < INTERVAL) {
+            return None;
+        }
+        (self.said, self.last) = (step, Instant::now());
+        let line = line(progress);
+        if line == self.last_line {
+            return None;
+        }
+        self.last_line.clone_from(&line);
+        Some(line)
     }
 }
 
@@ -68,6 +82,31 @@ pub(super) fn stage_line(stage: &StageReport) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_line_is_said_twice() {
+        let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
+        let progress = |fraction, samples| RenderProgress {
+            fraction,
+            elapsed_seconds: 1.0,
+            eta_seconds: None,
+            samples,
+            total_samples: 100,
+        };
+        let mut said = Vec::new();
+        for samples in 0..100 {
+            // Each comes twice, as a pass ends and as the next begins.
+            said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
+            said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
+        }
+        let tens: Vec<_> = (1..10).map(|ten| line(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
+        assert_eq!(said, tens);
+        // After a long silence, and nothing new.
+        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
+        assert_eq!(plain.due(&progress(0.9, 90)), None);
+        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
+        assert!(plain.due(&progress(0.91, 91)).is_some());
+    }
 
     #[test]
     fn a_line_says_how_far_and_how_long() {

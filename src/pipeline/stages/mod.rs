@@ -14,6 +14,7 @@ pub(super) mod textures;
 pub(super) mod world;
 pub(super) mod write;
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -81,15 +82,18 @@ pub(super) struct Reading<'a> {
 /// What a request found out about files on its way.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
-    /// Everything that was read or tried.
+    /// Everything that was read or tried, each once.
     pub(super) files: Vec<FileRead>,
+    known: HashSet<FileRead>,
     pub(super) errors: Vec<Diagnostic>,
+    /// Why nothing is written, as it was found last.
+    pub(super) conflicts: Vec<Diagnostic>,
     pub(super) warnings: Vec<Diagnostic>,
 }
 
 impl Findings {
     pub(super) fn read(&mut self, file: FileRead) {
-        if !self.files.contains(&file) {
+        if self.known.insert(file.clone()) {
             self.files.push(file);
         }
     }

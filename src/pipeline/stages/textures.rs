@@ -1,6 +1,6 @@
 //! Image files that visible materials look up, several at once, each decoded only when its content changed.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -182,8 +182,9 @@ fn load_one(image: &Image<'_>, reading: &Reading<'_>) -> Result<(Arc<Texels>, bo
 
 /// For `check`: also the textures of the scene file that no visible material names.
 pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
+    let mut known: HashSet<PathBuf> = wanted.iter().map(|one| one.source.path.clone()).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {
-        if wanted.iter().any(|one| one.source.path == texture.file.value) {
+        if !known.insert(texture.file.value.clone()) {
             continue;
         }
         let encoding = match texture.encoding {

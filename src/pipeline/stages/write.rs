@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use super::super::inputs::Inputs;
 use super::super::plan::Plan;
 use super::super::protocol::{Failure, Writing};
 use super::super::sink::Sink;
+use super::super::targets::{conflicts, guarded};
 use super::super::watch::content::{Content, Contents};
 use super::canvas::Canvas;
 use super::{Staged, Stop};
@@ -21,10 +23,19 @@ use crate::scene::fingerprint::{Fingerprint, Key};
 pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
 
 impl Written {
-    /// Write everything next time: a person asked for it.
-    pub(in crate::pipeline) fn forget(&mut self) {
+    /// Write everything next time.
+    fn forget(&mut self) {
         self.0.clear();
     }
+}
+
+/// Where pictures go, and what must not be lost there.
+#[derive(Clone, Copy)]
+pub(in crate::pipeline) struct Destination<'a> {
+    pub(in crate::pipeline) plan: &'a Plan,
+    pub(in crate::pipeline) inputs: &'a Inputs,
+    pub(in crate::pipeline) contents: &'a Contents,
+    pub(in crate::pipeline) sink: &'a Sink,
 }
 
 /// Look at all targets before work is put into a picture for them, and say what is wrong.
@@ -53,7 +64,8 @@ fn find_targets(plan: &Plan) -> Result<(), OutputError> {
             BitDepth::try_from(plan.bit_depth)?,
         )
     };
-    plan.outputs.iter().try_for_each(check)
+    plan.outputs.iter().try_for_each(check)?;
+    plan.report.iter().try_for_each(|path| output::check_place(path))
 }
 
 /// The last stage of a request; whether the picture is on disk then.
@@ -63,19 +75,17 @@ fn find_targets(plan: &Plan) -> Result<(), OutputError> {
 pub(in crate::pipeline) fn write_if_wanted(
     writing: Writing,
     canvas: &Canvas,
-    plan: &Plan,
+    to: Destination<'_>,
     written: &mut Written,
-    contents: &Contents,
-    sink: &Sink,
     token: &CancelToken,
 ) -> Result<Staged<bool>, Stop> {
     if writing == Writing::No {
         return Ok(Staged::skipped(false, "nothing is to be written"));
     }
-    match write(canvas, plan, written, contents, sink, token) {
+    match write(canvas, to, written, token) {
         Ok(Staged { status, why, .. }) => Ok(Staged { value: true, status, why }),
         Err(Stop::Failed(Failure::Work(message))) if writing == Writing::Try => {
-            sink.write_failed(message.clone());
+            to.sink.write_failed(message.clone());
             Ok(Staged::skipped(false, message))
         }
         Err(stop) => Err(stop),
@@ -88,12 +98,11 @@ pub(in crate::pipeline) fn write_if_wanted(
 /// What went wrong, a line each; cancelled.
 pub(in crate::pipeline) fn write(
     canvas: &Canvas,
-    plan: &Plan,
+    to: Destination<'_>,
     written: &mut Written,
-    contents: &Contents,
-    sink: &Sink,
     token: &CancelToken,
 ) -> Result<Staged<()>, Stop> {
+    let Destination { plan, contents, sink, .. } = to;
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
@@ -106,7 +115,7 @@ pub(in crate::pipeline) fn write(
         }
         let image = radiance.get_or_insert_with(|| canvas.film.radiance());
         token.check()?;
-        match write_one(image, canvas, plan, path, token) {
+        match write_one(image, canvas, to, path, token) {
             Ok(bytes) => {
                 count += 1;
                 sink.written(path, bytes);
@@ -127,10 +136,23 @@ pub(in crate::pipeline) fn write(
     }
 }
 
+/// [`write`] for a person who asked for it, whatever is on disk. What goes wrong is said.
+pub(in crate::pipeline) fn write_by_hand(canvas: &Canvas, to: Destination<'_>, written: &mut Written) {
+    let conflicts = conflicts(to.plan, to.inputs);
+    if !conflicts.is_empty() {
+        return to.sink.refused(conflicts);
+    }
+    written.forget();
+    // A token that nobody cancels: this picture was asked for.
+    if let Err(Stop::Failed(Failure::Work(message))) = write(canvas, to, written, &CancelToken::new()) {
+        to.sink.write_failed(message);
+    }
+}
+
 fn write_one(
     image: &RadianceImage,
     canvas: &Canvas,
-    plan: &Plan,
+    Destination { plan, inputs, .. }: Destination<'_>,
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
@@ -140,7 +162,7 @@ fn write_one(
         metadata: metadata(canvas, plan),
     };
     let bytes = output::encode(image, &options, Format::of(path)?, token)?;
-    output::write::atomic_until(path, &bytes, token)?;
+    guarded(plan, inputs, path, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
 

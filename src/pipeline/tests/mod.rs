@@ -2,6 +2,7 @@
 
 mod orders;
 mod reuse;
+mod targets;
 
 use std::fs;
 use std::path::PathBuf;

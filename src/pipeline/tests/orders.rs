@@ -373,3 +373,23 @@ fn a_crop_outside_the_picture_is_a_wrong_call() {
     assert_eq!(report.counters.camera_rays, 2 * 5 * 4);
     assert!(report.image.complete);
 }
+
+#[test]
+fn warnings_are_said_before_anything_is_rendered() {
+    let mut bench = Bench::new(SCENE);
+    // A face without area.
+    bench.write("one.obj", &format!("{OBJ}f 1 1 2\n"));
+    bench.preview = Some(PreviewSize { width: 20, height: 20 });
+    let of = bench.send();
+    let events = bench.until_end(of);
+    let at = |what: &dyn Fn(&Event) -> bool| events.iter().position(what).expect("it is said");
+    let early = at(&|event| matches!(event, Event::Warnings { .. }));
+    assert!(early < at(&|event| matches!(event, Event::Progress { .. })));
+    assert!(early < at(&|event| matches!(event, Event::Preview { .. })));
+    let (Event::Warnings { warnings: early, .. }, Some(Event::Done { warnings, .. })) =
+        (&events[early], events.last())
+    else {
+        panic!("{events:?}")
+    };
+    assert_eq!((early, early.len()), (warnings, 1));
+}

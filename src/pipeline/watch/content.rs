@@ -1,7 +1,7 @@
 //! What a file holds, cheap to ask again: a hash that is taken anew only when the file may have changed.
 
 use std::collections::HashMap;
-use std::fs::{self, File, Metadata};
+use std::fs::{self, Metadata};
 use std::io::Read;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,10 @@ use std::time::{Duration, SystemTime};
 
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::fingerprint::Fingerprint;
+use crate::system::file::{self, Kind};
 
 /// A file that a request read or tried to read.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct FileRead {
     /// Its name.
     pub path: PathBuf,
@@ -140,14 +141,12 @@ impl Contents {
     pub fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
         token.check()?;
         let now = SystemTime::now();
-        let metadata = match fs::metadata(path) {
-            Ok(metadata) => metadata,
+        let metadata = match file::kind(path) {
+            Ok((Kind::Regular, metadata)) => metadata,
+            Ok((Kind::Folder | Kind::Special | Kind::Kernel, _)) => return Ok(Content::Unusable),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Content::Missing),
             Err(_) => return Ok(Content::Unusable),
         };
-        if !metadata.is_file() {
-            return Ok(Content::Unusable);
-        }
         let stamp = Stamp::of(&metadata);
         let known = self.known().get(path).filter(|(known, _)| *known == stamp).map(|(_, content)| *content);
         if let Some(content) = known {
@@ -179,7 +178,7 @@ impl Contents {
 }
 
 fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
-    let Ok(mut file) = File::open(path) else { return Ok(Content::Unusable) };
+    let Ok(Ok((mut file, _))) = file::open(path) else { return Ok(Content::Unusable) };
     let mut hasher = blake3::Hasher::new();
     let mut buffer = vec![0; CHUNK];
     loop {
@@ -196,6 +195,7 @@ fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs::File;
 
     #[test]
     fn content_counts_and_not_the_time_stamp() {
@@ -212,6 +212,8 @@ mod tests {
         fs::write(&path, "a").expect("written");
         assert_eq!(contents.read(&path, &token), Ok(first));
         assert_eq!(contents.read(folder.path(), &token), Ok(Content::Unusable));
+        #[cfg(target_os = "linux")]
+        assert_eq!(contents.read(Path::new("/proc/kmsg"), &token), Ok(Content::Unusable));
     }
 
     #[test]

@@ -5,8 +5,21 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use notify::event::{AccessKind, AccessMode, EventKind};
+use notify::event::{AccessKind, AccessMode, EventKind, ModifyKind, RenameMode};
 use notify::{Event, RecommendedWatcher, RecursiveMode, Watcher};
+
+/// What happened to a watched name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Hint {
+    /// It was closed after writing, or renamed into its place.
+    Whole(OsString),
+    /// It was written to, and is still open.
+    Written(OsString),
+    /// It was removed or renamed away.
+    Gone(OsString),
+    /// Something else, perhaps to a name that is not known.
+    Touched,
+}
 
 /// Watches folders for what happens to some names in them.
 #[derive(Debug)]
@@ -20,13 +33,13 @@ pub(super) struct Folders {
 }
 
 impl Folders {
-    pub(super) fn new(poll: bool, hint: impl Fn() + Send + 'static) -> Self {
+    pub(super) fn new(poll: bool, say: impl Fn(Hint) + Send + 'static) -> Self {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
         let of_interest = names.clone();
         let handler = move |event: notify::Result<Event>| {
             let names = of_interest.lock().unwrap_or_else(PoisonError::into_inner);
-            if event.map_or(true, |event| is_hint(&event, &names)) {
-                hint();
+            if let Some(hint) = event.map_or(Some(Hint::Touched), |event| hint(&event, &names)) {
+                say(hint);
             }
         };
         let watcher = if poll { None } else { notify::recommended_watcher(handler).ok() };
@@ -82,14 +95,29 @@ impl Folders {
     }
 }
 
-/// Reading is no change: a watcher that reads must not wake itself.
-fn is_hint(event: &Event, names: &HashSet<OsString>) -> bool {
-    let may_change = match event.kind {
-        EventKind::Access(kind) => kind == AccessKind::Close(AccessMode::Write),
-        _ => true,
+/// What an event says of these names. Reading is no change: a watcher that reads must not wake itself.
+fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
+    let mut of_paths = event.paths.iter().map(|path| path.file_name());
+    let named = of_paths.clone().flatten().find(|name| names.contains(*name)).map(ToOwned::to_owned);
+    // A path that has no name, or no path at all, may stand for any.
+    let Some(name) = named else {
+        let is_any = event.paths.is_empty() || of_paths.any(|name| name.is_none());
+        return (is_any && !matches!(event.kind, EventKind::Access(_))).then_some(Hint::Touched);
     };
-    let is_named = |path: &PathBuf| path.file_name().is_none_or(|name| names.contains(name));
-    may_change && (event.paths.is_empty() || event.paths.iter().any(is_named))
+    match event.kind {
+        EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(Hint::Whole(name)),
+        EventKind::Access(_) => None,
+        EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(Hint::Whole(name)),
+        // Its two ends are said as well, each by itself.
+        EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => None,
+        EventKind::Modify(ModifyKind::Data(_)) => Some(Hint::Written(name)),
+        EventKind::Modify(ModifyKind::Name(RenameMode::From)) | EventKind::Remove(_) => {
+            Some(Hint::Gone(name))
+        }
+        EventKind::Any | EventKind::Create(_) | EventKind::Modify(_) | EventKind::Other => {
+            Some(Hint::Touched)
+        }
+    }
 }
 
 /// Whether changes made by another machine would go unnoticed.
@@ -112,17 +140,38 @@ fn is_remote(_folder: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use notify::event::{CreateKind, DataChange, RemoveKind};
+
     use super::*;
+
+    #[test]
+    fn an_event_says_whether_a_save_is_over() {
+        let names = HashSet::from([OsString::from("a.toml")]);
+        let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
+        let name = || OsString::from("a.toml");
+        let closed = EventKind::Access(AccessKind::Close(AccessMode::Write));
+        let renamed = |mode| EventKind::Modify(ModifyKind::Name(mode));
+        assert_eq!(of(closed, "/x/a.toml"), Some(Hint::Whole(name())));
+        assert_eq!(of(renamed(RenameMode::To), "/x/a.toml"), Some(Hint::Whole(name())));
+        assert_eq!(of(renamed(RenameMode::From), "/x/a.toml"), Some(Hint::Gone(name())));
+        assert_eq!(of(renamed(RenameMode::Both), "/x/a.toml"), None);
+        assert_eq!(of(EventKind::Remove(RemoveKind::File), "/x/a.toml"), Some(Hint::Gone(name())));
+        let written = EventKind::Modify(ModifyKind::Data(DataChange::Any));
+        assert_eq!(of(written, "/x/a.toml"), Some(Hint::Written(name())));
+        assert_eq!(of(EventKind::Create(CreateKind::File), "/x/a.toml"), Some(Hint::Touched));
+    }
 
     #[test]
     fn reads_and_other_names_are_no_hint() {
         let names = HashSet::from([OsString::from("a.toml")]);
-        let event = |kind, path: &str| Event::new(kind).add_path(PathBuf::from(path));
-        let closed = EventKind::Access(AccessKind::Close(AccessMode::Write));
+        let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let opened = EventKind::Access(AccessKind::Open(AccessMode::Any));
-        assert!(is_hint(&event(closed, "/x/a.toml"), &names));
-        assert!(!is_hint(&event(opened, "/x/a.toml"), &names));
-        assert!(!is_hint(&event(closed, "/x/a.png"), &names));
-        assert!(is_hint(&Event::new(EventKind::Other), &names), "the queue overflowed");
+        let read = EventKind::Access(AccessKind::Close(AccessMode::Read));
+        assert_eq!(of(opened, "/x/a.toml"), None);
+        assert_eq!(of(read, "/x/a.toml"), None);
+        assert_eq!(of(EventKind::Access(AccessKind::Close(AccessMode::Write)), "/x/a.png"), None);
+        assert_eq!(of(EventKind::Create(CreateKind::File), "/x/b"), None);
+        let overflow = Event::new(EventKind::Other);
+        assert_eq!(hint(&overflow, &names), Some(Hint::Touched), "the queue overflowed");
     }
 }

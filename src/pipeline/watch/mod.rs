@@ -1,12 +1,17 @@
 //! Says when a file that a scene depends on holds something else.
 //!
 //! Editors save in many ways: in place, by rename, by unlink and rewrite. So folders are watched, of the name and
-//! of what a link leads to; what happens there is taken as a hint only. After a short quiet the files' contents
-//! are compared, and only a difference counts. Where hints cannot be had (network file systems, no watches left)
+//! of what a link leads to; what happens there is taken as a hint only. The files' contents are compared, and only a
+//! difference counts. A file that was closed after writing or renamed into its place is looked at at once; one that
+//! is still being written, after a short quiet. Where hints cannot be had (network file systems, no watches left)
 //! the contents' time stamps are looked at several times a second, and every two seconds everywhere.
+//!
+//! A program may write in pieces. So what was said of a file is followed by [`News::Settled`] once nothing more is to be
+//! expected: whoever finds the file broken waits for that before saying so.
 
 pub mod content;
 mod folders;
+mod growth;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -15,19 +20,55 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use self::content::{Content, Contents, FileRead};
-use self::folders::Folders;
+use self::folders::{Folders, Hint};
+use self::growth::Growth;
 use crate::control::CancelToken;
 
-/// Time without a hint after which a save is taken to be over.
-const QUIET: Duration = Duration::from_millis(40);
-/// The same where a file is missing: most likely it is being replaced.
-const QUIET_MISSING: Duration = Duration::from_millis(250);
-/// The longest wait for quiet.
-const PATIENCE: Duration = Duration::from_millis(500);
 /// Between two looks where hints are had.
 const HEARTBEAT: Duration = Duration::from_secs(2);
 /// Between two looks where no hints are had.
 const POLL: Duration = Duration::from_millis(200);
+/// Between two changes that are said, at least: time for a first picture where saves never stop.
+const BETWEEN_CHANGES: Duration = Duration::from_millis(100);
+
+/// How long files may be still or in motion before something is made of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Waits {
+    /// Without a hint, after which a file that is being written is looked at.
+    quiet: Duration,
+    /// The same where a file is missing or empty: most likely it is being replaced.
+    quiet_missing: Duration,
+    /// The longest wait for quiet.
+    longest: Duration,
+    /// Without a hint, after which files are settled. Programs that write a file in two goes take a fraction of it.
+    settle: Duration,
+    /// The same while a file was written and not closed: longer than a network makes `scp` or `sftp` pause.
+    settle_open: Duration,
+    /// The longest that files are unsettled, whatever happens to them.
+    settle_longest: Duration,
+}
+
+impl Default for Waits {
+    fn default() -> Self {
+        Self {
+            quiet: Duration::from_millis(40),
+            quiet_missing: Duration::from_millis(250),
+            longest: Duration::from_secs(2),
+            settle: Duration::from_millis(400),
+            settle_open: Duration::from_secs(2),
+            settle_longest: Duration::from_secs(10),
+        }
+    }
+}
+
+/// What a watcher says.
+#[derive(Clone, Copy, Debug)]
+pub enum News {
+    /// Some file holds something else, whole as far as can be told.
+    Changed(Changed),
+    /// What was said to have changed stays as it is: nobody seems to be writing.
+    Settled,
+}
 
 /// Some file holds something else.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +85,7 @@ pub struct Watcher {
 
 enum Message {
     /// Something happened to a watched name.
-    Hint,
+    Hint(Hint),
     /// Watch these.
     Files(Vec<FileRead>),
     Quit,
@@ -59,16 +100,25 @@ impl Watcher {
     pub fn start(
         poll: bool,
         contents: Arc<Contents>,
-        changed: impl FnMut(Changed) + Send + 'static,
+        say: impl FnMut(News) + Send + 'static,
+    ) -> std::io::Result<Self> {
+        Self::start_with(poll, contents, Waits::default(), say)
+    }
+
+    fn start_with(
+        poll: bool,
+        contents: Arc<Contents>,
+        waits: Waits,
+        say: impl FnMut(News) + Send + 'static,
     ) -> std::io::Result<Self> {
         let (orders, received) = mpsc::channel();
         let hints = orders.clone();
-        let folders = Folders::new(poll, move || {
+        let folders = Folders::new(poll, move |hint| {
             // The watcher is gone: nobody wants hints.
-            let _ = hints.send(Message::Hint);
+            let _ = hints.send(Message::Hint(hint));
         });
-        let watch =
-            Watch { folders, contents, files: HashMap::new(), signs: None, pending: Vec::new(), changed };
+        let growth = Growth::new(waits);
+        let watch = Watch { folders, contents, files: HashMap::new(), growth, pending: Vec::new(), say };
         std::thread::Builder::new().name("glimt-watch".to_owned()).spawn(move || watch.run(&received))?;
         Ok(Self { orders })
     }
@@ -91,38 +141,29 @@ struct Watch<F> {
     contents: Arc<Contents>,
     /// What the files held when that was last said, or when they were last read.
     files: HashMap<PathBuf, Content>,
-    /// When the first sign of a change came, and the latest.
-    signs: Option<(Instant, Instant)>,
-    /// What was found by a look without a sign before it.
+    growth: Growth,
+    /// What the last look found and did not say.
     pending: Vec<FileRead>,
-    changed: F,
+    say: F,
 }
 
-impl<F: FnMut(Changed)> Watch<F> {
+impl<F: FnMut(News)> Watch<F> {
     fn run(mut self, orders: &Receiver<Message>) {
         loop {
-            match orders.recv_timeout(self.pause()) {
-                Ok(Message::Hint) => self.sign(),
+            let pause = self.next_look().saturating_duration_since(Instant::now());
+            match orders.recv_timeout(pause) {
+                Ok(Message::Hint(hint)) => self.growth.hint(hint, Instant::now()),
                 Ok(Message::Files(files)) => self.set(files),
-                Err(RecvTimeoutError::Timeout) => self.look(),
+                Err(RecvTimeoutError::Timeout) => self.look(Instant::now()),
                 Ok(Message::Quit) | Err(RecvTimeoutError::Disconnected) => return,
             }
         }
     }
 
-    fn pause(&self) -> Duration {
-        match self.signs {
-            Some((first, latest)) => {
-                (latest + QUIET).min(first + PATIENCE).saturating_duration_since(Instant::now())
-            }
-            None if self.folders.gives_hints() => HEARTBEAT,
-            None => POLL,
-        }
-    }
-
-    fn sign(&mut self) {
-        let now = Instant::now();
-        self.signs = Some((self.signs.map_or(now, |(first, _)| first), now));
+    fn next_look(&self) -> Instant {
+        let pause = if self.folders.gives_hints() { HEARTBEAT } else { POLL };
+        let unhinted = Instant::now() + pause;
+        self.growth.due().map_or(unhinted, |due| due.min(unhinted))
     }
 
     fn set(&mut self, files: Vec<FileRead>) {
@@ -135,33 +176,46 @@ impl<F: FnMut(Changed)> Watch<F> {
         self.contents.retain(|path| self.files.contains_key(path));
         self.folders.set(self.files.keys());
         if self.files.keys().any(|path| !before.contains_key(path)) {
-            self.sign();
+            self.growth.hint(Hint::Touched, Instant::now());
         }
     }
 
-    /// It was quiet for long enough, or it is time for a look without a sign.
-    fn look(&mut self) {
+    /// It is time for a look, by the signs or without any.
+    fn look(&mut self, now: Instant) {
         let found = self.differences();
-        let Some((first, _)) = self.signs.filter(|_| !found.is_empty()) else {
-            self.signs = None;
-            if !found.is_empty() {
-                self.folders.renew();
-                self.pending = found;
-                self.sign();
+        let is_said = !self.is_early(&found, now);
+        if is_said {
+            for FileRead { path, content } in found {
+                self.files.insert(path, content);
             }
-            return;
+            let noticed = self.growth.said(now);
+            (self.say)(News::Changed(Changed { noticed }));
+        }
+        if self.growth.settles(now) {
+            (self.say)(News::Settled);
+        }
+    }
+
+    /// Whether there is nothing to say of what a look found, not yet at least.
+    fn is_early(&mut self, found: &[FileRead], now: Instant) -> bool {
+        let before = std::mem::take(&mut self.pending);
+        if found.is_empty() {
+            self.growth.saw_nothing();
+            return true;
+        }
+        let is_early = if self.growth.is_signed() {
+            let moves = !before.is_empty() && before != found;
+            self.growth.is_early(is_missing(found), moves, now)
+        } else {
+            // A hint was missed, or there are none: whether it is still being written the next look tells.
+            self.folders.renew();
+            self.growth.hint(Hint::Touched, now);
+            true
         };
-        let moves = !self.pending.is_empty() && self.pending != found;
-        self.pending.clear();
-        if first.elapsed() < PATIENCE && (moves || (first.elapsed() < QUIET_MISSING && is_half_way(&found))) {
-            self.pending = found;
-            return self.sign();
+        if is_early {
+            self.pending = found.to_vec();
         }
-        for FileRead { path, content } in found {
-            self.files.insert(path, content);
-        }
-        self.signs = None;
-        (self.changed)(Changed { noticed: first });
+        is_early
     }
 
     /// Files that do not hold what was last said of them.
@@ -180,7 +234,7 @@ impl<F: FnMut(Changed)> Watch<F> {
 }
 
 /// Whether a file is missing or empty: probably in the middle of being replaced.
-fn is_half_way(files: &[FileRead]) -> bool {
+fn is_missing(files: &[FileRead]) -> bool {
     let empty = Content::Hash(*blake3::hash(b"").as_bytes());
     files.iter().any(|file| file.content == Content::Missing || file.content == empty)
 }

@@ -1,4 +1,5 @@
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 
@@ -7,23 +8,30 @@ use super::*;
 /// Long after the last change that counts.
 const SETTLE: Duration = Duration::from_millis(900);
 
+/// Longer than any test.
+const NEVER: Duration = Duration::from_secs(3600);
+
 struct Scratch {
     folder: tempfile::TempDir,
-    changes: Receiver<Changed>,
+    news: Receiver<News>,
     watcher: Watcher,
 }
 
 impl Scratch {
     /// `a.toml` with the content `0`, watched.
     fn new(poll: bool) -> Self {
+        Self::with(poll, Waits::default())
+    }
+
+    fn with(poll: bool, waits: Waits) -> Self {
         let folder = tempfile::tempdir().expect("a scratch folder");
         fs::write(folder.path().join("a.toml"), "0").expect("written");
-        let (sender, changes) = channel();
-        let watcher = Watcher::start(poll, Arc::default(), move |changed| {
-            let _ = sender.send(changed);
+        let (sender, news) = channel();
+        let watcher = Watcher::start_with(poll, Arc::default(), waits, move |news| {
+            let _ = sender.send(news);
         });
         let watcher = watcher.expect("a thread");
-        let scratch = Self { folder, changes, watcher };
+        let scratch = Self { folder, news, watcher };
         scratch.watch(&[&scratch.path("a.toml")]);
         scratch
     }
@@ -43,16 +51,22 @@ impl Scratch {
         std::thread::sleep(Duration::from_millis(150));
     }
 
-    /// Waits for one change and that no second one follows.
+    #[track_caller]
+    fn next(&self) -> News {
+        self.news.recv_timeout(Duration::from_secs(60)).expect("something is said")
+    }
+
+    /// Waits for one change and that nothing follows but that the files are quiet.
     #[track_caller]
     fn expect_one(&self) {
-        self.changes.recv_timeout(Duration::from_secs(10)).expect("the change was noticed");
+        assert!(matches!(self.next(), News::Changed(_)), "it is the first that is said");
+        assert!(matches!(self.next(), News::Settled), "a change too many");
         self.expect_none();
     }
 
     #[track_caller]
     fn expect_none(&self) {
-        assert!(self.changes.recv_timeout(SETTLE).is_err(), "a change too many");
+        assert!(self.news.recv_timeout(SETTLE).is_err(), "news too many");
     }
 
     /// Three saves with distinct contents, each noticed once.
@@ -192,13 +206,101 @@ fn a_change_between_reading_and_watching_is_seen() {
 #[test]
 fn saves_without_a_pause_are_said_now_and_then() {
     let scratch = Scratch::new(false);
+    let begin = Instant::now();
     for i in 0..150 {
         fs::write(scratch.path("a.toml"), format!("{i}")).expect("written");
         std::thread::sleep(Duration::from_millis(10));
     }
-    let during = scratch.changes.try_iter().count();
-    assert!((1..=5).contains(&during), "{during} changes said in 1.5 s of saves");
+    let most = begin.elapsed().div_duration_f64(BETWEEN_CHANGES) as usize + 1;
+    let during = scratch.news.try_iter().filter(|news| matches!(news, News::Changed(_))).count();
+    assert!((1..=most).contains(&during), "{during} changes said, {most} may be");
+    let last = fs::read(scratch.path("a.toml")).expect("read");
     std::thread::sleep(SETTLE);
-    scratch.changes.try_iter().count();
+    scratch.news.try_iter().count();
+    fs::write(scratch.path("a.toml"), last).expect("written");
     scratch.expect_none();
+}
+
+/// Whatever needs a quiet time is never said.
+fn impatient() -> Scratch {
+    Scratch::with(false, Waits { quiet: NEVER, longest: NEVER, ..Waits::default() })
+}
+
+#[test]
+fn a_file_that_is_closed_after_writing_is_whole() {
+    let scratch = impatient();
+    scratch.three_saves(|content| fs::write(scratch.path("a.toml"), content).expect("written"));
+}
+
+#[test]
+fn a_file_that_is_renamed_into_its_place_is_whole() {
+    let scratch = impatient();
+    scratch.three_saves(|content| {
+        fs::write(scratch.path("a.toml.tmp"), content).expect("written");
+        fs::rename(scratch.path("a.toml.tmp"), scratch.path("a.toml")).expect("renamed");
+    });
+}
+
+#[test]
+fn a_save_by_way_of_a_backup_is_whole_at_its_last_step() {
+    let scratch = impatient();
+    scratch.three_saves(|content| {
+        fs::rename(scratch.path("a.toml"), scratch.path("a.toml~")).expect("renamed");
+        fs::write(scratch.path("a.toml"), content).expect("written");
+        fs::remove_file(scratch.path("a.toml~")).expect("removed");
+    });
+    scratch.three_saves(|content| {
+        fs::remove_file(scratch.path("a.toml")).expect("removed");
+        fs::write(scratch.path("a.toml"), format!("{content} more")).expect("written");
+    });
+}
+
+/// The watched file opened for writing, empty now.
+fn open(scratch: &Scratch) -> fs::File {
+    fs::File::create(scratch.path("a.toml")).expect("opened")
+}
+
+#[test]
+fn a_file_that_is_still_open_is_looked_at_when_it_is_closed() {
+    let scratch = impatient();
+    let mut file = open(&scratch);
+    file.write_all(b"half").expect("written");
+    assert!(scratch.news.recv_timeout(SETTLE).is_err(), "it is still growing");
+    file.write_all(b" and half").expect("written");
+    drop(file);
+    scratch.expect_one();
+}
+
+#[test]
+fn a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until_it_is_closed() {
+    let scratch = Scratch::with(false, Waits { settle_open: NEVER, ..Waits::default() });
+    let mut file = open(&scratch);
+    file.write_all(b"half").expect("written");
+    assert!(matches!(scratch.next(), News::Changed(_)));
+    scratch.expect_none();
+    file.write_all(b" and half").expect("written");
+    assert!(matches!(scratch.next(), News::Changed(_)));
+    scratch.expect_none();
+    drop(file);
+    assert!(matches!(scratch.next(), News::Settled));
+}
+
+#[test]
+fn a_file_that_comes_in_two_pieces_settles_after_the_second() {
+    let scratch = Scratch::with(false, Waits { settle: 5 * Waits::default().settle, ..Waits::default() });
+    fs::write(scratch.path("a.toml"), "half").expect("written");
+    assert!(matches!(scratch.next(), News::Changed(_)));
+    std::thread::sleep(Duration::from_millis(200));
+    fs::write(scratch.path("a.toml"), "half and half").expect("written");
+    scratch.expect_one();
+}
+
+#[test]
+fn a_file_that_never_ends_settles_at_last() {
+    let waits = Waits { settle_open: NEVER, settle_longest: Duration::from_millis(300), ..Waits::default() };
+    let scratch = Scratch::with(false, waits);
+    let mut file = open(&scratch);
+    file.write_all(b"half").expect("written");
+    assert!(matches!(scratch.next(), News::Changed(_)));
+    assert!(matches!(scratch.next(), News::Settled));
 }

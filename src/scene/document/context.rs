@@ -15,6 +15,14 @@ pub(super) struct Context<'a> {
     lines: OnceCell<LineIndex>,
     issues: RefCell<Vec<Issue>>,
     uncollected: Cell<usize>,
+    searches: Cell<Searches>,
+}
+
+/// How often a name was looked for among many, and with how many it was compared.
+#[derive(Clone, Copy, Default)]
+struct Searches {
+    count: usize,
+    comparisons: usize,
 }
 
 /// A diagnostic before it has its file.
@@ -85,7 +93,8 @@ impl Issue {
 
 impl<'a> Context<'a> {
     pub(super) fn new(source: Arc<str>, path: &'a Path) -> Self {
-        Self { source, path, lines: OnceCell::new(), issues: RefCell::default(), uncollected: Cell::new(0) }
+        let (lines, issues, uncollected, searches) = Default::default();
+        Self { source, path, lines, issues, uncollected, searches }
     }
 
     /// Adds to the list.
@@ -112,9 +121,26 @@ impl<'a> Context<'a> {
         self.source.get(span.clone()).unwrap_or_default()
     }
 
+    /// Looks for a name in what may be a long list. Each search costs as much as the list is long, so that only the
+    /// first few dozen of a file are made: a file with more wrong names has one mistake many times.
+    pub(super) fn search<T>(&self, comparisons: usize, look: impl FnOnce() -> Option<T>) -> Option<T> {
+        let Searches { count, comparisons: before } = self.searches.get();
+        if count >= MOST_SEARCHES || before >= MOST_COMPARISONS {
+            return None;
+        }
+        self.searches.set(Searches { count: count + 1, comparisons: before + comparisons });
+        look()
+    }
+
+    /// How many names were compared.
+    #[cfg(test)]
+    pub(super) fn comparisons(&self) -> usize {
+        self.searches.get().comparisons
+    }
+
     /// The line of a byte of the text, from 1.
     pub(super) fn line(&self, offset: usize) -> usize {
-        self.lines().locate(&self.source, offset).0
+        self.lines().line(offset)
     }
 
     /// The text of a line, counted from 1.
@@ -161,6 +187,12 @@ impl<'a> Context<'a> {
 
 /// Nobody reads on from here.
 const MOST_ISSUES: usize = 500;
+
+/// Searches for the nearest of many names that are made for one file.
+const MOST_SEARCHES: usize = 48;
+
+/// No search begins after this many names were compared.
+const MOST_COMPARISONS: usize = 200_000;
 
 /// Enough to find the first of them in the order of the file, in all files but monstrous ones.
 const MOST_COLLECTED: usize = 10_000;

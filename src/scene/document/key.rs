@@ -6,15 +6,13 @@ mod file;
 
 use std::ops::{Range, RangeInclusive};
 
-use toml::de::DeValue;
-
 use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
 use super::limits::Limits;
 use super::names::Names;
-use super::table::Table;
-use super::value::{Value, found, limited, whole, wrong_type};
+use super::table::{Table, Title};
+use super::value::{Item, Value, found, limited, whole, wrong_type};
 use crate::choice::Choice;
 use crate::math::{DVec3, Vec2};
 
@@ -64,11 +62,11 @@ impl<'a> Key<'a> {
     /// A whole number. `N` holds every number of the range.
     pub(super) fn whole<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
         let value = self.value?;
-        let DeValue::Integer(integer) = value.get_ref() else {
+        let Item::Integer { digits, radix } = value.item() else {
             wrong_type(self.context, self.name, value, "a whole number");
             return None;
         };
-        let number = whole(integer).filter(|number| range.contains(number));
+        let number = whole(digits, radix).filter(|number| range.contains(number));
         if number.is_none() {
             let (name, low, high) = (self.name, range.start(), range.end());
             let message = format!("`{name}` must be a whole number between {low} and {high}");
@@ -81,32 +79,44 @@ impl<'a> Key<'a> {
     /// `true` or `false`.
     pub(super) fn flag(&self) -> Option<bool> {
         let value = self.value?;
-        let flag = value.get_ref().as_bool();
-        if flag.is_none() {
-            wrong_type(self.context, self.name, value, "true or false");
+        if let Item::Boolean(flag) = value.item() {
+            return Some(flag);
         }
-        flag
+        wrong_type(self.context, self.name, value, "true or false");
+        None
     }
 
     /// A string; `expected` says of what.
     pub(super) fn text(&self, expected: &str) -> Option<&'a str> {
+        self.text_or(|| expected.to_owned())
+    }
+
+    /// A string, or an error that says what is expected.
+    fn text_or(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
-        let text = value.get_ref().as_str();
-        if text.is_none() {
-            wrong_type(self.context, self.name, value, expected);
+        if let Item::String(text) = value.item() {
+            return Some(text);
         }
-        text
+        wrong_type(self.context, self.name, value, &expected());
+        None
+    }
+
+    /// Whether its value is a table.
+    pub(super) fn is_table(&self) -> bool {
+        self.value.is_some_and(|value| matches!(value.item(), Item::Table(_)))
     }
 
     /// A value by its name.
     pub(super) fn choice<C: Choice>(&self) -> Option<C> {
-        let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
-        let list = if C::ALL.len() == 1 { list } else { format!("one of {list}") };
-        let text = self.text(&list)?;
+        let list = || {
+            let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
+            if C::ALL.len() == 1 { list } else { format!("one of {list}") }
+        };
+        let text = self.text_or(list)?;
         if let Some(meant) = C::named(text) {
             return Some(meant);
         }
-        let (span, name, shown) = (self.span()?, self.name, shortened(text, 32));
+        let (span, name, shown, list) = (self.span()?, self.name, shortened(text, 32), list());
         let mut issue = if C::UNAVAILABLE.contains(&text) {
             let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
             Issue::error(span, message)
@@ -138,37 +148,43 @@ impl<'a> Key<'a> {
     /// As many numbers as the array has room for; every wrong one is reported.
     fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
-        let Some(array) = value.get_ref().as_array().filter(|array| array.len() == N) else {
-            wrong_type(self.context, self.name, value, expected);
-            return None;
+        let array = match value.item() {
+            Item::Array(array) if array.len() == N => array,
+            _ => {
+                wrong_type(self.context, self.name, value, expected);
+                return None;
+            }
         };
-        let read = |one| limited(self.context, self.name, one, limits, expected);
-        let components: Vec<Option<f64>> = array.iter().map(read).collect();
-        components.into_iter().collect::<Option<Vec<_>>>()?.try_into().ok()
+        let mut numbers = [Some(0.0); N];
+        for (number, one) in numbers.iter_mut().zip(array.iter()) {
+            *number = limited(self.context, self.name, one, limits, expected);
+        }
+        let is_whole = numbers.iter().all(Option::is_some);
+        is_whole.then(|| numbers.map(Option::unwrap_or_default))
     }
 
     /// A number for all three axes, or three.
     pub(super) fn scale(&self, limits: Limits) -> Option<DVec3> {
-        match self.value?.get_ref() {
-            DeValue::Integer(_) | DeValue::Float(_) => self.number(limits).map(DVec3::splat),
+        match self.value?.item() {
+            Item::Integer { .. } | Item::Float(_) => self.number(limits).map(DVec3::splat),
             _ => self.numbers(limits, "a number or three, [x, y, z]").map(DVec3::from_array),
         }
     }
 
     /// The index of a thing that is named elsewhere in the file.
     pub(super) fn name_in(&self, names: &Names) -> Option<usize> {
-        let text = self.text(&format!("the name of a {}", names.kind))?;
+        let text = self.text_or(|| format!("the name of a {}", names.kind))?;
         let index = names.find(text);
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, shortened(text, 40));
             let issue = Issue::error(self.span()?, message).absence();
-            self.context.report(names.advise(issue, text));
+            self.context.report(names.advise(self.context, issue, text));
         }
         index
     }
 
     /// The value as a table of its own, `{ … }`.
     pub(super) fn inline_table(&self) -> Option<Table<'a>> {
-        Table::of(self.context, self.value?, format!("`{}`", self.name))
+        Table::of(self.context, self.value?, Title::Key(self.name))
     }
 }

@@ -16,7 +16,7 @@ choice! {
 }
 
 pub(super) fn read(root: &Table<'_>) -> Option<Vec<PointLight>> {
-    let read: Vec<Option<PointLight>> = root.tables("light").iter().map(light).collect();
+    let read: Vec<Option<PointLight>> = root.tables("light").map(|table| light(&table)).collect();
     read.into_iter().collect()
 }
 

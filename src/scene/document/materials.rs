@@ -90,9 +90,7 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
 }
 
 fn emission(key: &Key<'_>) -> Vec3 {
-    if let Some((value, span)) = key.value.zip(key.span())
-        && value.get_ref().is_table()
-    {
+    if let Some(span) = key.span().filter(|_| key.is_table()) {
         let issue = Issue::error(span, "a texture in `emission` is not supported yet")
             .help("give it a colour, [r, g, b] or \"#rrggbb\"");
         key.context.report(issue);

@@ -19,10 +19,8 @@ mod value;
 use std::path::Path;
 use std::sync::Arc;
 
-use toml::de::DeTable;
-
-use super::Outcome;
 use super::description::Scene;
+use super::{MAX_FILE_BYTES, Outcome, toml};
 use crate::math::Vec3;
 use context::{Context, Issue};
 use table::Table;
@@ -35,9 +33,14 @@ pub(super) fn lower(source: &Arc<str>, path: &Path) -> Outcome {
         context.report(Issue::error(0..0, "the scene file is empty").help(help));
         return Outcome { scene: None, diagnostics: context.finish(&[]) };
     }
-    let (root, errors) = DeTable::parse_recoverable(source);
-    let broken_lines = syntax::report(&context, &errors);
-    let scene = scene(&Table::root(&context, root.get_ref()));
+    if source.len() as u64 > MAX_FILE_BYTES {
+        let message = format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20);
+        context.report(Issue::error(0..0, message));
+        return Outcome { scene: None, diagnostics: context.finish(&[]) };
+    }
+    let (document, errors) = toml::parse(source);
+    let broken_lines = syntax::report(&context, errors);
+    let scene = scene(&Table::root(&context, document.root()));
     let has_errors = context.has_errors();
     Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines) }
 }

@@ -38,7 +38,7 @@ impl Names {
     }
 
     /// Adds to an issue about an unknown name what there is.
-    pub(super) fn advise(&self, issue: Issue, name: &str) -> Issue {
+    pub(super) fn advise(&self, context: &Context<'_>, issue: Issue, name: &str) -> Issue {
         const MOST: usize = 12;
         let kind = self.kind;
         let known = || self.entries.iter().map(|entry| entry.name.as_str());
@@ -51,7 +51,7 @@ impl Names {
             _ => format!("there are {list}"),
         };
         let issue = issue.help(help);
-        match nearest(name, known()) {
+        match context.search(self.entries.len(), || nearest(name, known())) {
             Some(near) => issue.label(format!("did you mean {}?", quoted(near))),
             None => issue,
         }
@@ -62,6 +62,31 @@ impl Names {
         for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
             let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));
             context.report(Issue::warning(entry.span.clone(), message));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Comparisons that as many wrong names cost as there are names.
+    fn comparisons(count: usize) -> usize {
+        let context = Context::new("".into(), Path::new("scene.toml"));
+        let names = Names::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));
+        for number in 0..count {
+            names.advise(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));
+        }
+        context.comparisons()
+    }
+
+    #[test]
+    fn many_wrong_names_among_many_are_compared_in_linear_time() {
+        assert_eq!(comparisons(10), 100);
+        for count in [1_000, 10_000, 50_000] {
+            assert!(comparisons(count) <= 250_000, "{count} names: {}", comparisons(count));
         }
     }
 }

@@ -3,28 +3,21 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use toml::de::Error;
-
 use super::super::sanitize::shortened;
+use super::super::toml::SyntaxError;
 use super::context::{Context, Issue};
 
 /// Reports the first error of each line; the others follow from it. Gives the lines that are not to be
 /// trusted, in order: those with errors, and those under a broken header, whose keys seem to be another
 /// table's.
-pub(super) fn report(context: &Context<'_>, errors: &[Error]) -> Vec<Range<usize>> {
-    const MOST_ERRORS: usize = 2_000;
+pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec<Range<usize>> {
     let mut lines = BTreeSet::new();
-    let mut spans: Vec<(Range<usize>, &str)> = errors
-        .iter()
-        .take(MOST_ERRORS)
-        .map(|error| (error.span().unwrap_or(0..0), error.message()))
-        .collect();
-    spans.sort_by_key(|(span, _)| span.start);
+    errors.sort_by_key(|error| error.span.start);
     let mut in_open_array = false;
-    for (span, message) in spans {
-        let lacks_comma = message.starts_with(MISSING_COMMA);
-        if lines.insert(context.line(span.start)) && !(lacks_comma && in_open_array) {
-            context.report(issue(context, span, message).syntax());
+    for error in errors {
+        let lacks_comma = error.what == MISSING_COMMA;
+        if lines.insert(context.line(error.span.start)) && !(lacks_comma && in_open_array) {
+            context.report(issue(context, error).syntax());
         }
         in_open_array = lacks_comma;
     }
@@ -42,11 +35,11 @@ fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
     (line + 1..).find(|next| is_header(*next) != Some(false)).unwrap_or(usize::MAX)
 }
 
-fn issue(context: &Context<'_>, span: Range<usize>, message: &str) -> Issue {
-    let (what, expected) = message.split_once(", expected ").unwrap_or((message, ""));
+fn issue(context: &Context<'_>, SyntaxError { span, what, expected }: SyntaxError) -> Issue {
+    let expected = expected.unwrap_or_default();
     let written = shortened(context.text(&span), 40);
     let error = |words: &str| Issue::error(span.clone(), words);
-    match what {
+    match what.as_str() {
         "duplicate key" => Issue::error(span, format!("`{written}` is given twice"))
             .label("the second time")
             .help("keep one of the two; a shape's header has double brackets, such as [[sphere]]"),
@@ -73,7 +66,7 @@ fn issue(context: &Context<'_>, span: Range<usize>, message: &str) -> Issue {
         what if what.contains("must be quoted") => not_a_value(span, &written),
         what => {
             let issue = Issue::error(span, format!("this is not TOML: {what}"));
-            match expected {
+            match expected.as_str() {
                 "" => issue,
                 "nothing" => issue.help("remove it"),
                 expected => issue.help(format!("expected {expected}")),

@@ -1,52 +1,73 @@
 //! A TOML table that knows which of its keys were asked for.
 
 use std::cell::RefCell;
+use std::fmt;
 use std::ops::Range;
-
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 
 use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
+use super::super::toml::{Entries, KeyValue};
 use super::context::{Context, Issue};
 use super::key::Key;
-use super::value::found;
+use super::value::{Item, Value, found};
+
+/// What messages call a table.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Title<'a> {
+    /// The file itself.
+    Root,
+    /// `[render]`
+    Table(&'static str),
+    /// `[[sphere]]`
+    List(&'static str),
+    /// `[materials.wall]`
+    Named(&'static str, &'a str),
+    /// A key whose value is in braces.
+    Key(&'static str),
+}
+
+impl fmt::Display for Title<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Root => Ok(()),
+            Self::Table(name) => write!(f, "[{name}]"),
+            Self::List(name) => write!(f, "[[{name}]]"),
+            Self::Named(group, name) => write!(f, "[{group}.{}]", shortened(name, 40)),
+            Self::Key(name) => write!(f, "`{name}`"),
+        }
+    }
+}
 
 /// A table of the file. Ask for its keys, then [`Table::finish`] it.
 pub(super) struct Table<'a> {
     pub(super) context: &'a Context<'a>,
     /// Its header, or its braces.
     pub(super) span: Range<usize>,
-    /// As it is called in messages: `[render]`, `[[sphere]]`, `[materials.wall]`.
-    pub(super) title: String,
-    entries: &'a DeTable<'a>,
+    title: Title<'a>,
+    entries: Entries<'a>,
     known: RefCell<Vec<&'static str>>,
     unavailable: RefCell<Vec<&'static str>>,
     missing: RefCell<Vec<(&'static str, &'static str)>>,
 }
 
 impl<'a> Table<'a> {
-    fn new(context: &'a Context<'a>, entries: &'a DeTable<'a>, span: Range<usize>, title: String) -> Self {
+    fn new(context: &'a Context<'a>, entries: Entries<'a>, span: Range<usize>, title: Title<'a>) -> Self {
         let (known, unavailable, missing) = Default::default();
         Self { context, span, title, entries, known, unavailable, missing }
     }
 
     /// The file itself.
-    pub(super) fn root(context: &'a Context<'a>, entries: &'a DeTable<'a>) -> Self {
-        Self::new(context, entries, 0..0, String::new())
+    pub(super) fn root(context: &'a Context<'a>, entries: Entries<'a>) -> Self {
+        Self::new(context, entries, 0..0, Title::Root)
     }
 
     /// A value as a table; an error where it is something else.
-    pub(super) fn of(
-        context: &'a Context<'a>,
-        value: &'a Spanned<DeValue<'a>>,
-        title: String,
-    ) -> Option<Self> {
-        match value.get_ref() {
-            DeValue::Table(entries) => Some(Self::new(context, entries, value.span(), title)),
+    pub(super) fn of(context: &'a Context<'a>, value: Value<'a>, title: Title<'a>) -> Option<Self> {
+        match value.item() {
+            Item::Table(entries) => Some(Self::new(context, entries, value.span(), title)),
             other => {
                 let mut issue = Issue::error(value.span(), format!("{title} must be a table"));
-                if is_array_of_tables(other) {
+                if is_array_of_tables(&other) {
                     issue = issue.label("found an array of tables").help(format!("write {title} once"));
                 } else {
                     issue = issue.label(format!("found {}", found(context, value)));
@@ -63,8 +84,8 @@ impl<'a> Table<'a> {
         if !known.contains(&name) {
             known.push(name);
         }
-        let entry = self.entries.get_key_value(name);
-        Key::new(self.context, name, entry.map(|(key, _)| key.span()), entry.map(|(_, value)| value))
+        let entry = self.entries.get(name);
+        Key::new(self.context, name, entry.as_ref().map(|one| one.span.clone()), entry.map(|one| one.value))
     }
 
     /// A key that must be there; `example` is what may stand after its `=`.
@@ -88,50 +109,47 @@ impl<'a> Table<'a> {
     /// The table of this name in the file, `[name]`.
     pub(super) fn table(&self, name: &'static str) -> Option<Self> {
         let value = self.optional(name).value?;
-        Self::of(self.context, value, format!("[{name}]"))
+        Self::of(self.context, value, Title::Table(name))
     }
 
     /// The tables `[name.…]` with their names and the places of those, in the order of the file.
     pub(super) fn named_tables(&self, name: &'static str) -> Vec<(String, Range<usize>, Option<Self>)> {
         let Some(group) = self.table(name) else { return Vec::new() };
         let mut entries: Vec<_> = group.entries.iter().collect();
-        entries.sort_by_key(|(key, _)| key.span().start);
-        let read =
-            |key: &str, value| Self::of(self.context, value, format!("[{name}.{}]", shortened(key, 40)));
-        let entry = |(key, value): (&'a Spanned<_>, _)| {
-            let text: &std::borrow::Cow<'_, str> = key.get_ref();
-            (text.to_string(), key.span(), read(text, value))
-        };
-        entries.into_iter().map(entry).collect()
+        entries.sort_by_key(|entry| entry.span.start);
+        let read = |key, value| Self::of(self.context, value, Title::Named(name, key));
+        entries.into_iter().map(|one| (one.key.to_owned(), one.span, read(one.key, one.value))).collect()
     }
 
     /// The tables `[[name]]` of the file.
-    pub(super) fn tables(&self, name: &'static str) -> Vec<Self> {
+    pub(super) fn tables(&self, name: &'static str) -> impl Iterator<Item = Self> + use<'a> {
+        let context = self.context;
         let key = self.optional(name);
-        let Some(value) = key.value else { return Vec::new() };
-        let title = || format!("[[{name}]]");
-        if let DeValue::Array(array) = value.get_ref() {
-            return array.iter().filter_map(|one| Self::of(self.context, one, title())).collect();
-        }
-        let issue =
-            Issue::error(key.key_span().unwrap_or_default(), format!("`{name}` must be a list of tables"))
-                .label(format!("found {}", found(self.context, value)))
-                .help(format!("write [[{name}]] with double brackets"));
-        self.context.report(issue);
-        Vec::new()
+        let list = key.value.and_then(|value| match value.item() {
+            Item::Array(array) => Some(array),
+            _ => {
+                let span = key.key_span().unwrap_or_default();
+                let issue = Issue::error(span, format!("`{name}` must be a list of tables"))
+                    .label(format!("found {}", found(context, value)))
+                    .help(format!("write [[{name}]] with double brackets"));
+                context.report(issue);
+                None
+            }
+        });
+        let values = list.into_iter().flat_map(|list| list.iter());
+        values.filter_map(move |value| Self::of(context, value, Title::List(name)))
     }
 
     /// Reports the keys that nobody asked for, and those that should be there. Of a misspelled required key
     /// only the spelling is reported.
     pub(super) fn finish(&self) {
         let known = self.known.borrow();
-        let unknown = self.entries.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
         let mut meant = Vec::new();
-        for (key, value) in unknown {
+        for KeyValue { key, span, value } in self.entries.iter().filter(|one| !known.contains(&one.key)) {
             self.context.report_with(|| {
-                let near = nearest(key.get_ref(), known.iter().copied());
+                let near = nearest(key, known.iter().copied());
                 meant.extend(near);
-                self.unknown(key.get_ref(), key.span(), value.get_ref(), near)
+                self.unknown(key, span, &value.item(), near)
             });
         }
         for (name, example) in self.missing.borrow().iter().filter(|(name, _)| !meant.contains(name)) {
@@ -142,13 +160,14 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn unknown(&self, key: &str, span: Range<usize>, value: &DeValue<'_>, near: Option<&str>) -> Issue {
+    fn unknown(&self, key: &str, span: Range<usize>, value: &Item<'_>, near: Option<&str>) -> Issue {
         let shown = shortened(key, 40);
-        let table = |value: &DeValue<'_>| matches!(value, DeValue::Table(_)) || is_array_of_tables(value);
-        let message = match () {
-            () if !self.title.is_empty() => format!("unknown key `{shown}` in {}", self.title),
-            () if table(value) => format!("unknown table `{shown}`"),
-            () => format!("unknown key `{shown}` outside of any table"),
+        let message = match self.title {
+            Title::Root if matches!(value, Item::Table(_)) || is_array_of_tables(value) => {
+                format!("unknown table `{shown}`")
+            }
+            Title::Root => format!("unknown key `{shown}` outside of any table"),
+            title => format!("unknown key `{shown}` in {title}"),
         };
         let mut issue = Issue::error(span, message);
         if let Some(near) = near {
@@ -164,7 +183,6 @@ impl<'a> Table<'a> {
     }
 }
 
-fn is_array_of_tables(value: &DeValue<'_>) -> bool {
-    let DeValue::Array(array) = value else { return false };
-    array.iter().next().is_some_and(|first| first.get_ref().is_table())
+fn is_array_of_tables(value: &Item<'_>) -> bool {
+    matches!(value, Item::Array(array) if array.is_of_tables())
 }

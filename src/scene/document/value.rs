@@ -1,50 +1,46 @@
 //! TOML values as numbers, and in words.
 
-use toml::Spanned;
-use toml::de::{DeInteger, DeValue};
-
 use super::super::sanitize::shortened;
+pub(super) use super::super::toml::{Item, Value};
 use super::context::{Context, Issue};
 use super::limits::Limits;
-
-/// A value with its place.
-pub(super) type Value<'a> = &'a Spanned<DeValue<'a>>;
 
 /// A value in a few words, to be read after `found`.
 pub(super) fn found(context: &Context<'_>, value: Value<'_>) -> String {
     const LONGEST: usize = 32;
     let written = || shortened(context.text(&value.span()), LONGEST);
-    match value.get_ref() {
-        DeValue::String(_) => format!("the string {}", written()),
-        DeValue::Integer(_) | DeValue::Float(_) => written(),
-        DeValue::Boolean(_) => written(),
-        DeValue::Datetime(_) => format!("the date {}", written()),
-        DeValue::Array(array) => match array.len() {
+    match value.item() {
+        Item::String(_) => format!("the string {}", written()),
+        Item::Integer { .. } | Item::Float(_) | Item::Boolean(_) => written(),
+        Item::Datetime => format!("the date {}", written()),
+        Item::Array(array) => match array.len() {
             0 => "an empty array".to_owned(),
             1 => "an array of 1 value".to_owned(),
             count => format!("an array of {count} values"),
         },
-        DeValue::Table(_) => "a table".to_owned(),
+        Item::Table(_) => "a table".to_owned(),
     }
 }
 
 /// An integer or a float; the largest double where it is larger. None: something else.
-pub(super) fn number(value: &DeValue<'_>) -> Option<f64> {
-    match value {
+pub(super) fn number(value: Value<'_>) -> Option<f64> {
+    match value.item() {
         // Rounding to the nearest double is what writing the number as a float would do.
-        DeValue::Integer(integer) => Some(whole(integer).map_or(f64::MAX, |number| number as f64)),
-        DeValue::Float(float) => {
-            let number: f64 = float.as_str().parse().ok()?;
-            let is_digits = number.is_infinite() && !float.as_str().contains("inf");
+        Item::Integer { digits, radix } => {
+            Some(whole(digits, radix).map_or(f64::MAX, |number| number as f64))
+        }
+        Item::Float(text) => {
+            let number: f64 = text.parse().ok()?;
+            let is_digits = number.is_infinite() && !text.contains("inf");
             Some(if is_digits { f64::MAX } else { number })
         }
-        _ => None,
+        Item::String(_) | Item::Boolean(_) | Item::Datetime | Item::Array(_) | Item::Table(_) => None,
     }
 }
 
-/// An integer; none where it is beyond all uses.
-pub(super) fn whole(integer: &DeInteger<'_>) -> Option<i128> {
-    i128::from_str_radix(integer.as_str(), integer.radix()).ok()
+/// An integer by its digits; none where it is beyond all uses.
+pub(super) fn whole(digits: &str, radix: u32) -> Option<i128> {
+    i128::from_str_radix(digits, radix).ok()
 }
 
 /// A number within limits. `name` is what messages call it, `expected` what it must be.
@@ -55,7 +51,7 @@ pub(super) fn limited(
     limits: Limits,
     expected: &str,
 ) -> Option<f64> {
-    let Some(number) = number(value.get_ref()) else {
+    let Some(number) = number(value) else {
         wrong_type(context, name, value, expected);
         return None;
     };

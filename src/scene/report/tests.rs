@@ -106,3 +106,26 @@ fn lines_have_the_text_of_the_plain_report_and_roles() {
     assert_eq!(role("-->"), Some(Role::Frame));
     assert!(render(&diagnostics, 80, Style::Ansi).contains("\u{1b}["));
 }
+
+#[test]
+fn labels_are_never_cut() {
+    let source: Arc<str> = "[[quad]]\nu = [0, 0, 0]\n".into();
+    let label = "`u` and `v` are parallel, or one of them is 0, and so on, for as long as it takes to say it";
+    let one = at(&source, 13..22, label);
+    for width in [30, 59, 60, 61, 80, 106, 107, 108, 200] {
+        let text = render(std::slice::from_ref(&one), width, Style::Plain);
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let rows: Vec<&str> = text.lines().collect();
+        assert!(rows.iter().all(|row| row.chars().count() <= width), "{width}:\n{text}");
+        let said = words(&text).join(" ");
+        assert!(said.contains(label), "{width}:\n{text}");
+        assert!(said.contains("^^^^^^^^^"), "{width}:\n{text}");
+    }
+    // Where it fits it stands behind the carets.
+    assert!(render(std::slice::from_ref(&one), 200, Style::Plain).contains("^^^^^^^^^ `u` and"));
+    assert!(
+        lines(std::slice::from_ref(&one), 60)
+            .iter()
+            .all(|line| { line.iter().map(|piece| piece.text.chars().count()).sum::<usize>() <= 60 })
+    );
+}

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::{BLUE, RED, cells_of};
 use crate::pipeline::protocol::{self, Command, Failure, PreviewSize, Writing};
+use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::tui::event::{Effect, Event, KeyPress, Signal, Source};
 use crate::tui::fixtures::*;
 use crate::tui::state::Activity;
@@ -151,7 +152,9 @@ fn signals_end_stop_and_redraw() {
     assert!(matches!(effect(&mut desk, Signal::Terminate)[..], [Effect::Quit(ExitStatus(143))]));
     assert!(matches!(effect(&mut desk, Signal::Hangup)[..], [Effect::Quit(ExitStatus(129))]));
     assert!(matches!(effect(&mut desk, Signal::Suspend)[..], [Effect::Suspend]));
+    assert!(matches!(effect(&mut desk, Signal::Quit)[..], [Effect::Quit(ExitStatus(131))]));
     assert!(matches!(effect(&mut desk, Signal::Continue)[..], [Effect::Redraw]));
+    assert!(matches!(effect(&mut desk, Signal::Resize)[..], [Effect::Measure]));
 }
 
 #[test]
@@ -172,25 +175,99 @@ fn a_cancelled_render_says_that_it_stopped() {
 }
 
 #[test]
-fn a_write_that_is_still_postponed_at_the_end_is_known() {
+fn whether_the_person_knows_what_came_of_a_write_is_known_at_the_end() {
     let generation = 1;
     let written = |generation| protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 };
     let failed = protocol::Event::WriteFailed { generation, message: "full".to_owned() };
-    for (outcome, is_left) in [(None, true), (Some(written(generation)), false), (Some(failed), false)] {
+    let refused = protocol::Event::Refused { generation, conflicts: Vec::new() };
+    let postponed = protocol::Event::WritePostponed { generation };
+    let ends = [written(generation), failed, refused].map(|event| (Some(event), false));
+    for (outcome, is_open) in [(None, true), (Some(postponed), true)].into_iter().chain(ends) {
         let mut desk = Desk::new();
+        assert!(!desk.state.asked_to_write);
         desk.press('w');
-        assert!(!desk.state.is_write_postponed, "the worker may write it at once");
-        desk.worker(protocol::Event::WritePostponed { generation });
         if let Some(event) = outcome {
             desk.worker(event);
         }
         assert!(matches!(desk.press('q')[..], [Effect::Quit(ExitStatus::QUIT)]));
-        assert_eq!(desk.state.is_write_postponed, is_left);
+        assert_eq!(desk.state.asked_to_write, is_open);
     }
     let mut desk = Desk::new();
-    desk.worker(protocol::Event::WritePostponed { generation });
+    desk.press('w');
     desk.press('r');
-    assert!(desk.state.is_write_postponed, "the order goes over to the next request");
-    desk.worker(written(generation));
-    assert!(!desk.state.is_write_postponed, "the request before wrote it after all");
+    assert!(desk.state.asked_to_write, "the order goes over to the next request");
+    desk.worker(written(desk.state.generation));
+    assert!(!desk.state.asked_to_write);
+}
+
+fn wrong(message: &str) -> Vec<Diagnostic> {
+    vec![diagnostic(Severity::Error, message)]
+}
+
+#[test]
+fn a_file_that_is_half_there_is_no_error_until_it_stays_so() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(wrong("half"));
+    let text = desk.text();
+    assert!(!text.contains("half") && !text.contains("broken"), "{text}");
+    assert!(text.contains("waiting for the file"), "{text}");
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(wrong("three quarters"));
+    assert!(!desk.text().contains("three quarters") && !desk.text().contains("broken"));
+    assert!(desk.event(Event::Settled).is_empty());
+    let text = desk.text();
+    assert!(text.contains("error: three quarters") && text.contains("broken"), "{text}");
+    assert!(!text.contains("half"), "of what is in the file now: {text}");
+}
+
+#[test]
+fn a_file_that_comes_in_two_pieces_shows_no_error() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(wrong("half"));
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.finish(BLUE);
+    desk.event(Event::Settled);
+    desk.wait(5000);
+    let text = desk.text();
+    assert!(!text.contains("half") && text.contains("done"), "{text}");
+    assert!(cells_of(&mut desk, BLUE) > 0 && cells_of(&mut desk, RED) == 0);
+}
+
+#[test]
+fn an_error_in_a_file_that_stays_as_it_is_is_shown_at_once() {
+    let mut desk = Desk::new();
+    desk.fail(wrong("from the start"));
+    assert!(desk.text().contains("error: from the start"), "nothing was saved");
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.event(Event::Settled);
+    desk.fail(wrong("that took long to be found"));
+    assert!(desk.text().contains("error: that took long to be found"));
+    desk.press('r');
+    desk.fail(wrong("again"));
+    assert!(desk.text().contains("error: again"));
+}
+
+#[test]
+fn an_error_does_not_wait_for_a_watcher_that_is_gone() {
+    let mut desk = Desk::new();
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(wrong("half"));
+    desk.event(Event::Lost(Source::Watcher));
+    assert!(desk.text().contains("error: half"), "{}", desk.text());
+    desk.press('r');
+    desk.fail(wrong("again"));
+    assert!(desk.text().contains("error: again"));
+}
+
+#[test]
+fn a_failure_of_the_work_does_not_wait_for_the_file() {
+    let mut desk = Desk::new();
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let failure = Failure::Work("no memory".to_owned());
+    desk.worker(protocol::Event::Failed { generation: desk.state.generation, failure });
+    assert!(desk.text().contains("no memory"), "{}", desk.text());
 }

@@ -168,6 +168,25 @@ fn a_new_request_lets_a_paused_worker_go_on() {
     let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
     assert!(!desk.state.paused);
+    assert!(desk.text().contains("no longer paused"), "{}", desk.text());
+}
+
+#[test]
+fn a_key_that_ends_a_pause_says_so_beside_what_it_says_itself() {
+    for (key, words) in [('s', "no longer paused"), ('r', "no longer paused"), ('v', "view normal: shown")] {
+        let mut desk = Desk::new();
+        desk.press(' ');
+        let effects = desk.press(key);
+        assert!(request(&effects).is_some() && !desk.state.paused);
+        let text = desk.text();
+        assert!(text.contains("no longer paused") && text.contains(words), "{key}: {text}");
+        desk.press(key);
+        assert!(!desk.text().contains("no longer paused"), "{key}: said once");
+    }
+    let mut desk = Desk::new();
+    desk.press(' ');
+    desk.press(' ');
+    assert!(!desk.text().contains("no longer paused"), "whoever ends it by its key knows");
 }
 
 #[test]

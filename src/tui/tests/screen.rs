@@ -193,6 +193,7 @@ fn a_broken_file_keeps_the_picture_and_shows_the_place() {
     let before = cells_of(&mut desk, RED);
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    desk.event(Event::Settled);
     let text = desk.text();
     for words in [
         "error: unknown key `heigth`",
@@ -254,6 +255,32 @@ fn warnings_are_counted_and_shown_on_demand() {
     assert!(desk.text().contains("warning: texture `b` is not used"));
     desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(!desk.text().contains("not used"));
+}
+
+#[test]
+fn a_conflict_opens_the_pane_once_and_stays_until_it_is_solved() {
+    let mut desk = Desk::new();
+    let conflict = || vec![diagnostic(Severity::Error, "cannot write a.png")];
+    let refused = || protocol::Event::Refused { generation: 1, conflicts: conflict() };
+    desk.worker(refused());
+    assert!(
+        desk.text().contains("error: cannot write a.png") && desk.text().contains("1 error"),
+        "{}",
+        desk.text()
+    );
+    assert!(desk.text().contains("nothing is written"));
+    assert!(desk.state.is_running(), "the render goes on");
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    assert!(!desk.text().contains("cannot write a.png"));
+    desk.worker(refused());
+    assert!(!desk.text().contains("cannot write a.png"), "a person has seen and closed it");
+    let warning = diagnostic(Severity::Warning, "texture `b` is not used");
+    desk.worker(done(1, [conflict(), vec![warning]].concat(), false));
+    assert!(desk.text().contains("1 error, 1 warning (e shows them)"), "{}", desk.text());
+    desk.press('e');
+    assert!(desk.text().contains("cannot write a.png"));
+    desk.worker(done(1, Vec::new(), false));
+    assert!(!desk.text().contains("error"), "{}", desk.text());
 }
 
 #[test]
@@ -331,4 +358,23 @@ proptest! {
         }
         desk.screen();
     }
+}
+
+#[test]
+fn warnings_are_there_while_the_picture_is_rendered() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    desk.press('e');
+    assert!(desk.text().contains("files are still being read"), "{}", desk.text());
+    let warnings = vec![diagnostic(Severity::Warning, "texture `b` is not used")];
+    desk.worker(protocol::Event::Warnings { generation: 1, warnings });
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
+    assert!(desk.text().contains("1 warning"), "{}", desk.text());
+    desk.press('e');
+    assert!(desk.text().contains("warning: texture `b` is not used"), "{}", desk.text());
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.worker(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
+    assert!(!desk.text().contains("not used"), "the scene has none any more: {}", desk.text());
+    desk.press('e');
+    assert!(desk.text().contains("no errors and no warnings"), "{}", desk.text());
 }

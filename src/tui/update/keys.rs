@@ -115,7 +115,11 @@ fn scene_settings(state: &mut State) -> Vec<Effect> {
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
     if state.problems.is_none() && state.warnings.is_empty() {
-        return told(state, "no errors and no warnings");
+        let is_read = state.are_warnings_known || !state.is_running();
+        return told(
+            state,
+            if is_read { "no errors and no warnings" } else { "the files are still being read" },
+        );
     }
     change(state, |state| {
         state.pane.open = !state.pane.open;

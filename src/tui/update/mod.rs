@@ -24,16 +24,39 @@ pub(super) fn start(state: &mut State) -> Vec<Effect> {
 /// One event.
 pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
     state.now = now;
+    let was_paused = state.paused;
+    let effects = happened(state, event);
+    let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
+    if was_paused && effects.iter().any(is_request) {
+        let rest = state.message.take().map_or(String::new(), |message| format!(" · {message}"));
+        say(state, format!("no longer paused{rest}"));
+    }
+    effects
+}
+
+fn happened(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
         Event::Key(key) => keys::update(state, key),
+        // There is nothing to type text into; the loop tells the line what that has to know.
+        Event::Paste | Event::Answer(_) | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
+        Event::Frame(report) => {
+            state.dirty |= state.frame != Some(report);
+            state.frame = Some(report);
+            Vec::new()
+        }
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
         Event::Picture { generation, picture } => show(state, Shown { generation, picture }),
         Event::Changed(Changed { noticed }) => {
             state.message = None;
+            state.is_settled = false;
             let effects = render(state, false);
             state.change = Some(PendingChange { generation: state.generation, noticed });
             effects
+        }
+        Event::Settled => {
+            worker::settled(state);
+            Vec::new()
         }
         Event::Signal(signal) => vec![signalled(signal)],
         Event::Shown { generation } => shown(state, generation),
@@ -51,6 +74,8 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.generation += 1;
     state.requested = Layout::preview_size(state);
     state.resize_due = None;
+    state.held = None;
+    state.are_warnings_known = false;
     state.dirty = true;
     let request = Request {
         generation: state.generation,
@@ -128,9 +153,11 @@ fn signalled(signal: Signal) -> Effect {
     match signal {
         Signal::Interrupt => Effect::Quit(ExitStatus::INTERRUPTED),
         Signal::Terminate => Effect::Quit(ExitStatus::TERMINATED),
+        Signal::Quit => Effect::Quit(ExitStatus::ABORTED),
         Signal::Hangup => Effect::Quit(ExitStatus::HANGUP),
         Signal::Suspend => Effect::Suspend,
         Signal::Continue => Effect::Redraw,
+        Signal::Resize => Effect::Measure,
     }
 }
 
@@ -138,6 +165,7 @@ fn lost(state: &mut State, source: Source) -> Vec<Effect> {
     match source {
         Source::Worker => vec![Effect::GiveUp],
         Source::Watcher => {
+            worker::settled(state);
             say(state, "files are no longer watched: r renders again");
             Vec::new()
         }

@@ -2,16 +2,12 @@
 
 use super::say;
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport};
-use crate::scene::diagnostic::Diagnostic;
+use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Written};
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
-    // The order to write outlives its request: whichever carries it out has done so.
-    if matches!(event, Event::Written { .. } | Event::WriteFailed { .. }) {
-        state.is_write_postponed = false;
-    }
     if generation(&event) != state.generation {
         return Vec::new();
     }
@@ -30,6 +26,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 say(state, "no depth of field: the scene's camera has no `aperture`");
             }
         }
+        Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => state.progress = Some(progress),
         Event::Preview { .. } | Event::Files { .. } => {}
         Event::Written { path, bytes, .. } => wrote(state, Written { path, bytes }),
@@ -37,8 +34,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             state.asked_to_write = false;
             say(state, format!("error: {}", visible(&message)));
         }
+        Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::WritePostponed { .. } => {
-            state.is_write_postponed = true;
             say(state, "the image is written as soon as every pixel has a sample");
         }
         Event::Done { report, warnings, unchanged, .. } => done(state, report, warnings, unchanged),
@@ -57,11 +54,13 @@ fn generation(event: &Event) -> u64 {
         Event::Started { generation }
         | Event::Stage { generation, .. }
         | Event::Asset { generation, .. }
+        | Event::Warnings { generation, .. }
         | Event::Settings { generation, .. }
         | Event::Progress { generation, .. }
         | Event::Preview { generation }
         | Event::Written { generation, .. }
         | Event::WriteFailed { generation, .. }
+        | Event::Refused { generation, .. }
         | Event::WritePostponed { generation }
         | Event::Files { generation, .. }
         | Event::Done { generation, .. }
@@ -103,6 +102,17 @@ fn wrote(state: &mut State, written: Written) {
     state.written.push(written);
 }
 
+/// What is new is shown at once; what a person has seen and closed stays closed.
+fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
+    state.asked_to_write = false;
+    say(state, "nothing is written (e shows why)");
+    if !conflicts.iter().all(|conflict| state.warnings.contains(conflict)) {
+        state.pane = Pane { open: true, scroll: 0 };
+    }
+    state.warnings.retain(|one| one.severity == Severity::Warning);
+    state.warnings.splice(0..0, conflicts);
+}
+
 /// The file is whole again.
 fn mended(state: &mut State) {
     if state.problems.take().is_some() {
@@ -122,22 +132,45 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.report = Some(report);
     state.unchanged = unchanged;
     state.renders += u64::from(!unchanged);
-    state.pane.open &= !warnings.is_empty();
-    state.warnings = warnings;
+    warn(state, warnings);
     if unchanged && state.change.is_some_and(|change| change.generation == state.generation) {
         state.change = None;
         state.first_change = None;
     }
 }
 
+fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
+    state.pane.open &= !warnings.is_empty();
+    state.warnings = warnings;
+    state.are_warnings_known = true;
+}
+
+/// What is wrong with a file that may be half written is not said until that stays so.
 fn failed(state: &mut State, failure: Failure) {
-    state.activity = Activity::Broken;
     state.set_paused(false);
     state.assets.clear();
     state.change = None;
-    state.problems = Some(match failure {
-        Failure::Scene(diagnostics) => Problems { diagnostics, work: None },
-        Failure::Work(message) => Problems { diagnostics: Vec::new(), work: Some(message) },
-    });
+    match failure {
+        Failure::Scene(diagnostics) if !state.is_settled => {
+            state.activity = Activity::Waiting;
+            state.held = Some(diagnostics);
+        }
+        Failure::Scene(diagnostics) => broken(state, Problems { diagnostics, work: None }),
+        Failure::Work(message) => broken(state, Problems { diagnostics: Vec::new(), work: Some(message) }),
+    }
+}
+
+fn broken(state: &mut State, problems: Problems) {
+    state.activity = Activity::Broken;
+    state.problems = Some(problems);
     state.pane = Pane { open: true, scroll: 0 };
+    state.dirty = true;
+}
+
+/// Nobody is writing the files any more: what was found wrong with them is so.
+pub(super) fn settled(state: &mut State) {
+    state.is_settled = true;
+    if let Some(diagnostics) = state.held.take() {
+        broken(state, Problems { diagnostics, work: None });
+    }
 }

@@ -19,7 +19,8 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let (page, last) = span(&text, area);
     let first = state.pane.scroll.min(last);
     Clear.render(area, buffer);
-    let tone = if state.problems.is_some() { Tone::Error } else { Tone::Warning };
+    let has_error = state.warnings.iter().any(|one| one.severity == Severity::Error);
+    let tone = if state.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
     let mut title = title(state);
     if last > 0 {
         title = format!("{title}· lines {}-{} of {} ", first + 1, first + page, text.len());
@@ -92,7 +93,7 @@ fn wrapped(line: &str, width: usize) -> Vec<Line> {
 }
 
 fn title(state: &State) -> String {
-    let Some(problems) = &state.problems else { return counted(state.warnings.len(), "warning") };
+    let Some(problems) = &state.problems else { return format!(" {} ", report::summary(&state.warnings)) };
     let errors = problems.diagnostics.iter().filter(|it| it.severity == Severity::Error).count()
         + usize::from(problems.work.is_some());
     let errors = counted(errors, "error");

@@ -9,12 +9,16 @@ use crate::tui::keymap::KEYMAP;
 use crate::tui::state::State;
 
 const TITLE: &str = " keys ";
+/// What else is on the screen.
+const NOTES: &[(&str, &str)] =
+    &[("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer")];
 
 /// In the middle of the screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
-    let labels = KEYMAP.iter().map(|it| columns(it.label)).max().unwrap_or(0);
-    let helps = KEYMAP.iter().map(|it| columns(it.help)).max().unwrap_or(0);
-    let lines = u16::try_from(KEYMAP.len()).unwrap_or(u16::MAX);
+    let entries = || KEYMAP.iter().map(|it| (it.label, it.help)).chain(NOTES.iter().copied());
+    let labels = entries().map(|(label, _)| columns(label)).max().unwrap_or(0);
+    let helps = entries().map(|(_, help)| columns(help)).max().unwrap_or(0);
+    let lines = u16::try_from(entries().count()).unwrap_or(u16::MAX);
     let area = centred(buffer.area, labels + helps + 6, lines.saturating_add(2));
     Clear.render(area, buffer);
     let block = Block::bordered().title(TITLE).border_style(Tone::Plain.style(state.depth));
@@ -23,7 +27,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         block.render(area, buffer);
     }
     let hidden = lines.saturating_sub(inner.height);
-    for (index, binding) in (0..inner.height).zip(KEYMAP) {
+    for (index, (label, help)) in (0..inner.height).zip(entries()) {
         let line = row(inner, index);
         if hidden > 0 && index + 1 == inner.height {
             put(
@@ -34,8 +38,8 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
             );
             break;
         }
-        let label = format!(" {:<width$}  ", binding.label, width = usize::from(labels));
-        put(buffer, line, &[(&label, Tone::Strong), (binding.help, Tone::Plain)], state.depth);
+        let label = format!(" {label:<width$}  ", width = usize::from(labels));
+        put(buffer, line, &[(&label, Tone::Strong), (help, Tone::Plain)], state.depth);
     }
 }
 

@@ -8,15 +8,14 @@ mod stages;
 mod status;
 mod text;
 
-use ratatui::Frame;
+use ratatui::buffer::Buffer;
 
 use self::layout::Layout;
 use super::state::State;
 
-/// The whole screen.
-pub(super) fn draw(state: &State, frame: &mut Frame<'_>) {
+/// The whole screen, into a buffer of the window's size.
+pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let layout = Layout::of(state);
-    let buffer = frame.buffer_mut();
     status::header(state, layout.header, buffer);
     preview::draw(state, layout.preview, buffer);
     stages::draw(state, layout.stages, buffer);

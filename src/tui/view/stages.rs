@@ -5,6 +5,7 @@ use ratatui::layout::Rect;
 
 use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, row, seconds};
 use crate::pipeline::protocol::{Stage, StageReport, Status};
+use crate::scene::report::summary;
 use crate::scene::sanitize::visible;
 use crate::tui::state::{AssetBar, PreviewKind, State};
 
@@ -99,8 +100,8 @@ fn results(state: &State) -> Vec<(String, Tone)> {
     }
     match state.warnings.len() {
         0 => {}
-        1 => lines.push(("1 warning (e shows it)".to_owned(), Tone::Warning)),
-        count => lines.push((format!("{count} warnings (e shows them)"), Tone::Warning)),
+        1 => lines.push((format!("{} (e shows it)", summary(&state.warnings)), Tone::Warning)),
+        _ => lines.push((format!("{} (e shows them)", summary(&state.warnings)), Tone::Warning)),
     }
     lines
 }

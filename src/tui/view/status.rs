@@ -30,6 +30,7 @@ fn activity(state: &State) -> (&'static str, Tone) {
         _ if state.paused => ("paused", Tone::Warning),
         Activity::Running { .. } => ("rendering", Tone::Strong),
         Activity::Done => ("done", Tone::Good),
+        Activity::Waiting => ("waiting for the file", Tone::Warning),
         Activity::Broken if !state.pane.open => ("broken (e shows why)", Tone::Error),
         Activity::Broken => ("broken", Tone::Error),
         Activity::Cancelled => ("stopped", Tone::Warning),
@@ -51,7 +52,8 @@ pub(super) fn bar(state: &State, area: Rect, buffer: &mut Buffer) {
         return;
     }
     let gauge = gauge(fraction, usize::from(room), state.preview == PreviewKind::Ascii);
-    let tone = if state.activity == Activity::Broken { Tone::Faint } else { Tone::Good };
+    let tone =
+        if matches!(state.activity, Activity::Broken | Activity::Waiting) { Tone::Faint } else { Tone::Good };
     put(
         buffer,
         area,
@@ -71,7 +73,9 @@ fn bar_words(state: &State) -> String {
                 words.push("unchanged".to_owned());
             }
         }
-        (Activity::Broken | Activity::Cancelled, _) => words.push(activity(state).0.to_owned()),
+        (Activity::Waiting | Activity::Broken | Activity::Cancelled, _) => {
+            words.push(activity(state).0.to_owned())
+        }
         (Activity::Running { .. }, Some(progress)) => {
             words.push(format!("{}%", percent(progress.fraction)));
             words.push(format!("samples {}/{}", progress.samples, progress.total_samples));
@@ -112,8 +116,22 @@ pub(super) fn status(state: &State, layout: &Layout, buffer: &mut Buffer) {
         words.splice(0..0, state.message.clone());
     }
     let used = put_right(buffer, area, &help, Tone::Strong, state.depth);
-    let room = Rect { width: area.width.saturating_sub(used + 1), ..area };
-    put(buffer, room, &[(&words.join(" · "), Tone::Plain)], state.depth);
+    let mut room = Rect { width: area.width.saturating_sub(used + 1), ..area };
+    let words = words.join(" · ");
+    let frame = format!("{} ", frame(state));
+    // The toggles come first where there is not enough room.
+    if columns(&words) + 1 + columns(&frame) <= room.width {
+        room.width -= put_right(buffer, room, &frame, Tone::Faint, state.depth);
+    }
+    put(buffer, room, &[(&words, Tone::Plain)], state.depth);
+}
+
+/// What the last picture took on its way: its size, and how long the terminal takes to answer.
+fn frame(state: &State) -> String {
+    let Some(frame) = state.frame else { return String::new() };
+    let size = format!("{} kB", frame.bytes.div_ceil(1000));
+    let answer = frame.round_trip.map_or(String::new(), |time| format!(" {} ms", time.as_millis().max(1)));
+    size + &answer
 }
 
 fn depth_of_field(state: &State) -> bool {

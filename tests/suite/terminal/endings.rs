@@ -13,7 +13,9 @@ fn keys_and_signals_end_it_and_the_terminal_is_given_back() {
         terminal.press(key);
         assert_eq!(terminal.end(), code, "{key:?}");
     }
-    for (signal, code) in [(Signal::SIGTERM, 143), (Signal::SIGINT, 130), (Signal::SIGHUP, 129)] {
+    for (signal, code) in
+        [(Signal::SIGTERM, 143), (Signal::SIGINT, 130), (Signal::SIGHUP, 129), (Signal::SIGQUIT, 131)]
+    {
         let terminal = folder.terminal();
         terminal.wait_for_color("red");
         terminal.signal(signal);
@@ -32,6 +34,30 @@ fn it_ends_in_the_middle_of_a_render_and_leaves_the_last_picture() {
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
     assert_eq!(folder.bytes("scene.png"), before);
+}
+
+#[test]
+fn a_picture_that_was_asked_for_is_written_at_the_end_or_the_person_is_told() {
+    let folder = Folder::new();
+    let slow = SCENE.replace("samples = 4", "samples = 10000000");
+    folder.write("scene.toml", &slow);
+    let mut terminal = folder.terminal();
+    terminal.wait_for("ETA");
+    terminal.press("wq");
+    assert_eq!(terminal.end_saying("wrote scene.png"), 0);
+    assert!(folder.path("scene.png").is_file());
+
+    // Nothing to write: most pixels have no sample yet.
+    std::fs::remove_file(folder.path("scene.png")).expect("removed");
+    folder.write(
+        "scene.toml",
+        &slow.replace("width = 64", "width = 2000").replace("height = 48", "height = 2000"),
+    );
+    let mut terminal = folder.terminal();
+    terminal.wait_for("rendering");
+    terminal.press("wq");
+    assert_eq!(terminal.end_saying("nothing is written|there is no picture yet"), 0);
+    assert!(!folder.path("scene.png").exists());
 }
 
 #[test]

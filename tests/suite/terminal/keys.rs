@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::pty::{Folder, SCENE, cells};
+use super::pty::{Folder, SCENE, cells, upper};
 
 const ESCAPE: &str = "\x1b";
 const PAGE_UP: &str = "\x1b[5~";
@@ -61,7 +61,7 @@ fn views_are_shown_as_they_are_and_written_when_asked() {
     terminal.wait_for_render(2);
     // The board faces the eye: (0, 0, 1) is shown as (n + 1)/2, without a curve.
     let board = vt100::Color::Rgb(128, 128, 255);
-    terminal.wait("normals", |screen| cells(screen).filter(|cell| cell.fgcolor() == board).count() > 100);
+    terminal.wait("normals", |screen| cells(screen).filter(|cell| upper(cell) == Some(board)).count() > 100);
     assert_eq!(folder.bytes("scene.png"), beauty);
     terminal.press("w");
     terminal.wait_for("wrote scene.png");

@@ -1,8 +1,13 @@
 //! The live program in a pseudo-terminal, as a person sees it.
 
 mod endings;
+mod input;
 mod keys;
+mod outputs;
 mod pty;
+mod relay;
+mod saving;
+mod thin_line;
 
 use std::fs;
 

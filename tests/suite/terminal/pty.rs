@@ -5,9 +5,11 @@ use std::io::{Read, Write};
 use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use super::relay::{Answers, Relay, Seen};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::LocalFlags;
 use nix::unistd::Pid;
@@ -95,7 +97,14 @@ impl Folder {
     }
 
     pub fn terminal_with(&self, command: &[&str], variables: &[(&str, &str)]) -> Terminal {
-        Terminal::open(command, variables, self.0.path())
+        Terminal::open(command, variables, self.0.path(), size(80, 24), None)
+    }
+
+    /// The program at work on the scene, at the end of a thin line, in a terminal of 120×40 cells.
+    pub fn thin_line(&self, answers: Answers) -> Terminal {
+        let tmux: &[_] =
+            if answers == Answers::Multiplexer { &[("TMUX", "/tmp/tmux-0/default,1,0")] } else { &[] };
+        Terminal::open(&[PROGRAM, "scene.toml"], tmux, self.0.path(), size(120, 40), Some(answers))
     }
 
     pub fn program(&self) -> &'static str {
@@ -109,13 +118,20 @@ pub struct Terminal {
     // Held so that the terminal's modes can be looked at when the program is gone.
     _slave: Box<dyn SlavePty + Send>,
     child: Box<dyn Child + Send + Sync>,
-    keys: Box<dyn Write + Send>,
+    keys: Arc<Mutex<Box<dyn Write + Send>>>,
     screen: Arc<Mutex<vt100::Parser>>,
+    relay: Option<Relay>,
+    is_reading: Arc<AtomicBool>,
 }
 
 impl Terminal {
-    fn open(command: &[&str], variables: &[(&str, &str)], folder: &Path) -> Self {
-        let size = size(80, 24);
+    fn open(
+        command: &[&str],
+        variables: &[(&str, &str)],
+        folder: &Path,
+        size: PtySize,
+        line: Option<Answers>,
+    ) -> Self {
         let pair = native_pty_system().openpty(size).expect("a pseudo-terminal");
         let mut builder = CommandBuilder::new(command[0]);
         builder.args(&command[1..]);
@@ -131,19 +147,44 @@ impl Terminal {
         let child = pair.slave.spawn_command(builder).expect("the program starts");
         let mut output = pair.master.try_clone_reader().expect("a reader");
         let screen = Arc::new(Mutex::new(vt100::Parser::new(side(size.rows), side(size.cols), 0)));
+        let keys = Arc::new(Mutex::new(pair.master.take_writer().expect("a writer")));
         let shared = screen.clone();
-        std::thread::spawn(move || {
-            let mut bytes = [0; 1 << 16];
-            while let Ok(count @ 1..) = output.read(&mut bytes) {
-                shared.lock().expect("a parser does not panic").process(&bytes[..count]);
+        let is_reading = Arc::new(AtomicBool::new(true));
+        let reads = is_reading.clone();
+        let relay = match line {
+            Some(answers) => Some(Relay::start(output, keys.clone(), shared, answers)),
+            None => {
+                std::thread::spawn(move || {
+                    let mut bytes = [0; 1 << 16];
+                    while let Ok(count @ 1..) = output.read(&mut bytes) {
+                        shared.lock().expect("a parser does not panic").process(&bytes[..count]);
+                        while !reads.load(Ordering::Acquire) {
+                            std::thread::sleep(Duration::from_millis(5));
+                        }
+                    }
+                });
+                None
             }
-        });
-        let keys = pair.master.take_writer().expect("a writer");
-        Self { master: pair.master, _slave: pair.slave, child, keys, screen }
+        };
+        Self { master: pair.master, _slave: pair.slave, child, keys, screen, relay, is_reading }
     }
 
     pub fn press(&mut self, keys: &str) {
-        self.keys.write_all(keys.as_bytes()).expect("keys are taken");
+        if let Some(relay) = &self.relay {
+            relay.press(keys);
+            return;
+        }
+        let mut writer = self.keys.lock().expect("a writer does not panic");
+        writer.write_all(keys.as_bytes()).expect("keys are taken");
+    }
+
+    /// The same for more than the terminal holds, which waits until the program has read it.
+    pub fn burst(&mut self, keys: String) {
+        let writer = self.keys.clone();
+        std::thread::spawn(move || {
+            // A program that ends takes no more.
+            let _ = writer.lock().expect("a writer does not panic").write_all(keys.as_bytes());
+        });
     }
 
     pub fn resize(&mut self, columns: u16, rows: u16) {
@@ -155,6 +196,30 @@ impl Terminal {
     pub fn signal(&self, signal: Signal) {
         let id = self.child.process_id().expect("an id");
         kill(Pid::from_raw(i32::try_from(id).expect("a process id")), signal).expect("sent");
+    }
+
+    /// Whether the terminal takes what the program writes.
+    pub fn set_reading(&self, reading: bool) {
+        self.is_reading.store(reading, Ordering::Release);
+    }
+
+    /// Waits for the end of the program.
+    #[track_caller]
+    pub fn code(&mut self) -> u32 {
+        let deadline = Instant::now() + LIMIT;
+        loop {
+            if let Some(status) = self.child.try_wait().expect("a child") {
+                return status.exit_code();
+            }
+            assert!(Instant::now() < deadline, "it does not end\n{}", self.text());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// What went over the thin line.
+    pub fn line<T>(&self, what: impl FnOnce(&Seen) -> T) -> T {
+        let relay = self.relay.as_ref().expect("a thin line");
+        what(&relay.seen.lock().expect("no panic"))
     }
 
     /// What is on the screen.
@@ -205,17 +270,16 @@ impl Terminal {
 
     /// Waits for the end; gives the exit code after checking that the terminal is as it was before.
     #[track_caller]
-    pub fn end(mut self) -> u32 {
-        let deadline = Instant::now() + LIMIT;
-        let status = loop {
-            if let Some(status) = self.child.try_wait().expect("a child") {
-                break status;
-            }
-            assert!(Instant::now() < deadline, "it does not end\n{}", self.text());
-            std::thread::sleep(Duration::from_millis(5));
-        };
+    pub fn end(self) -> u32 {
+        self.end_saying("")
+    }
+
+    /// The same, with one of these words, `|` between them, on the screen then.
+    #[track_caller]
+    pub fn end_saying(mut self, words: &str) -> u32 {
+        let code = self.code();
         self.wait("the screen from before, with a cursor", |screen| {
-            !screen.alternate_screen() && !screen.hide_cursor()
+            !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
         });
         let modes = self.master.get_termios().expect("modes").local_flags.bits();
         for (name, flag) in
@@ -223,7 +287,8 @@ impl Terminal {
         {
             assert_ne!(modes & flag.bits(), 0, "{name} is off");
         }
-        status.exit_code()
+        self.wait(words, |screen| words.split('|').any(|word| screen.contents().contains(word)));
+        code
     }
 }
 
@@ -252,11 +317,11 @@ pub struct Colors {
 }
 
 impl Colors {
-    /// Those of half blocks.
+    /// Those of the upper halves of cells.
     pub fn of(screen: &vt100::Screen) -> Self {
         let mut colors = Self::default();
-        for cell in cells(screen).filter(|cell| cell.contents() == "▀") {
-            let vt100::Color::Rgb(r, g, b) = cell.fgcolor() else { continue };
+        for color in cells(screen).filter_map(upper) {
+            let vt100::Color::Rgb(r, g, b) = color else { continue };
             let above = |a: u8, b: u8, c: u8| a > 90 && a / 2 > b.max(c);
             colors.red += usize::from(above(r, g, b));
             colors.green += usize::from(above(g, r, b));
@@ -269,11 +334,24 @@ impl Colors {
         self.red + self.green + self.blue
     }
 
+    pub fn is_most(&self, name: &str) -> bool {
+        self.most() == Some(name)
+    }
+
     /// The colour of nearly all of them, if they are enough for a picture.
     fn most(&self) -> Option<&'static str> {
         let total = self.total();
         let all = [(self.red, "red"), (self.green, "green"), (self.blue, "blue")];
         all.into_iter().find(|(count, _)| total > 100 && count * 10 > total * 9).map(|(_, name)| name)
+    }
+}
+
+/// The colour of a cell's upper half, however it is drawn.
+pub fn upper(cell: &vt100::Cell) -> Option<vt100::Color> {
+    match cell.contents() {
+        "▀" | "█" => Some(cell.fgcolor()),
+        "▄" | " " | "" => Some(cell.bgcolor()),
+        _ => None,
     }
 }
 

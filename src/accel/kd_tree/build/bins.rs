@@ -2,34 +2,46 @@
 //! (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree Construction for Interactive Ray Tracing of Dynamic
 //! Scenes*, 2007), and the two faces of the box around all, beyond which space is empty.
 
+use std::array;
+
 use rayon::prelude::*;
 
-use super::cost::{Plane, Search};
+use super::cost::{Plane, Planes, Search};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
 /// Bins along an axis.
-const BINS: usize = 32;
+const BINS: usize = 31;
+
+/// Planes between them, and those before the first and behind the last.
+const PLANES: usize = BINS + 1;
 
 /// More references are counted in parallel.
 const PARALLEL_SIZE: usize = 1 << 16;
 
 /// How many boxes start and end in each bin of each axis.
 struct Histogram {
-    starts: [[u32; BINS]; 3],
-    ends: [[u32; BINS]; 3],
+    starts: [[u32; PLANES]; 3],
+    ends: [[u32; PLANES]; 3],
 }
+
+/// Added to a number from −½ to 2²², it leaves the nearest integer in the low bits.
+const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
     fn of(references: &[Reference], start: Vec4, per_length: Vec4) -> Self {
-        let mut own = Self { starts: [[0; BINS]; 3], ends: [[0; BINS]; 3] };
-        let bin = |place: f32| (place as i32).clamp(0, BINS as i32 - 1) as usize;
+        let mut own = Self { starts: [[0; PLANES]; 3], ends: [[0; PLANES]; 3] };
+        // A half less, so that the nearest integer is the one below.
+        let bins = |at: Vec4| {
+            let place = (at - start) * per_length - Vec4::splat(0.5);
+            place.clamp(Vec4::ZERO, Vec4::splat((BINS - 1) as f32)) + Vec4::splat(ROUND)
+        };
         for reference in references {
-            let low = (reference.bounds.min - start) * per_length;
-            let high = (reference.bounds.max() - start) * per_length;
+            let low = bins(reference.bounds.min).to_array().map(f32::to_bits);
+            let high = bins(reference.bounds.max()).to_array().map(f32::to_bits);
             for axis in 0..3 {
-                own.starts[axis][bin(low[axis])] += 1;
-                own.ends[axis][bin(high[axis])] += 1;
+                own.starts[axis][low[axis] as usize % PLANES] += 1;
+                own.ends[axis][high[axis] as usize % PLANES] += 1;
             }
         }
         own
@@ -44,9 +56,10 @@ impl Histogram {
     }
 }
 
-/// The cheapest plane; none where a leaf is as cheap. `around` is the box around the references.
-pub fn cheapest(references: &[Reference], cell: &Bounds, around: &Bounds) -> Option<Plane> {
-    let extent = around.max() - around.min;
+/// The cheapest plane; none where a leaf is as cheap.
+pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
+    let around = Bounds::around(references);
+    let extent = around.extent();
     let scale = |length: f32| {
         let per_length = BINS as f32 / length;
         if length > 0.0 && per_length.is_finite() { per_length } else { 0.0 }
@@ -59,19 +72,19 @@ pub fn cheapest(references: &[Reference], cell: &Bounds, around: &Bounds) -> Opt
     } else {
         Histogram::of(references, around.min, per_length)
     };
-    let mut search = Search::new(cell, references.len());
-    let count = references.len();
+    let mut search = Search::<{ PLANES / 4 }>::new(cell, references.len());
     for axis in 0..3 {
-        search.along(axis, |across| {
-            across.offer(around.min[axis], 0, count, 0);
-            across.offer(around.max()[axis], count, 0, 0);
-            let (mut left, mut right) = (0, count);
-            for bin in 1..if per_length[axis] > 0.0 { BINS } else { 1 } {
-                left += histogram.starts[axis][bin - 1] as usize;
-                right -= histogram.ends[axis][bin - 1] as usize;
-                across.offer(around.min[axis] + extent[axis] * (bin as f32 / BINS as f32), left, right, 0);
-            }
-        });
+        let (min, max) = (around.min.to_array()[axis], around.max().to_array()[axis]);
+        let (mut at, mut left, mut right) = ([min; PLANES], [0; PLANES], [references.len() as u32; PLANES]);
+        for bin in 1..if per_length[axis] > 0.0 { BINS } else { 1 } {
+            at[bin] = min + (max - min) * (bin as f32 / BINS as f32);
+            left[bin] = left[bin - 1] + histogram.starts[axis][bin - 1];
+            right[bin] = right[bin - 1] - histogram.ends[axis][bin - 1];
+        }
+        (at[BINS], left[BINS], right[BINS]) = (max, references.len() as u32, 0);
+        let four = |from: [f32; PLANES]| array::from_fn(|i| Vec4::from_slice(&from[4 * i..]));
+        let counts = |counts: [u32; PLANES]| four(counts.map(|count| count as f32));
+        search.offer(axis, false, &Planes { at: four(at), left: counts(left), right: counts(right) });
     }
     // What lies in the plane must not go where space is to be empty.
     search.cheapest().map(|plane| Plane { planar_right: plane.at <= around.min[plane.axis], ..plane })

@@ -1,8 +1,8 @@
 //! What a split is expected to cost, by surface areas (MacDonald, Booth, *Heuristics for ray tracing using space
-//! subdivision*, 1990).
+//! subdivision*, 1990). Planes are weighed four at a time.
 
 use crate::accel::reference::Bounds;
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 
 /// What one step of traversal costs, in tests of a triangle.
 const TRAVERSAL_COST: f32 = 1.0;
@@ -13,89 +13,97 @@ const EMPTY_FACTOR: f32 = 0.8;
 /// Instead of an axis.
 const LEAF: usize = 3;
 
-/// A plane and what comes of it.
-#[derive(Clone, Copy, Debug)]
+/// Above the axis in a tag: triangles in the plane go to the right.
+const PLANAR_RIGHT: usize = 4;
+
+/// A plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     pub axis: usize,
     pub at: f32,
     /// Triangles in the plane go to the right.
     pub planar_right: bool,
-    pub cost: f32,
 }
 
-/// Takes planes of one cell and keeps the cheapest.
-pub struct Search<'a> {
-    cell: &'a Bounds,
+/// 4·`N` planes across one axis, and how many triangles are on either side of each; those on both sides count on both.
+#[derive(Clone, Copy)]
+pub struct Planes<const N: usize> {
+    pub at: [Vec4; N],
+    pub left: [Vec4; N],
+    pub right: [Vec4; N],
+}
+
+/// Takes planes of one cell, 4·`N` at a time, and keeps the cheapest of each lane.
+pub struct Search<const N: usize> {
+    min: [f32; 4],
+    max: [f32; 4],
     /// Extents, flat ones taken as a little thick, so that cells without area are split as well.
     extent: [f32; 3],
     inverse_area: f32,
-    best: Plane,
+    cost: [Vec4; N],
+    at: [Vec4; N],
+    /// Axis or [`LEAF`], and [`PLANAR_RIGHT`]; as floats, as all is selected by floats.
+    tag: [Vec4; N],
 }
 
-impl<'a> Search<'a> {
+impl<const N: usize> Search<N> {
     /// Only planes that make `count` triangles cheaper than a leaf of them count.
-    pub fn new(cell: &'a Bounds, count: usize) -> Self {
-        let extent = (cell.max() - cell.min).truncate();
+    #[inline(always)]
+    pub fn new(cell: &Bounds, count: usize) -> Self {
+        let extent = cell.extent().truncate();
         let extent = extent.max(Vec3::splat(extent.max_element() * 1e-4)).to_array();
         let [x, y, z] = extent;
-        let best = Plane { axis: LEAF, at: 0.0, planar_right: false, cost: count as f32 };
-        Self { cell, extent, inverse_area: 1.0 / (x * y + y * z + z * x), best }
+        Self {
+            min: cell.min.to_array(),
+            max: cell.max().to_array(),
+            extent,
+            inverse_area: 1.0 / (x * y + y * z + z * x),
+            cost: [Vec4::splat(count as f32); N],
+            at: [Vec4::ZERO; N],
+            tag: [Vec4::splat(LEAF as f32); N],
+        }
     }
 
-    /// The cheapest; none where a leaf is.
-    pub fn cheapest(self) -> Option<Plane> {
-        Some(self.best).filter(|plane| plane.axis != LEAF)
-    }
-
-    /// Offer planes across an axis by a closure that is given where to.
+    /// Offer planes; those outside of the cell do not count.
     #[inline(always)]
-    pub fn along(&mut self, axis: usize, offer: impl FnOnce(&mut Across)) {
+    pub fn offer(&mut self, axis: usize, planar_right: bool, planes: &Planes<N>) {
         let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
-        let mut across = Across {
-            axis,
-            min: self.cell.min[axis],
-            max: self.cell.max()[axis],
-            face: u * v * self.inverse_area,
-            per_length: (u + v) * self.inverse_area,
-            best: self.best,
-        };
-        offer(&mut across);
-        self.best = across.best;
-    }
-}
-
-/// Takes planes across one axis.
-pub struct Across {
-    axis: usize,
-    min: f32,
-    max: f32,
-    /// Area of the plane in the cell, and what each unit of length along the axis adds; relative to the cell's.
-    face: f32,
-    per_length: f32,
-    best: Plane,
-}
-
-impl Across {
-    /// A plane with so many triangles below, above and in it.
-    #[inline(always)]
-    pub fn offer(&mut self, at: f32, left: usize, right: usize, planar: usize) {
-        if !(at > self.min && at < self.max) {
-            return;
-        }
-        self.offer_side(at, left + planar, right, false);
-        if planar > 0 {
-            self.offer_side(at, left, right + planar, true);
+        // Area of the plane in the cell, and what each unit of length along the axis adds; relative to the cell's.
+        let face = Vec4::splat(u * v * self.inverse_area);
+        let per_length = Vec4::splat((u + v) * self.inverse_area);
+        let (min, max) = (Vec4::splat(self.min[axis]), Vec4::splat(self.max[axis]));
+        let tag = Vec4::splat((axis + if planar_right { PLANAR_RIGHT } else { 0 }) as f32);
+        for i in 0..N {
+            let (at, left, right) = (planes.at[i], planes.left[i], planes.right[i]);
+            let below = (face + (at - min) * per_length) * left;
+            let above = (face + (max - at) * per_length) * right;
+            let is_empty = left.min(right).cmpeq(Vec4::ZERO);
+            let factor = Vec4::select(is_empty, Vec4::splat(EMPTY_FACTOR), Vec4::ONE);
+            let cost = factor * (Vec4::splat(TRAVERSAL_COST) + below + above);
+            self.take(i, Vec4::select(at.cmpgt(min) & at.cmplt(max), cost, Vec4::INFINITY), at, tag);
         }
     }
 
+    /// Take what is cheaper than what is there.
     #[inline(always)]
-    fn offer_side(&mut self, at: f32, left: usize, right: usize, planar_right: bool) {
-        let below = (self.face + (at - self.min) * self.per_length) * left as f32;
-        let above = (self.face + (self.max - at) * self.per_length) * right as f32;
-        let factor = if left == 0 || right == 0 { EMPTY_FACTOR } else { 1.0 };
-        let cost = factor * (TRAVERSAL_COST + below + above);
-        if cost < self.best.cost {
-            self.best = Plane { axis: self.axis, at, planar_right, cost };
+    fn take(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
+        let is_cheaper = cost.cmplt(self.cost[i]);
+        self.cost[i] = Vec4::select(is_cheaper, cost, self.cost[i]);
+        self.at[i] = Vec4::select(is_cheaper, at, self.at[i]);
+        self.tag[i] = Vec4::select(is_cheaper, tag, self.tag[i]);
+    }
+
+    /// The cheapest; none where a leaf is as cheap.
+    #[inline(always)]
+    pub fn cheapest(mut self) -> Option<Plane> {
+        for i in 1..N {
+            let (cost, at, tag) = (self.cost[i], self.at[i], self.tag[i]);
+            self.take(0, cost, at, tag);
         }
+        let cost = self.cost[0].to_array();
+        let lane = (1..4).fold(0, |best, lane| if cost[lane] < cost[best] { lane } else { best });
+        let tag = self.tag[0].to_array()[lane] as usize;
+        let (axis, planar_right) = (tag % PLANAR_RIGHT, tag >= PLANAR_RIGHT);
+        (axis != LEAF).then_some(Plane { axis, at: self.at[0].to_array()[lane], planar_right })
     }
 }

@@ -5,18 +5,23 @@
 
 mod bins;
 mod cost;
+mod join;
+mod partition;
 mod subtree;
 mod sweep;
 
 use rayon::prelude::*;
 
-use super::node::{self, Kind, Node, Triangle};
+use super::node::{self, Node, Triangle};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 
 use crate::accel::reference::{Bounds, Reference};
+use cost::Plane;
+use join::Part;
+use partition::Scratch;
 use subtree::Subtree;
 
 /// Cells of at most this many references are built by one thread; the token is polled between them.
@@ -69,18 +74,14 @@ fn build_within(
         let (nodes, references, triangles) = Default::default();
         return Ok(Built { nodes, references, triangles, bounds: Aabb::EMPTY });
     }
-    let mut around = Bounds::EMPTY;
-    for reference in &references {
-        around.grow(&reference.bounds);
-    }
+    let bounds = Bounds::around(&references);
     let levels = depth_limit(references.len());
-    let part = part(Cell { references, bounds: around, around, levels, room }, &corners, token)?;
-    let mut all = Subtree::default();
-    part.append_to(&mut all);
+    let part = part(&Cell { bounds, levels, room }, references, &corners, token)?;
+    let all = part.join();
     token.check()?;
     let (references, order) = by_first_use(all.ids, count);
     let triangles = order.into_par_iter().map(|id| Triangle { corners: corners(id), id }).collect();
-    Ok(Built { nodes: all.nodes, references, triangles, bounds: around.aabb() })
+    Ok(Built { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
 }
 
 /// Triangles in the order in which leaves first name them, and their places there instead of their numbers.
@@ -98,12 +99,10 @@ fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     (ids, order)
 }
 
-/// A part of space and what is in it.
+/// A part of space.
+#[derive(Clone, Copy)]
 struct Cell {
-    references: Vec<Reference>,
     bounds: Bounds,
-    /// The box around the references.
-    around: Bounds,
     /// How many planes may yet follow.
     levels: u32,
     /// How many leaves and references together may come of it.
@@ -111,101 +110,61 @@ struct Cell {
 }
 
 impl Cell {
-    /// The room of a leaf.
-    fn own_room(&self) -> u64 {
-        self.references.len() as u64 + 1
-    }
-
     /// The plane to split it by; none for a leaf.
-    fn plane(&self) -> Option<cost::Plane> {
+    fn plane(&self, references: &[Reference]) -> Option<Plane> {
         // A plane through all triangles makes two of each.
-        let has_room = 2 * self.own_room() <= self.room;
-        if self.levels == 0 || self.references.is_empty() || !has_room {
+        let has_room = 2 * leaf_room(references.len()) <= self.room;
+        if self.levels == 0 || references.is_empty() || !has_room {
             None
-        } else if self.references.len() <= sweep::SWEPT {
-            sweep::cheapest(&self.references, &self.bounds)
+        } else if references.len() <= sweep::SWEPT {
+            sweep::cheapest(references, &self.bounds)
         } else {
-            bins::cheapest(&self.references, &self.bounds, &self.around)
+            bins::cheapest(references, &self.bounds)
         }
     }
 
-    /// Its halves. What only touches the plane goes to the side that it is on.
-    fn split(self, plane: &cost::Plane, corners: &impl Fn(u32) -> [Vec3; 3]) -> [Self; 2] {
-        let Self { mut references, bounds, levels, room, .. } = self;
-        let mut right = Vec::with_capacity(references.len() / 2);
-        let mut around = [Bounds::EMPTY; 2];
-        let (axis, at) = (plane.axis, plane.at);
-        references.retain_mut(|reference| {
-            let (min, max) = (reference.bounds.min[axis], reference.bounds.max()[axis]);
-            let (below, above) = (min < at, max > at);
-            if below && above {
-                let [own, other] = reference.split(axis, at, corners(reference.id()));
-                around[0].grow(&own.bounds);
-                around[1].grow(&other.bounds);
-                *reference = own;
-                right.push(other);
-                return true;
-            }
-            let goes_right = above || (!below && plane.planar_right);
-            around[usize::from(goes_right)].grow(&reference.bounds);
-            if goes_right {
-                right.push(*reference);
-            }
-            !goes_right
-        });
-        let [left_bounds, right_bounds] = bounds.halves(axis, at);
-        let levels = levels - 1;
-        let mut left = Self { references, bounds: left_bounds, around: around[0], levels, room };
-        let mut right = Self { references: right, bounds: right_bounds, around: around[1], levels, room };
-        // In proportion: as `room` is enough for both, so is the share of each.
-        left.room = room * left.own_room() / (left.own_room() + right.own_room());
-        right.room = room - left.room;
-        [left, right]
+    /// Its halves, with so many references in each.
+    fn halves(&self, plane: &Plane, counts: [usize; 2]) -> [Self; 2] {
+        let [left, right] = counts.map(leaf_room);
+        // In proportion: as the room is enough for both, so is the share of each.
+        let room = self.room * left / (left + right);
+        let levels = self.levels - 1;
+        let [below, above] = self.bounds.halves(plane.axis, plane.at);
+        [Self { bounds: below, levels, room }, Self { bounds: above, levels, room: self.room - room }]
     }
 }
 
-/// A part of the tree above the subtrees.
-enum Part {
-    /// Two halves.
-    Halves { axis: usize, at: f32, halves: Box<[Part; 2]> },
-    /// Built by one thread.
-    Built(Subtree),
-}
-
-impl Part {
-    /// Node before children, left before right.
-    fn append_to(self, all: &mut Subtree) {
-        match self {
-            Self::Built(subtree) => all.append(&subtree),
-            Self::Halves { axis, at, halves } => {
-                let place = all.nodes.len();
-                all.nodes.push(Node::new(Kind::Leaf { first: 0, count: 0 }));
-                let [left, right] = *halves;
-                left.append_to(all);
-                all.nodes[place] = Node::new(Kind::Inner { axis, at, right: all.nodes.len() as u32 });
-                right.append_to(all);
-            }
-        }
-    }
+/// The room that a leaf of so many references takes.
+fn leaf_room(count: usize) -> u64 {
+    count as u64 + 1
 }
 
 /// Split until one thread can take over.
 fn part(
-    cell: Cell,
+    cell: &Cell,
+    mut references: Vec<Reference>,
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
 ) -> Result<Part, Cancelled> {
     token.check()?;
-    let plane = if cell.references.len() > TASK_SIZE { cell.plane() } else { None };
-    let Some(plane) = plane else { return Ok(Part::Built(Subtree::build(cell, corners))) };
-    let [left, right] = cell.split(&plane, corners);
-    let (left, right) = rayon::join(|| part(left, corners, token), || part(right, corners, token));
-    Ok(Part::Halves { axis: plane.axis, at: plane.at, halves: Box::new([left?, right?]) })
+    let plane = if references.len() > TASK_SIZE { cell.plane(&references) } else { None };
+    let Some(plane) = plane else {
+        return Ok(Part::Built(Subtree::build(cell, references, corners, token)?));
+    };
+    let left = Scratch::default().partition(&mut references, 0, &plane, corners).to_vec();
+    references.shrink_to_fit();
+    let [left_cell, right_cell] = cell.halves(&plane, [left.len(), references.len()]);
+    let (left, right) = rayon::join(
+        || part(&left_cell, left, corners, token),
+        || part(&right_cell, references, corners, token),
+    );
+    Ok(Part::halves(plane, [left?, right?]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::kd_tree::node::Kind;
 
     #[test]
     fn a_tree_without_room_makes_leaves_early() {

@@ -1,7 +1,10 @@
 //! What one thread builds.
 
 use super::Cell;
+use super::partition::Scratch;
 use crate::accel::kd_tree::node::{Kind, Node};
+use crate::accel::reference::Reference;
+use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
 /// Nodes and numbers of triangles, counted from its own first.
@@ -13,32 +16,57 @@ pub struct Subtree {
 
 impl Subtree {
     /// Of a cell and all in it.
-    pub fn build(cell: Cell, corners: &impl Fn(u32) -> [Vec3; 3]) -> Self {
-        let mut own = Self::default();
-        own.add(cell, corners);
-        own
-    }
-
-    /// Recursion is as deep as the tree, which is limited.
-    fn add(&mut self, cell: Cell, corners: &impl Fn(u32) -> [Vec3; 3]) {
-        let place = self.nodes.len();
-        let first = self.ids.len() as u32;
-        self.nodes.push(Node::new(Kind::Leaf { first, count: cell.references.len() as u32 }));
-        let Some(plane) = cell.plane() else {
-            self.ids.extend(cell.references.iter().map(super::Reference::id));
-            return;
-        };
-        let [left, right] = cell.split(&plane, corners);
-        self.add(left, corners);
-        let right_place = self.nodes.len() as u32;
-        self.nodes[place] = Node::new(Kind::Inner { axis: plane.axis, at: plane.at, right: right_place });
-        self.add(right, corners);
-    }
-
-    /// Put another behind.
-    pub fn append(&mut self, other: &Self) {
-        let (nodes, ids) = (self.nodes.len() as u32, self.ids.len() as u32);
-        self.nodes.extend(other.nodes.iter().map(|node| node.moved(nodes, ids)));
-        self.ids.extend_from_slice(&other.ids);
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build(
+        cell: &Cell,
+        references: Vec<Reference>,
+        corners: &impl Fn(u32) -> [Vec3; 3],
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        let mut builder =
+            Builder { built: Self::default(), references, scratch: Scratch::default(), corners, token };
+        builder.add(0, cell)?;
+        Ok(builder.built)
     }
 }
+
+/// Builds a subtree in memory that is allocated once.
+struct Builder<'a, C> {
+    built: Subtree,
+    /// Those of all cells that are yet to be built, the next one's last.
+    references: Vec<Reference>,
+    scratch: Scratch,
+    corners: &'a C,
+    token: &'a CancelToken,
+}
+
+impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
+    /// Add a cell whose references begin at `first`, and take them away. Recursion is as deep as the tree, which is limited.
+    fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
+        let place = self.built.nodes.len();
+        let own = &self.references[first..];
+        let leaf = Kind::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
+        self.built.nodes.push(Node::new(leaf));
+        let Some(plane) = cell.plane(own) else {
+            self.built.ids.extend(own.iter().map(Reference::id));
+            self.references.truncate(first);
+            return Ok(());
+        };
+        if own.len() > POLLED {
+            self.token.check()?;
+        }
+        let left = self.scratch.partition(&mut self.references, first, &plane, self.corners);
+        let middle = self.references.len();
+        let [left_cell, right_cell] = cell.halves(&plane, [left.len(), middle - first]);
+        self.references.extend_from_slice(left);
+        self.add(middle, &left_cell)?;
+        let right = self.built.nodes.len() as u32;
+        self.built.nodes[place] = Node::new(Kind::Inner { axis: plane.axis, at: plane.at, right });
+        self.add(first, &right_cell)
+    }
+}
+
+/// The token is polled where a cell with more references is split.
+const POLLED: usize = 256;

@@ -81,8 +81,7 @@ struct Plane {
 
 impl Grid {
     fn around(references: &[Reference]) -> Self {
-        let mut all = Bounds::EMPTY;
-        references.iter().for_each(|reference| all.grow(&reference.bounds));
+        let all = Bounds::around(references);
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 

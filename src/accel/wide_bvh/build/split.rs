@@ -337,27 +337,71 @@ mod tests {
         [min.x, min.y, min.z, max.x, max.y, max.z].map(f32::to_bits)
     }
 
+    type Partition = fn(&mut [Reference], usize, &Bins) -> (usize, [Bounds; 2]);
+
+    /// By vectors and by plain code, along each axis.
+    const PARTITIONS: [[Partition; 2]; 3] = [
+        [partitioned::<0>, partition_by_plane::<0>],
+        [partitioned::<1>, partition_by_plane::<1>],
+        [partitioned::<2>, partition_by_plane::<2>],
+    ];
+
     #[test]
-    fn vectors_count_and_partition_as_plain_code_does() {
-        for count in [1, 2, 5, 33, 1000] {
-            let references = references(count);
-            let boxes = Boxes::around(&references);
-            let bins = Bins::new(&boxes.centroids, references.len());
-            let mut plain = Histogram::<BINS>::EMPTY;
-            plain.count(&references, &bins);
-            let own = Histogram::<BINS>::of(&references, &bins);
+    fn vectors_count_as_plain_code_does() {
+        fn counts<const N: usize>(references: &[Reference], bins: &Bins) {
+            let mut plain = Histogram::<N>::EMPTY;
+            plain.count(references, bins);
+            let own = Histogram::<N>::of(references, bins);
             assert_eq!(own.counts, plain.counts);
+            for axis in 0..3 {
+                let counted: u32 = own.counts[..bins.count].iter().map(|counts| counts[axis]).sum();
+                assert_eq!(counted as usize, references.len(), "all are in the bins that there are");
+                // Each bin has those that are in it, and no others.
+                for (bin, (bounds, counts)) in own.bounds.iter().zip(&own.counts).enumerate() {
+                    let inside = |one: &&Reference| bins.of(one)[axis] == bin;
+                    let inside: Vec<Reference> = references.iter().filter(inside).copied().collect();
+                    assert_eq!(counts[axis] as usize, inside.len());
+                    assert_eq!(bits(&bounds[axis]), bits(&Bounds::around(&inside)));
+                }
+            }
             for (own, plain) in own.bounds.iter().flatten().zip(plain.bounds.iter().flatten()) {
                 assert_eq!(bits(own), bits(plain));
             }
-            for bin in 1..bins.count {
-                let (mut own, mut plain) = (references.clone(), references.clone());
-                let (own_middle, own_sides) = partitioned::<1>(&mut own, bin, &bins);
-                let (middle, sides) = partition_by_plane::<1>(&mut plain, bin, &bins);
-                assert_eq!(own_middle, middle);
-                let ids = |references: &[Reference]| references.iter().map(Reference::id).collect::<Vec<_>>();
-                assert_eq!(ids(&own), ids(&plain));
-                assert_eq!(own_sides.each_ref().map(bits), sides.each_ref().map(bits));
+        }
+        for count in [1, 2, 5, 24, FEW, FEW + 1, 1000] {
+            let references = references(count as u32);
+            let bins = Bins::new(&Boxes::around(&references).centroids, references.len());
+            if count <= FEW {
+                assert!(bins.count <= FEW_BINS, "{} bins", bins.count);
+                counts::<FEW_BINS>(&references, &bins);
+            }
+            counts::<BINS>(&references, &bins);
+        }
+    }
+
+    #[test]
+    fn vectors_partition_as_plain_code_does_along_every_axis() {
+        for count in [1, 2, 5, 33, 1000] {
+            let references = references(count);
+            let bins = Bins::new(&Boxes::around(&references).centroids, references.len());
+            for (axis, [by_vectors, plainly]) in PARTITIONS.into_iter().enumerate() {
+                for bin in 1..bins.count {
+                    let (mut own, mut plain) = (references.clone(), references.clone());
+                    let (middle, sides) = by_vectors(&mut own, bin, &bins);
+                    let (plain_middle, plain_sides) = plainly(&mut plain, bin, &bins);
+                    assert_eq!(middle, plain_middle);
+                    let ids =
+                        |references: &[Reference]| references.iter().map(Reference::id).collect::<Vec<_>>();
+                    assert_eq!(ids(&own), ids(&plain));
+                    assert_eq!(sides.each_ref().map(bits), plain_sides.each_ref().map(bits));
+                    let is_left = |one: &Reference| bins.of(one)[axis] < bin;
+                    assert!(
+                        own[..middle].iter().all(is_left) && !own[middle..].iter().any(is_left),
+                        "{axis}"
+                    );
+                    let around = |side: &[Reference]| bits(&Boxes::around(side).centroids);
+                    assert_eq!(sides.each_ref().map(bits), [around(&own[..middle]), around(&own[middle..])]);
+                }
             }
         }
     }

@@ -124,7 +124,7 @@ fn push_ordered(tree: &WideBvh, node: &Node, near: F8, met: u32, stack: &mut Sta
 
 /// Ask for the beginning of a child's memory before it is needed; asking for all of it is slower.
 #[inline(always)]
-pub(super) fn prefetch(tree: &WideBvh, code: u32) {
+pub fn prefetch(tree: &WideBvh, code: u32) {
     let index = (code & !LEAF_BITS) as usize;
     let node: *const i8 = tree.nodes.as_ptr().wrapping_add(index).cast();
     let pack: *const i8 = tree.packs.as_ptr().wrapping_add(index).cast();

@@ -87,3 +87,46 @@ fn distance_error<V: Lanes>(corners: &Corners<V>, shear_z: V, inverse_determinan
 fn greatest<V: Lanes>(corners: &Corners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
 }
+
+#[cfg(test)]
+#[allow(unsafe_code)]
+mod tests {
+    use super::*;
+    use crate::accel::pathological::random;
+    use crate::accel::wide_bvh::simd::lanes::F4;
+
+    /// Triangles as thin as the filter is told to let pass, and a little thicker.
+    #[test]
+    fn the_filter_lets_every_needle_pass_and_hardly_anything_else() {
+        // SAFETY: four floats are in every processor of this architecture.
+        let like = unsafe { F4::splat(0.0) };
+        let mut next = random(31);
+        let (mut needles, mut passed, mut thick) = (0, 0, 0);
+        for round in 0..200_000 {
+            // Needles of all widths, sizes and distances, as those in whose corners |x| = |y| are the worst.
+            let size = 2.0_f32.powf(next() * 12.0);
+            let depth = if round % 2 == 0 { 0.0 } else { size * 2.0_f32.powf(next() * 10.0) };
+            let width = size * 2.0_f32.powf(next() * 7.0 - 14.0) * (1.0 + depth / size);
+            let along = if round % 3 == 0 { [next(), next()] } else { [1.0, 1.0_f32.copysign(next())] };
+            let mut corner = |part: f32| {
+                let at = |axis: usize, off: f32| along[axis] * size * part + off * width;
+                [at(0, next()), at(1, next()), depth * (1.0 - 0.1 * next().abs())]
+            };
+            let scalar = [corner(1.0), corner(-1.0), corner(0.3)];
+            let corners: Corners<F4> = scalar.map(|corner| corner.map(|x| like.like(x)));
+            let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = corners;
+            let determinant = (cx * by - cy * bx) + (ax * cy - ay * cx) + (bx * ay - by * ax);
+            let shear_z = like.like(2.0_f32.powf(next() * 8.0));
+            let (error, reach) = distance_error(&corners, shear_z, like.like(1.0).over(determinant));
+            let is_needle = F4::bits((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
+            let farthest = scalar.iter().flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
+            let passes = F4::bits(may_be_needle(&corners, determinant, slender(like.like(farthest)))) != 0;
+            assert!(passes || !is_needle, "{scalar:?}");
+            needles += u32::from(is_needle);
+            passed += u32::from(passes);
+            thick += u32::from(!passes);
+        }
+        assert!(needles > 20_000 && thick > 20_000, "{needles} needles, {thick} that do not pass");
+        assert!(passed < 4 * needles, "{passed} pass, {needles} are needles");
+    }
+}

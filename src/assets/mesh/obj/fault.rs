@@ -14,6 +14,7 @@ pub(super) fn first_fault(source: &Source<'_>) -> Option<AssetError> {
             b"vt" => counted(&mut cursor, &mut counts[1], 2, "texture coordinates"),
             b"vn" => counted(&mut cursor, &mut counts[2], 3, "normal coordinates"),
             b"f" => face_fault(&mut cursor, counts),
+            b"usemtl" if !cursor.skip_in_line() => Some("`usemtl` is followed by a name".to_owned()),
             _ => None,
         };
         if let Some(reason) = reason {
@@ -27,15 +28,17 @@ pub(super) fn first_fault(source: &Source<'_>) -> Option<AssetError> {
 fn counted(cursor: &mut Cursor<'_>, count: &mut i64, wanted: usize, what: &str) -> Option<String> {
     *count += 1;
     let mut found = 0;
-    while cursor.skip_in_line() {
-        let start = *cursor;
-        if cursor.float().is_none() {
-            let mut start = start;
+    let mut last = 1.0;
+    while skip_in_statement(cursor) {
+        let mut start = *cursor;
+        let Some(number) = cursor.float() else {
             return Some(format!("expected {wanted} {what}, found {}", shown(start.word())));
-        }
+        };
+        last = number;
         found += 1;
     }
     match found {
+        4 if what == "coordinates" && last == 0.0 => Some("the weight of a vertex is 0".to_owned()),
         4 if wanted == 3 => None,
         5 if what == "coordinates" => {
             Some("coordinates are followed by one weight or three colours".to_owned())
@@ -45,13 +48,22 @@ fn counted(cursor: &mut Cursor<'_>, count: &mut i64, wanted: usize, what: &str) 
     }
 }
 
-fn face_fault(cursor: &mut Cursor<'_>, counts: [i64; 3]) -> Option<String> {
+/// To the next word of this statement, which goes on behind a backslash at the end of a line.
+fn skip_in_statement(cursor: &mut Cursor<'_>) -> bool {
     while cursor.skip_in_line() {
-        let word = cursor.word();
-        if word == b"\\" {
-            cursor.end_line();
-            continue;
+        let mut ahead = *cursor;
+        if ahead.word() != b"\\" || ahead.skip_in_line() {
+            return true;
         }
+        ahead.end_line();
+        *cursor = ahead;
+    }
+    false
+}
+
+fn face_fault(cursor: &mut Cursor<'_>, counts: [i64; 3]) -> Option<String> {
+    while skip_in_statement(cursor) {
+        let word = cursor.word();
         let parts: Vec<&[u8]> = word.split(|&byte| byte == b'/').collect();
         if parts.len() > 3 {
             return Some(format!("expected a corner like 1/2/3, found {}", shown(word)));

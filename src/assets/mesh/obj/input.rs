@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, Read};
+use std::ops::Range;
 
 use super::super::Source;
 
@@ -14,32 +15,118 @@ pub(super) struct Survey<'a> {
 }
 
 impl<'a> Survey<'a> {
-    /// Lines that `tobj` mistakes for faces (`l`, `p`) are blanked, lines that go on behind a backslash joined,
-    /// bytes beyond UTF-8 replaced.
+    /// Comments behind numbers, colours of vertices and lines that `tobj` mistakes for faces (`l`, `p`) are blanked,
+    /// lines that go on behind a backslash joined, keywords before names brought to the start of their line, bytes
+    /// beyond UTF-8 replaced.
     pub(super) fn of(bytes: &'a [u8]) -> Self {
-        let mut text = Cow::Borrowed(bytes);
-        let mut used_materials = BTreeSet::new();
+        let mut survey = Self { text: Cow::Borrowed(bytes), used_materials: BTreeSet::new() };
+        let mut unfinished = None;
         let mut start = 0;
         for end in memchr::memchr_iter(b'\n', bytes).chain([bytes.len()]) {
-            let line = bytes[start..end].trim_ascii();
-            match line {
-                [b'l' | b'p', b' ' | b'\t', ..] => text.to_mut()[start..end].fill(b' '),
-                [b'u', b's', b'e', b'm', b't', b'l', b' ', name @ ..] => {
-                    used_materials.insert(String::from_utf8_lossy(name).trim().to_owned());
-                }
-                [.., b'\\'] => {
-                    let slash = bytes[start..end].trim_ascii_end().len() + start - 1;
-                    text.to_mut()[slash..(end + 1).min(bytes.len())].fill(b' ');
-                }
-                _ => {}
+            let line = &bytes[start..end];
+            let statement = unfinished.take().unwrap_or_else(|| Statement::of(line.trim_ascii_start()));
+            if survey.line(start, line, statement) {
+                unfinished = Some(statement);
             }
             start = (end + 1).min(bytes.len());
         }
-        if !text.is_ascii() && std::str::from_utf8(&text).is_err() {
-            text = Cow::Owned(String::from_utf8_lossy(&text).into_owned().into_bytes());
+        if !survey.text.is_ascii() && std::str::from_utf8(&survey.text).is_err() {
+            survey.text = Cow::Owned(String::from_utf8_lossy(&survey.text).into_owned().into_bytes());
         }
-        Self { text, used_materials }
+        survey
     }
+
+    /// A line at this byte, of this statement; whether the statement goes on in the next one.
+    fn line(&mut self, start: usize, line: &[u8], statement: Statement) -> bool {
+        let content = match statement {
+            Statement::Comment => return false,
+            Statement::Named => {
+                self.named(start, line);
+                line
+            }
+            Statement::Vertex | Statement::Numbers | Statement::Skipped => {
+                let content = &line[..memchr::memchr(b'#', line).unwrap_or(line.len())];
+                self.blank(start + content.len()..start + line.len());
+                content
+            }
+            Statement::Other => line,
+        };
+        match statement {
+            Statement::Skipped => self.blank(start..start + line.len()),
+            Statement::Vertex => {
+                let colours = colours(content).unwrap_or(content.len());
+                self.blank(start + colours..start + content.len());
+            }
+            Statement::Comment | Statement::Named | Statement::Numbers | Statement::Other => {}
+        }
+        let content = content.trim_ascii_end();
+        let goes_on = content.ends_with(b"\\");
+        if goes_on {
+            self.blank(start + content.len() - 1..start + content.len());
+            self.blank(start + line.len()..(start + line.len() + 1).min(self.text.len()));
+        }
+        goes_on
+    }
+
+    /// `tobj` takes what stands behind the first space of the line for the name.
+    fn named(&mut self, start: usize, line: &[u8]) {
+        let statement = line.trim_ascii();
+        let keyword = statement.iter().position(u8::is_ascii_whitespace).unwrap_or(statement.len());
+        if statement.starts_with(b"usemtl") {
+            self.used_materials.insert(String::from_utf8_lossy(&statement[keyword..]).trim().to_owned());
+        }
+        if line.len() > keyword && (!line.starts_with(statement) || line[keyword] != b' ') {
+            let text = &mut self.text.to_mut()[start..start + line.len()];
+            text.fill(b' ');
+            text[..statement.len()].copy_from_slice(statement);
+            text[keyword..].iter_mut().take(1).for_each(|blank| *blank = b' ');
+        }
+    }
+
+    fn blank(&mut self, range: Range<usize>) {
+        if !range.is_empty() {
+            self.text.to_mut()[range].fill(b' ');
+        }
+    }
+}
+
+/// What a line is, as far as it is read differently.
+#[derive(Clone, Copy)]
+enum Statement {
+    Comment,
+    Vertex,
+    /// Other numbers, up to a comment.
+    Numbers,
+    /// Points and lines.
+    Skipped,
+    /// A keyword and a name, in which `#` may occur.
+    Named,
+    Other,
+}
+
+impl Statement {
+    fn of(line: &[u8]) -> Self {
+        let keyword = line.iter().position(u8::is_ascii_whitespace).map_or(line, |end| &line[..end]);
+        match keyword {
+            b"v" => Self::Vertex,
+            b"vt" | b"vn" | b"f" => Self::Numbers,
+            b"l" | b"p" => Self::Skipped,
+            b"usemtl" | b"mtllib" => Self::Named,
+            [b'#', ..] => Self::Comment,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// Where the three colours of a vertex stand; `tobj` wants all vertices to have them, or none.
+fn colours(line: &[u8]) -> Option<usize> {
+    let mut ends = line.windows(2).enumerate().filter_map(|(at, pair)| {
+        (!pair[0].is_ascii_whitespace() && pair[1].is_ascii_whitespace()).then_some(at + 1)
+    });
+    // Behind the keyword and three coordinates.
+    let colours = ends.nth(3)?;
+    (line[colours..].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count() == 3)
+        .then_some(colours)
 }
 
 /// Bytes that `tobj` gets at a time, between two polls of the token.

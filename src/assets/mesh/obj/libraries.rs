@@ -1,15 +1,18 @@
 //! The material files of an OBJ.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::super::{AssetError, Source, mtl};
+use super::super::mtl::{self, cut_at_comments};
+use super::super::{AssetError, Source};
 use crate::assets::FileMaterial;
 
 /// The material files that an OBJ names, as they are met.
 pub(super) struct Libraries<'a> {
     pub(super) source: &'a Source<'a>,
+    /// Names that the OBJ asks for.
+    pub(super) used: &'a BTreeSet<String>,
     pub(super) found: RefCell<Found>,
     pub(super) failed: RefCell<Option<AssetError>>,
 }
@@ -17,31 +20,51 @@ pub(super) struct Libraries<'a> {
 #[derive(Default)]
 pub(super) struct Found {
     pub(super) materials: HashMap<String, FileMaterial>,
+    /// Names asked for that lead to a material.
+    pub(super) resolved: BTreeSet<String>,
     pub(super) warnings: Vec<String>,
     pub(super) missing: bool,
     /// Files that were read or looked for.
     pub(super) files: Vec<PathBuf>,
+    /// Pictures that they name.
+    pub(super) pictures: Vec<PathBuf>,
 }
 
 impl Libraries<'_> {
     /// One file, or several in one statement. A missing one is a warning; a malformed one is the mesh's error.
     pub(super) fn load(&self, statement: &Path) -> tobj::MTLLoadResult {
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
-        let whole = folder.join(statement);
-        let text = statement.to_string_lossy().replace('\\', "/");
-        let names: Vec<_> = if whole.exists() {
-            vec![whole]
-        } else if folder.join(&text).exists() {
-            vec![folder.join(&text)]
-        } else {
-            text.split_whitespace().map(|name| folder.join(name)).collect()
-        };
+        let text = statement.to_string_lossy();
+        let readings = cut_at_comments(&text).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
+        let whole = readings.map(|name| folder.join(name)).find(|path| path.exists());
+        let names = whole.map_or_else(
+            || {
+                let names = cut_at_comments(&text).last().unwrap_or(&text).replace('\\', "/");
+                names.split_whitespace().map(|name| folder.join(name)).collect()
+            },
+            |path| vec![path],
+        );
         let mut materials = Vec::new();
         for path in names {
             materials.extend(self.load_file(&path)?);
         }
-        let places = materials.iter().enumerate().map(|(index, found)| (found.name.clone(), index)).collect();
+        let places = self.places(&materials);
+        self.found.borrow_mut().resolved.extend(places.keys().cloned());
         Ok((materials, places))
+    }
+
+    /// Which of these materials each name asked for means. On both sides a comment may follow the name, and a name may
+    /// look as if one did (`Material #25`): what agrees in most of its length counts.
+    fn places(&self, materials: &[tobj::Material]) -> HashMap<String, usize> {
+        let whole = materials.iter().enumerate().map(|(index, found)| (found.name.as_str(), index));
+        let mut known: HashMap<&str, usize> = whole.clone().collect();
+        for (name, index) in whole {
+            for name in cut_at_comments(name) {
+                known.entry(name).or_insert(index);
+            }
+        }
+        let meant = |name: &String| cut_at_comments(name).find_map(|name| known.get(name).copied());
+        self.used.iter().filter_map(|name| Some((name.clone(), meant(name)?))).collect()
     }
 
     fn load_file(&self, path: &Path) -> Result<Vec<tobj::Material>, tobj::LoadError> {
@@ -50,7 +73,9 @@ impl Libraries<'_> {
             Ok(materials) => {
                 let folder = path.parent().unwrap_or(Path::new(""));
                 let known = materials.iter().map(|found| (found.name.clone(), mtl::material(found, folder)));
-                self.found.borrow_mut().materials.extend(known);
+                let mut found = self.found.borrow_mut();
+                found.materials.extend(known);
+                found.pictures.extend(materials.iter().flat_map(|material| mtl::pictures(material, folder)));
                 Ok(materials)
             }
             Err(error @ AssetError::Unreadable { .. }) => {

@@ -22,7 +22,8 @@ const OPTIONS: tobj::LoadOptions =
 
 pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     let survey = Survey::of(source.bytes);
-    let libraries = Libraries { source, found: RefCell::default(), failed: RefCell::default() };
+    let used = &survey.used_materials;
+    let libraries = Libraries { source, used, found: RefCell::default(), failed: RefCell::default() };
     let mut reader = Chunks::new(source, &survey.text);
     let result = contain(|| tobj::load_obj_buf(&mut reader, &OPTIONS, |name| libraries.load(name)));
     source.watch.token.check()?;
@@ -37,15 +38,16 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         };
         return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
     };
-    let Found { materials: known, mut warnings, missing, files } = libraries.found.into_inner();
+    let Found { materials: known, resolved, mut warnings, missing, files, pictures } =
+        libraries.found.into_inner();
     let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
         found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
     });
     if !missing {
-        let unknown = survey.used_materials.iter().filter(|name| !known.contains_key(*name));
+        let unknown = used.difference(&resolved);
         warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
     }
-    let mut parsed = Parsed { materials, warnings, companions: files, ..Parsed::default() };
+    let mut parsed = Parsed { materials, warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
     assemble(source, parsed)
 }

@@ -106,3 +106,57 @@ fn a_face_of_very_many_corners_ends() {
     let loaded = read(&format!("{SQUARE}f {}\n", corners.join(" "))).expect("a fan");
     assert!(!loaded.mesh.triangles.is_empty());
 }
+
+#[test]
+fn comments_may_stand_behind_a_statement() {
+    let plain = read(&format!("{SQUARE}vt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\n")).expect("whole").mesh;
+    for text in [
+        "v 0 0 0 # a\nv 1 0 0#\nv 1 1 0 # 1 2 3\nv 0 1 0\nvt 0 0 # x\nvn 0 0 1# y\nf 1/1/1 2/1/1 3/1/1 4/1/1 # x\n",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 \\\n3/1/1 4/1/1# C:\\\n# D:\\\n",
+        // A comment does not go on behind its end, whatever it ends with.
+        "# C:\\models\\\nv 0 0 0 # \\\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nl 1 2 # x\n",
+    ] {
+        assert_eq!(read(text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh, plain, "{text}");
+    }
+    assert_eq!(
+        says("v 0 0 0 # a\nv 1 0 0 # b\n# c\nf 1 2 3 # d\n"),
+        ":4: vertex 3 is out of range: there are 2, from 1"
+    );
+    assert_eq!(says("v 0 0 # 0\n"), ":1: expected 3 coordinates, found 2");
+    assert_eq!(says(&format!("{SQUARE}f 1 2 \\\n x\n")), ":5: expected a corner like 1/2/3, found \"x\"");
+}
+
+#[test]
+fn names_are_told_from_comments_by_what_there_is() {
+    let mtl = b"# of old\nnewmtl Material #25 # the floor\nKd 1 0 0 # red\nNs 10 # dull\nnewmtl b # c\nillum 2 # d\n\
+                newmtl d\n";
+    let text = format!(
+        "mtllib a.mtl # ours\n{SQUARE}usemtl Material #25\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl d # e\nf 2 3 4\n"
+    );
+    let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]).expect("whole");
+    assert_eq!(loaded.warnings, Vec::<String>::new());
+    assert_eq!(loaded.mesh.materials, [0, 1, 2]);
+    assert_eq!(loaded.materials[0].diffuse, Vec3::X);
+}
+
+#[test]
+fn keywords_may_be_indented_and_followed_by_tabs() {
+    let mtl = b"\tnewmtl\ta b\n\tKd\t1 0 0\n";
+    let text = format!("\tmtllib\ta.mtl\n{SQUARE}  usemtl\ta b \nf 1 2 3\n");
+    let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]).expect("whole");
+    assert_eq!(loaded.warnings, Vec::<String>::new());
+    assert_eq!(loaded.mesh.materials, [0]);
+}
+
+#[test]
+fn colours_and_weights_behind_coordinates() {
+    // Some vertices with a colour, some without.
+    let text = "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 1 1 1 # white\nf 1 2 3\n";
+    assert_eq!(read(text).expect("whole").mesh.positions[2], Vec3::Y);
+    assert_eq!(
+        read("v 0 0 0 2\nv 1 0 0 2\nv 0 1 0 0.5\nf 1 2 3\n").expect("whole").mesh.positions[2],
+        Vec3::Y * 2.0
+    );
+    assert_eq!(says("v 0 0 0\nv 1 0 0 0\nv 0 1 0\nf 1 2 3\n"), ":2: the weight of a vertex is 0");
+    assert_eq!(says("v 0 0 0 1 0\n"), ":1: coordinates are followed by one weight or three colours");
+}

@@ -112,6 +112,9 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
     let mut encoding = None;
     let mut elements = Vec::new();
     for (start, end, line) in lines {
+        if end == HEADER_LIMIT && !line.ends_with(b"\n") {
+            break; // cut within the line
+        }
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_whitespace().collect();
         if words == ["end_header"] {
@@ -120,7 +123,13 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
         }
         statement(&words, &mut encoding, &mut elements).map_err(|reason| source.wrong_at(start, reason))?;
     }
-    Err(source.wrong("the header has no end_header"))
+    let reason = "the header has no end_header";
+    Err(source.wrong(if bytes.len() == source.bytes.len() {
+        reason.to_owned()
+    } else {
+        let limit = HEADER_LIMIT >> 20;
+        format!("{reason} in its first {limit} MiB, and no more than that is read of a header")
+    }))
 }
 
 fn statement(

@@ -116,7 +116,8 @@ fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Resul
     let length = numbers.integer(count)?;
     match u64::try_from(length) {
         Ok(fits) if numbers.can_hold(item, fits) => Ok(fits as usize),
-        _ => Err(format!("it claims {length} corners, more than the file can hold")),
+        Ok(_) => Err(format!("it claims {length} corners, more than the file can hold")),
+        Err(_) => Err(format!("the length of a list is {length}")),
     }
 }
 

@@ -112,7 +112,7 @@ fn errors_name_line_or_face() {
         says(&ascii("0 0 0\n1 x 0\n0 0 0\n0 0 0\n3 0 1 2\n"))
             .contains("a.ply:12: vertex 2: expected a number")
     );
-    assert!(says(&ascii(&format!("{SQUARE}-3 0 1 2\n"))).contains("it claims -3 corners"));
+    assert!(says(&ascii(&format!("{SQUARE}-3 0 1 2\n"))).contains("the length of a list is -3"));
     let mut binary = wild(false);
     let last = binary.len() - 2;
     binary[last] = 9;
@@ -148,4 +148,28 @@ fn lies_cost_nothing() {
     file.extend([0; 48]);
     file.extend(4_000_000_000_u32.to_le_bytes());
     assert!(says(&file).contains("face 1: it claims 4000000000 corners"));
+}
+
+#[test]
+fn a_header_that_is_too_long_names_the_limit() {
+    let comments = format!("comment {}\n", "x".repeat(100)).repeat(10_000);
+    let long = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
+    let reason = says(long.as_bytes());
+    assert!(
+        reason.ends_with("no end_header in its first 1 MiB, and no more than that is read of a header"),
+        "{reason}"
+    );
+    let line = format!("ply\ncomment {}", "x".repeat(2 << 20));
+    assert!(says(line.as_bytes()).contains("no end_header in its first 1 MiB"));
+    // One just short enough, cut within a statement.
+    let comments = format!("comment {}\n", "x".repeat(100)).repeat(9_000);
+    let fits = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
+    assert!(read_bytes(fits.as_bytes()).is_ok());
+    assert_eq!(says(b"ply\nformat ascii 1.0\n"), "a.ply: the header has no end_header");
+}
+
+#[test]
+fn a_list_of_negative_length_is_said_to_be_one() {
+    assert_eq!(says(&ascii(&format!("{SQUARE}-3 0 1 2\n"))), "a.ply:15: face 1: the length of a list is -3");
+    assert!(says(&ascii(&format!("{SQUARE}999 0 1 2\n"))).contains("it claims 999 corners"));
 }

@@ -1,12 +1,10 @@
 //! Colours, and colours or textures.
 
-use toml::de::DeValue;
-
 use super::super::super::description::ColorSource;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::Names;
-use super::super::value::{limited, wrong_type};
+use super::super::value::{Item, wrong_type};
 use super::Key;
 use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
@@ -27,14 +25,14 @@ impl Key<'_> {
 
     /// A colour ≥ 0 or a texture.
     pub(in super::super) fn color_or_texture(&self, textures: &Names) -> Option<ColorSource> {
-        match self.value?.get_ref() {
-            DeValue::Table(_) => {
+        match self.value?.item() {
+            Item::Table(_) => {
                 let table = self.inline_table()?;
                 let texture = table.required("texture", "\"name\"").name_in(textures);
                 table.finish();
                 texture.map(ColorSource::Texture)
             }
-            DeValue::String(text) if textures.find(text).is_some() => {
+            Item::String(text) if textures.find(text).is_some() => {
                 let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR_OR_TEXTURE}", self.name))
                     .label("found the name of a texture")
                     .help(format!("write {{ texture = {} }}", self.context.text(&self.span()?)));
@@ -47,12 +45,10 @@ impl Key<'_> {
 
     fn color_of(&self, limits: Limits, expected: &str) -> Option<Vec3> {
         let value = self.value?;
-        match value.get_ref() {
-            DeValue::String(text) => self.hexadecimal(text),
-            DeValue::Array(array) if array.len() == 3 => {
-                let read = |one| limited(self.context, self.name, one, limits, "three numbers, [r, g, b]");
-                let components: Vec<Option<f64>> = array.iter().map(read).collect();
-                let rgb: [f64; 3] = components.into_iter().collect::<Option<Vec<_>>>()?.try_into().ok()?;
+        match value.item() {
+            Item::String(text) => self.hexadecimal(text),
+            Item::Array(array) if array.len() == 3 => {
+                let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
                 Some(Vec3::from_array(rgb.map(|component| component as f32)))
             }
             _ => {

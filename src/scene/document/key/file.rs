@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::super::super::description::Located;
 use super::super::super::nearest::nearest;
-use super::super::super::read::{is_link, neighbour};
+use super::super::super::read::{MOST_FILES, is_link, neighbour};
 use super::super::super::sanitize::{shortened, visible};
 use super::super::context::Issue;
 use super::Key;
+use crate::system::file::{self, Kind};
 use crate::system::in_words;
 
 impl Key<'_> {
@@ -28,8 +29,15 @@ impl Key<'_> {
             return None;
         }
         let path = self.context.resolve(text);
-        if let Err(issue) = regular_file(&path) {
-            let (message, help) = issue;
+        let may_be_meant =
+            |found: &Path| endings.is_empty() || endings.contains(&ending(&found.to_string_lossy()).as_str());
+        if let Err((message, is_missing)) = regular_file(&path) {
+            let help = is_missing.then(|| {
+                match self.context.search(MOST_FILES, || neighbour(&path, may_be_meant)) {
+                    Some(near) => format!("did you mean {}?", visible(&near.to_string_lossy())),
+                    None => "paths are relative to the scene file".to_owned(),
+                }
+            });
             self.context.report(Issue::error(span, message).maybe_help(help));
             return None;
         }
@@ -66,23 +74,18 @@ fn ending(text: &str) -> String {
     Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-fn regular_file(path: &Path) -> Result<(), (String, Option<String>)> {
+/// What is wrong with a file, and whether it is that there is none of this name.
+fn regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
-    let other = |what: &str| Err((format!("{shown} is {what}, not a file"), None));
-    match std::fs::metadata(path) {
-        Ok(metadata) if metadata.is_dir() => other("a folder"),
-        Ok(metadata) if !metadata.is_file() => other("a pipe, a socket or a device"),
-        Ok(_) => Ok(()),
+    match file::kind(path) {
+        Ok((Kind::Regular, _)) => Ok(()),
+        Ok((kind, _)) => Err((format!("{shown} is {}, not a file", kind.words()), false)),
         Err(error) if error.kind() == io::ErrorKind::NotFound && is_link(path) => {
-            Err((format!("{shown} is a symbolic link to a file that does not exist"), None))
+            Err((format!("{shown} is a symbolic link to a file that does not exist"), false))
         }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Err((
-            format!("there is no file {shown}"),
-            Some(match neighbour(path) {
-                Some(near) => format!("did you mean {}?", visible(&near.to_string_lossy())),
-                None => "paths are relative to the scene file".to_owned(),
-            }),
-        )),
-        Err(error) => Err((format!("cannot read {shown}: {}", in_words(&error)), None)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            Err((format!("there is no file {shown}"), true))
+        }
+        Err(error) => Err((format!("cannot read {shown}: {}", in_words(&error)), false)),
     }
 }

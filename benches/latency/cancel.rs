@@ -1,0 +1,60 @@
+//! How soon the worker is free for a newer request, whatever it is doing.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
+use glimt::pipeline::settings::Overrides;
+use glimt::pipeline::{Handle, start};
+
+use super::Outcome;
+
+const LIMIT: Duration = Duration::from_secs(20);
+
+/// Stopped after 0, 1, 2, … 60 ms, at first with nothing loaded: while the scene is read, its trees are built, the
+/// first picture and the first passes are traced; then well into the render.
+pub fn times(scene: &Path) -> Outcome<Vec<Duration>> {
+    let mut times = Vec::new();
+    for step in 0..12 {
+        let worker = start()?;
+        let mut generation = 0;
+        send(&worker, scene, &mut generation);
+        times.push(cancel(&worker, scene, &mut generation, Duration::from_millis(step * step * 4))?);
+    }
+    let worker = start()?;
+    let mut generation = 0;
+    send(&worker, scene, &mut generation);
+    while !matches!(worker.events.recv_timeout(LIMIT)?, Event::Preview { .. }) {}
+    for after in (0..60).chain([200, 333, 500, 777]) {
+        times.push(cancel(&worker, scene, &mut generation, Duration::from_millis(after))?);
+    }
+    Ok(times)
+}
+
+fn cancel(worker: &Handle, scene: &Path, generation: &mut u64, after: Duration) -> Outcome<Duration> {
+    std::thread::sleep(after);
+    let begin = Instant::now();
+    send(worker, scene, generation);
+    loop {
+        match worker.events.recv_timeout(LIMIT)? {
+            Event::Started { generation: started } if started == *generation => return Ok(begin.elapsed()),
+            Event::Failed { failure, .. } => return Err(format!("{failure:?}").into()),
+            _ => {}
+        }
+    }
+}
+
+/// Each request is of another picture.
+fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
+    *generation += 1;
+    let overrides =
+        Overrides { samples: Some(100_000), seed: u32::try_from(*generation).ok(), ..Overrides::default() };
+    worker.send(Command::Render(Box::new(Request {
+        generation: *generation,
+        scene: scene.to_owned(),
+        overrides,
+        preview: Some(PreviewSize { width: 118, height: 74 }),
+        write: Writing::No,
+        force: false,
+    })));
+}

@@ -1,0 +1,146 @@
+//! From a save or a key to the first changed cell of the picture, and how soon a render stops.
+//!
+//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [SCENE…]]` copies scenes and assets into a scratch folder, runs
+//! glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints medians and maxima in
+//! milliseconds: from before the file is written, or the key pressed, until the terminal has read the first bytes
+//! that change the picture. `settled`: nothing is rendering when the file is saved; `busy`: the picture before it still is.
+//! Another build of the program may be named by `GLIMT`. `cancel`: from a newer request until the worker takes it up, whatever it was doing.
+
+#![allow(clippy::print_stdout)]
+
+mod cancel;
+mod scenes;
+mod terminal;
+
+use std::error::Error;
+use std::fs;
+use std::time::{Duration, Instant};
+
+use scenes::{Copies, SCENES, Scene};
+use terminal::{Cells, Terminal};
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+const COLUMNS: u16 = 120;
+const ROWS: u16 = 40;
+/// Measurements of each kind.
+const ROUNDS: usize = 7;
+/// After a save, nothing is asked of the machine for this long.
+const PAUSE: Duration = Duration::from_millis(300);
+
+fn main() -> Outcome<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|one| !one.starts_with('-')).collect();
+    let modes = ["settled", "busy", "cancel"];
+    let all_modes = !arguments.iter().any(|one| modes.contains(&one.as_str()));
+    let all_scenes = !arguments.iter().any(|one| !modes.contains(&one.as_str()));
+    let is_wanted = |mode: &str| all_modes || arguments.iter().any(|one| one == mode);
+    let mut copies = Copies::new()?;
+    let scenes = SCENES.iter().filter(|scene| all_scenes || arguments.iter().any(|one| one == scene.name));
+    let scenes: Vec<&Scene> = scenes.collect();
+    for mode in [Mode::Settled, Mode::Busy] {
+        if is_wanted(mode.name()) {
+            println!("{}: from a save or a key to the first changed cell, ms, median (most)", mode.name());
+            for scene in &scenes {
+                row(&mut copies, scene, mode)?;
+            }
+        }
+    }
+    if is_wanted("cancel") {
+        println!("cancel: until the worker takes the next request up, ms, median (most)");
+        for scene in &scenes {
+            println!("{:<14} {}", scene.name, figures(cancel::times(&copies.scene(scene))?));
+        }
+    }
+    Ok(())
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    Settled,
+    Busy,
+}
+
+impl Mode {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Settled => "settled",
+            Self::Busy => "busy",
+        }
+    }
+
+    /// Whether the picture is another one. While it is still being rendered, less noise is not a change.
+    fn is_other(self, before: &Cells, now: &Cells) -> bool {
+        let differ = |most: u8| {
+            let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
+            let far = move |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {
+                a.as_flattened().iter().zip(b.as_flattened()).any(|(a, b)| a.abs_diff(*b) > most)
+            };
+            pairs.filter(far).count()
+        };
+        match self {
+            Self::Settled => differ(0) > 0,
+            Self::Busy => differ(16) > 20,
+        }
+    }
+}
+
+/// One scene: every edit, every key.
+fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
+    let path = copies.scene(scene);
+    let path = path.to_str().ok_or("a name that is no text")?;
+    let samples = if mode == Mode::Settled { "2" } else { "100000" };
+    let arguments = [path, "--samples", samples, "-o", "out.png"];
+    let mut terminal = Terminal::open(copies.folder(), &arguments, COLUMNS, ROWS)?;
+    terminal.wait("a picture", |screen| screen.contents().contains('▀'))?;
+    // Files whose times are this old need not be read to be known.
+    std::thread::sleep(Duration::from_millis(2500));
+    let mut words = Vec::new();
+    for edit in scene.edits {
+        let mut times = Vec::new();
+        for _ in 0..ROUNDS {
+            let before = ready(&mut terminal, mode)?;
+            let (file, bytes) = copies.edit(scene, *edit)?;
+            let begin = Instant::now();
+            fs::write(&file, &bytes)?;
+            let end = terminal.when(PAUSE, |now| mode.is_other(&before, now))?;
+            times.push(end - begin);
+        }
+        words.push(format!("{} {}", edit.0, figures(times)));
+    }
+    for key in scene.keys {
+        let mut times = Vec::new();
+        for _ in 0..ROUNDS {
+            // Another picture each time, so that none is found among those that are kept.
+            let before = ready(&mut terminal, mode)?;
+            let (file, bytes) = copies.edit(scene, scene.edits[0])?;
+            fs::write(&file, &bytes)?;
+            terminal.when(PAUSE, |now| mode.is_other(&before, now))?;
+            let before = ready(&mut terminal, mode)?;
+            let begin = Instant::now();
+            terminal.press(key)?;
+            let end = terminal.when(PAUSE, |now| mode.is_other(&before, now))?;
+            times.push(end - begin);
+        }
+        words.push(format!("{key} {}", figures(times)));
+    }
+    println!("{:<14} {}", scene.name, words.join("  "));
+    Ok(())
+}
+
+/// The picture before something is done.
+fn ready(terminal: &mut Terminal, mode: Mode) -> Outcome<Cells> {
+    if mode == Mode::Settled {
+        terminal.wait("the end of the render", |screen| {
+            screen.contents().lines().next().is_some_and(|line| line.contains("done"))
+        })?;
+        std::thread::sleep(PAUSE);
+    }
+    Ok(terminal.cells())
+}
+
+/// Median and largest in milliseconds.
+fn figures(mut times: Vec<Duration>) -> String {
+    times.sort();
+    let milliseconds = |time: Option<&Duration>| time.map_or(0.0, |time| time.as_secs_f64() * 1e3);
+    format!("{:5.1} ({:.0})", milliseconds(times.get(times.len() / 2)), milliseconds(times.last()))
+}

@@ -1,0 +1,137 @@
+//! What is edited in the bundled scenes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::Outcome;
+
+/// A bundled scene with edits of it: what kind, what is replaced and by what. `{}` stands for a number between 0.1
+/// and 1 that is another one each time; without it, the file of this name is a picture that gets darker by it.
+pub struct Scene {
+    pub name: &'static str,
+    pub edits: &'static [(&'static str, &'static str, &'static str)],
+    pub keys: &'static [&'static str],
+}
+
+pub const SCENES: &[Scene] = &[
+    Scene {
+        name: "cornell",
+        edits: &[
+            ("material", "red = { diffuse = [0.63,", "red = { diffuse = [{},"),
+            ("camera", "position = [0, 1, 4.4]", "position = [{}, 1, 4.4]"),
+            ("object", "center = [-0.35, 0.6,", "center = [-{}, 0.6,"),
+            ("light", "emission = [17,", "emission = [1{},"),
+        ],
+        keys: &["s", "v"],
+    },
+    Scene {
+        name: "cornell_glass",
+        edits: &[
+            ("material", "red = { diffuse = [0.63,", "red = { diffuse = [{},"),
+            ("camera", "position = [0, 1, 4.4]", "position = [{}, 1, 4.4]"),
+            ("object", "center = [-0.42, 0.42,", "center = [-{}, 0.42,"),
+            ("light", "emission = [17,", "emission = [1{},"),
+        ],
+        keys: &["s", "v"],
+    },
+    Scene {
+        name: "textures",
+        edits: &[
+            ("material", "normal_map = \"bumps\"", "normal_map = \"bumps\"\nnormal_strength = {}"),
+            ("camera", "position = [0, 1.6, 5.6]", "position = [{}, 1.6, 5.6]"),
+            ("object", "translate = [-1.6,", "translate = [-{},"),
+            ("light", "emission = [15,", "emission = [1{},"),
+            ("texture", "assets/textures/bricks.png", ""),
+        ],
+        keys: &["s", "v"],
+    },
+    Scene {
+        name: "dof",
+        edits: &[
+            ("material", "lime = { diffuse = [0.5,", "lime = { diffuse = [{},"),
+            ("camera", "position = [0, 1.5, 6]", "position = [{}, 1.5, 6]"),
+            ("object", "center = [-0.10, 0.45, 0.00]", "center = [-{}, 0.45, 0.00]"),
+            ("light", "emission = [14,", "emission = [1{},"),
+        ],
+        keys: &["s", "v", "d"],
+    },
+    Scene {
+        name: "mesh",
+        edits: &[
+            ("material", "coral = { diffuse = [0.74,", "coral = { diffuse = [{},"),
+            ("camera", "position = [0, 1.9, 5.4]", "position = [{}, 1.9, 5.4]"),
+            ("object", "translate = [-1.15,", "translate = [-{},"),
+            ("light", "emission = [16,", "emission = [1{},"),
+        ],
+        keys: &["s", "v"],
+    },
+    Scene {
+        name: "million",
+        edits: &[
+            ("material", "diffuse = [0.58,", "diffuse = [{},"),
+            ("camera", "position = [0, 0.7, 3.6]", "position = [{}, 0.7, 3.6]"),
+            ("object", "[[mesh]]", "[[mesh]]\ntranslate = [{}, 0, 0]"),
+            ("light", "intensity = [3.4,", "intensity = [{},"),
+        ],
+        keys: &["s", "v"],
+    },
+];
+
+/// Copies of scenes and assets, to be edited.
+pub struct Copies {
+    folder: tempfile::TempDir,
+    /// Edits so far.
+    edits: u32,
+}
+
+impl Copies {
+    /// All of them, with the large mesh that is made.
+    pub fn new() -> Outcome<Self> {
+        let folder = tempfile::tempdir()?;
+        let project = Path::new(env!("CARGO_MANIFEST_DIR"));
+        for name in ["scenes", "assets", "assets/textures"] {
+            fs::create_dir(folder.path().join(name))?;
+            for entry in fs::read_dir(project.join(name))? {
+                let entry = entry?;
+                if entry.file_type()?.is_file() {
+                    fs::copy(entry.path(), folder.path().join(name).join(entry.file_name()))?;
+                }
+            }
+        }
+        let mut make = std::process::Command::new(env!("CARGO_BIN_EXE_glimt-assets"));
+        make.arg("million").current_dir(folder.path()).stdout(std::process::Stdio::null());
+        if !make.status()?.success() {
+            return Err("the large mesh was not made".into());
+        }
+        Ok(Self { folder, edits: 0 })
+    }
+
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    pub fn scene(&self, scene: &Scene) -> PathBuf {
+        self.folder.path().join("scenes").join(scene.name).with_extension("toml")
+    }
+
+    /// The file that an edit changes, and what it holds then.
+    pub fn edit(&mut self, scene: &Scene, (_, from, to): (&str, &str, &str)) -> Outcome<(PathBuf, Vec<u8>)> {
+        self.edits += 1;
+        let number = 0.1 + f64::from(self.edits) * 0.377 % 0.9;
+        let of_project = |name: &Path| Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+        if to.is_empty() {
+            let mut picture = image::open(of_project(Path::new(from)))?.to_rgb8();
+            picture.iter_mut().for_each(|value| *value = (f64::from(*value) * number) as u8);
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            picture.write_to(&mut bytes, image::ImageFormat::Png)?;
+            return Ok((self.folder.path().join(from), bytes.into_inner()));
+        }
+        let path = self.scene(scene);
+        let name = Path::new("scenes").join(scene.name).with_extension("toml");
+        let text = fs::read_to_string(of_project(&name))?;
+        if !text.contains(from) {
+            return Err(format!("{} has no {from:?}", name.display()).into());
+        }
+        Ok((path, text.replacen(from, &to.replace("{}", &format!("{number:.3}")), 1).into_bytes()))
+    }
+}

@@ -1,0 +1,168 @@
+//! A terminal that notes when bytes came and looks at them later, so that it takes no time from the program while
+//! something is measured.
+
+use std::io::{Read, Write};
+use std::num::NonZeroU16;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
+
+use super::Outcome;
+
+/// Nothing that is waited for takes this long.
+const LIMIT: Duration = Duration::from_secs(20);
+
+/// Bytes that the program wrote, and when.
+type Chunk = (Instant, Vec<u8>);
+
+/// The program in a pseudo-terminal of truecolour.
+pub struct Terminal {
+    // Held so that the terminal stays.
+    _master: Box<dyn MasterPty + Send>,
+    child: Box<dyn Child + Send + Sync>,
+    keys: Arc<Mutex<Box<dyn Write + Send>>>,
+    chunks: Arc<Mutex<Vec<Chunk>>>,
+    screen: vt100::Parser,
+}
+
+/// The colours of every picture cell; text is none.
+pub type Cells = Vec<Option<[[u8; 3]; 2]>>;
+
+impl Terminal {
+    /// Start the program in this folder.
+    pub fn open(folder: &Path, arguments: &[&str], columns: u16, rows: u16) -> Outcome<Self> {
+        let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
+        let pair = native_pty_system().openpty(size)?;
+        let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
+        let mut command = CommandBuilder::new(program);
+        command.args(arguments);
+        command.cwd(folder);
+        for name in ["NO_COLOR", "TMUX", "TERM_PROGRAM"] {
+            command.env_remove(name);
+        }
+        command.env("TERM", "xterm-256color");
+        command.env("COLORTERM", "truecolor");
+        let child = pair.slave.spawn_command(command)?;
+        let keys = Arc::new(Mutex::new(pair.master.take_writer()?));
+        let chunks = Arc::<Mutex<Vec<Chunk>>>::default();
+        read(pair.master.try_clone_reader()?, chunks.clone(), keys.clone());
+        let side = |length| NonZeroU16::new(length).ok_or("a terminal has no cells");
+        let screen = vt100::Parser::new(side(rows)?, side(columns)?, 0);
+        Ok(Self { _master: pair.master, child, keys, chunks, screen })
+    }
+
+    /// Type these characters.
+    pub fn press(&self, keys: &str) -> Outcome<()> {
+        Ok(lock(&self.keys).write_all(keys.as_bytes())?)
+    }
+
+    /// Wait until the screen is as told.
+    pub fn wait(&mut self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> Outcome<()> {
+        let deadline = Instant::now() + LIMIT;
+        loop {
+            self.catch_up();
+            if holds(self.screen.screen()) {
+                return Ok(());
+            }
+            if Instant::now() > deadline {
+                return Err(format!("not seen: {what}\n{}", self.screen.screen().contents()).into());
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// What the picture is now.
+    pub fn cells(&mut self) -> Cells {
+        self.catch_up();
+        cells(self.screen.screen())
+    }
+
+    /// When the picture first differed as told, looked for once `pause` is over and then until it is found.
+    pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> Outcome<Instant> {
+        let deadline = Instant::now() + LIMIT;
+        thread::sleep(pause);
+        while Instant::now() < deadline {
+            for (time, bytes) in std::mem::take(&mut *lock(&self.chunks)) {
+                self.screen.process(&bytes);
+                if differs(&cells(self.screen.screen())) {
+                    return Ok(time);
+                }
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+        Err(format!("the picture does not change\n{}", self.screen.screen().contents()).into())
+    }
+
+    fn catch_up(&mut self) {
+        for (_, bytes) in std::mem::take(&mut *lock(&self.chunks)) {
+            self.screen.process(&bytes);
+        }
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        // The figures are there; how it ends is of no interest.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Note what comes, and answer what a terminal is asked: whether it is there, and what it is.
+fn read(
+    mut output: Box<dyn Read + Send>,
+    chunks: Arc<Mutex<Vec<Chunk>>>,
+    keys: Arc<Mutex<Box<dyn Write + Send>>>,
+) {
+    const ANSWERS: [(&[u8], &[u8]); 2] = [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;22c")];
+    thread::spawn(move || {
+        let mut bytes = vec![0; 1 << 16];
+        let mut tail = Vec::new();
+        while let Ok(count @ 1..) = output.read(&mut bytes) {
+            lock(&chunks).push((Instant::now(), bytes[..count].to_vec()));
+            tail.extend_from_slice(&bytes[..count]);
+            for (question, answer) in ANSWERS {
+                while let Some(at) = tail.windows(question.len()).position(|window| window == question) {
+                    tail.drain(at..at + question.len());
+                    // A program that is gone needs no answer.
+                    let _ = lock(&keys).write_all(answer);
+                }
+            }
+            // A question may be cut.
+            tail.drain(..tail.len().saturating_sub(3));
+        }
+    });
+}
+
+fn cells(screen: &vt100::Screen) -> Cells {
+    let (rows, columns) = screen.size();
+    let mut cells = Cells::new();
+    for row in 0..rows.get() {
+        for column in 0..columns.get() {
+            cells.push(screen.cell(row, column).and_then(shades));
+        }
+    }
+    cells
+}
+
+/// The upper and the lower half of a picture cell.
+fn shades(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
+    let rgb = |color| match color {
+        vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
+        _ => None,
+    };
+    let (fore, back) = (rgb(cell.fgcolor()), rgb(cell.bgcolor()));
+    match cell.contents() {
+        "▀" => Some([fore?, back.unwrap_or_default()]),
+        "▄" => Some([back.unwrap_or_default(), fore?]),
+        "█" => Some([fore?; 2]),
+        _ => Some([back?; 2]),
+    }
+}

@@ -1,0 +1,79 @@
+//! Putting the parts of a tree together, in parallel.
+
+use rayon::prelude::*;
+
+use super::cost::Plane;
+use super::subtree::Subtree;
+use crate::accel::kd_tree::node::{Kind, Node};
+use crate::accel::wide_bvh::pages;
+
+/// A part of the tree above the subtrees.
+pub enum Part {
+    /// A plane and what is below and above it.
+    Halves { plane: Plane, size: Size, halves: Box<[Part; 2]> },
+    /// Built by one thread.
+    Built(Subtree),
+}
+
+/// Nodes and numbers of triangles.
+#[derive(Clone, Copy)]
+pub struct Size {
+    nodes: usize,
+    ids: usize,
+}
+
+impl Part {
+    /// Of a plane and both parts.
+    pub fn halves(plane: Plane, halves: [Self; 2]) -> Self {
+        let [left, right] = halves.each_ref().map(Self::size);
+        let size = Size { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
+        Self::Halves { plane, size, halves: Box::new(halves) }
+    }
+
+    fn size(&self) -> Size {
+        match self {
+            Self::Built(subtree) => Size { nodes: subtree.nodes.len(), ids: subtree.ids.len() },
+            Self::Halves { size, .. } => *size,
+        }
+    }
+
+    /// All in one: node before children, left before right.
+    pub fn join(self) -> Subtree {
+        let size = self.size();
+        let mut all = Subtree { nodes: pages::large(size.nodes), ids: pages::large(size.ids) };
+        let nothing = Node::new(Kind::Leaf { first: 0, count: 0 });
+        rayon::join(
+            || (0..size.nodes).into_par_iter().map(|_| nothing).collect_into_vec(&mut all.nodes),
+            || (0..size.ids).into_par_iter().map(|_| 0).collect_into_vec(&mut all.ids),
+        );
+        self.write(&mut all.nodes, &mut all.ids, Size { nodes: 0, ids: 0 });
+        all
+    }
+
+    /// Write to where so much stands before.
+    fn write(self, nodes: &mut [Node], ids: &mut [u32], before: Size) {
+        match self {
+            Self::Built(subtree) => {
+                for (node, own) in nodes.iter_mut().zip(&subtree.nodes) {
+                    *node = own.moved(before.nodes as u32, before.ids as u32);
+                }
+                ids.copy_from_slice(&subtree.ids);
+            }
+            Self::Halves { plane, halves, .. } => {
+                let [left, right] = *halves;
+                let size = left.size();
+                let (node, nodes) = nodes.split_at_mut(1);
+                let (left_nodes, right_nodes) = nodes.split_at_mut(size.nodes);
+                let (left_ids, right_ids) = ids.split_at_mut(size.ids);
+                let before_left = Size { nodes: before.nodes + 1, ..before };
+                let before_right = Size { nodes: before_left.nodes + size.nodes, ids: before.ids + size.ids };
+                let right_place = before_right.nodes as u32;
+                node[0] = Node::new(Kind::Inner { axis: plane.axis, at: plane.at, right: right_place });
+                rayon::join(
+                    || left.write(left_nodes, left_ids, before_left),
+                    || right.write(right_nodes, right_ids, before_right),
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Which references go to which side of a plane.
+
+use super::cost::Plane;
+use crate::accel::reference::{Bounds, Reference};
+use crate::math::Vec3;
+
+/// Memory that partitioning works in, to be used again.
+#[derive(Default)]
+pub struct Scratch {
+    /// Those on the left, behind them anything.
+    left: Vec<Reference>,
+    /// Places on the left and on the right of those on both sides.
+    on_both: Vec<[u32; 2]>,
+}
+
+impl Scratch {
+    /// Partition the references from place `first` on: those on the right stay, each with the box of what of it is there; those
+    /// on the left are returned. What only touches the plane goes to the side that it is on. The order is kept.
+    ///
+    /// Nothing depends on a branch that could be guessed wrongly: every reference is written to both sides, whose ends
+    /// then move on or not.
+    pub fn partition(
+        &mut self,
+        references: &mut Vec<Reference>,
+        first: usize,
+        plane: &Plane,
+        corners: &impl Fn(u32) -> [Vec3; 3],
+    ) -> &[Reference] {
+        match plane.axis {
+            0 => self.partition_along::<0>(references, first, plane, corners),
+            1 => self.partition_along::<1>(references, first, plane, corners),
+            _ => self.partition_along::<2>(references, first, plane, corners),
+        }
+    }
+
+    fn partition_along<const AXIS: usize>(
+        &mut self,
+        references: &mut Vec<Reference>,
+        first: usize,
+        plane: &Plane,
+        corners: &impl Fn(u32) -> [Vec3; 3],
+    ) -> &[Reference] {
+        let own = &mut references[first..];
+        if self.left.len() < own.len() {
+            self.left.resize(own.len(), Reference { bounds: Bounds::EMPTY });
+            self.on_both.resize(own.len(), [0; 2]);
+        }
+        let at = plane.at;
+        let (mut left, mut right, mut on_both) = (0, 0, 0);
+        for place in 0..own.len() {
+            let reference = own[place];
+            let (min, max) = (reference.bounds.min.to_array()[AXIS], reference.bounds.max().to_array()[AXIS]);
+            let (below, above) = (min < at, max > at);
+            let is_planar = !(below | above);
+            self.left[left] = reference;
+            own[right] = reference;
+            self.on_both[on_both] = [left as u32, right as u32];
+            left += usize::from(below | (is_planar & !plane.planar_right));
+            right += usize::from(above | (is_planar & plane.planar_right));
+            on_both += usize::from(below & above);
+        }
+        for [left, right] in self.on_both[..on_both].iter().map(|both| both.map(|place| place as usize)) {
+            let whole = own[right];
+            [self.left[left], own[right]] = whole.split(AXIS, at, corners(whole.id()));
+        }
+        references.truncate(first + right);
+        &self.left[..left]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::pathological::random;
+
+    #[test]
+    fn each_side_has_what_reaches_into_it_in_order() {
+        let mut next = random(29);
+        let mut step = || Vec3::new(next(), next(), next()).map(|x| (x * 6.0).round());
+        let mesh: Vec<[Vec3; 3]> = (0..200_u32)
+            .map(|id| {
+                let mut corners = [step(), step(), step()];
+                if id % 4 == 3 {
+                    let axis = id as usize % 3;
+                    let at = corners[0][axis];
+                    corners.iter_mut().for_each(|corner| corner[axis] = at);
+                }
+                corners
+            })
+            .collect();
+        let corners = |id: u32| mesh[id as usize];
+        let all: Vec<Reference> = (0..200).map(|id| Reference::new(id, corners(id))).collect();
+        let mut scratch = Scratch::default();
+        for axis in 0..3 {
+            for planar_right in [false, true] {
+                let plane = Plane { axis, at: 1.0, planar_right };
+                let mut own = all.clone();
+                let left = scratch.partition(&mut own, 50, &plane, &corners).to_vec();
+                let expected = |is_there: &dyn Fn(f32, f32) -> bool| -> Vec<u32> {
+                    let reaches = |one: &&Reference| is_there(one.bounds.min[axis], one.bounds.max()[axis]);
+                    all[50..].iter().filter(reaches).map(Reference::id).collect()
+                };
+                let planar = |min: f32, max: f32| min == 1.0 && max == 1.0;
+                let on_left = expected(&|min, max| min < 1.0 || (planar(min, max) && !planar_right));
+                let on_right = expected(&|min, max| max > 1.0 || (planar(min, max) && planar_right));
+                let ids = |side: &[Reference]| side.iter().map(Reference::id).collect::<Vec<_>>();
+                assert_eq!((ids(&left), ids(&own[50..])), (on_left, on_right), "{plane:?}");
+                assert_eq!(ids(&own[..50]), ids(&all[..50]), "those of other cells stay");
+                assert!(left.iter().all(|one| one.bounds.max()[axis] <= 1.0), "{plane:?}");
+                assert!(own[50..].iter().all(|one| one.bounds.min[axis] >= 1.0), "{plane:?}");
+            }
+        }
+        let in_planes = all.iter().filter(|one| one.bounds.extent().truncate().min_element() == 0.0).count();
+        assert!(in_planes > 20, "{in_planes}");
+    }
+}

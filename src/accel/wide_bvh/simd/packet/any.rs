@@ -1,0 +1,87 @@
+//! Whether each ray hits anything, children in any order.
+
+use super::frustum::Frustum;
+use super::rays::Packet;
+use super::rows::Rows;
+use crate::accel::wide_bvh::WideBvh;
+use crate::accel::wide_bvh::node::{Child, PACK, TrianglePack};
+use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
+use crate::accel::wide_bvh::simd::single::prefetch;
+use crate::accel::wide_bvh::simd::stack::Stack;
+use crate::accel::{Ends, PACKET as SIZE};
+use crate::geometry::Ray;
+use crate::geometry::aabb::SLAB_PAD;
+use crate::geometry::watertight::ShearedRay;
+
+/// See [`WideBvh::any_packet`]; none where the rays do not go the same way.
+#[inline(always)]
+pub fn any<V: Lanes>(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &Ends,
+    except: &[Option<u32>],
+    like: V,
+    like8: F8,
+) -> Option<u32> {
+    let Some(rows) = Rows::new(rays, ends) else { return Some(0) };
+    let packet = Packet::new(&rows, &tree.bounds, like)?;
+    let frustum = Frustum::new(&packet, like8);
+    let mut t_max = like.gather(&rows.ends);
+    let pad = like.like(SLAB_PAD);
+    let mut end = t_max.greatest() * SLAB_PAD;
+    let all = rows.traced;
+    let mut found = 0_u32;
+    let mut stack: Stack<u32> = Stack::new();
+    stack.push(0);
+    while let Some(code) = stack.pop() {
+        match Child::decode(code) {
+            Child::Inner(index) => {
+                let node = &tree.nodes[index as usize];
+                let (_, mut met) = frustum.enter(node, like8.like(end));
+                while met != 0 {
+                    let slot = met.trailing_zeros() as usize % 8;
+                    met &= met - 1;
+                    prefetch(tree, node.children[slot]);
+                    stack.push_if(node.children[slot], packet.meets(node, slot, t_max * pad));
+                }
+            }
+            Child::Leaf { first, count } => {
+                let before = found;
+                for pack in &tree.packs[first as usize..(first + count) as usize] {
+                    for lane in 0..PACK {
+                        if pack.ids[lane] == u32::MAX {
+                            break;
+                        }
+                        let hits = packet.hits(pack, lane, t_max);
+                        let mut rest = (hits.hit | hits.doubtful) & all & !found;
+                        while rest != 0 {
+                            let ray = rest.trailing_zeros() as usize % SIZE;
+                            rest &= rest - 1;
+                            if except.get(ray).copied().flatten() == Some(pack.ids[lane]) {
+                                continue;
+                            }
+                            let sure = hits.hit & 1 << ray != 0;
+                            if sure || doubtful_hit(&Ray { t_max: ends[ray], ..rays[ray] }, pack, lane) {
+                                found |= 1 << ray;
+                            }
+                        }
+                    }
+                }
+                if found == all {
+                    return Some(found);
+                }
+                if before != found {
+                    t_max = like.like(-1.0).or_else(V::mask(found, t_max), t_max);
+                    end = t_max.greatest() * SLAB_PAD;
+                }
+            }
+        }
+    }
+    Some(found)
+}
+
+#[cold]
+#[inline(never)]
+fn doubtful_hit(ray: &Ray, pack: &TrianglePack, lane: usize) -> bool {
+    ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners(lane), ray.t_max).is_some()
+}

@@ -1,0 +1,89 @@
+//! The nearest hits, near children first.
+
+use super::frustum::Frustum;
+use super::nearest::Nearest;
+use super::rays::Packet;
+use super::rows::Rows;
+use crate::accel::Ends;
+use crate::accel::wide_bvh::WideBvh;
+use crate::accel::wide_bvh::node::{Child, Node, PACK};
+use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
+use crate::accel::wide_bvh::simd::single::prefetch;
+use crate::accel::wide_bvh::simd::stack::{Stack, entry, key};
+use crate::geometry::aabb::SLAB_PAD;
+use crate::geometry::{Ray, ShapeHit};
+
+/// See [`WideBvh::closest_packet`]; false where the rays do not go the same way.
+#[inline(always)]
+pub fn closest<V: Lanes>(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &Ends,
+    hits: &mut [Option<ShapeHit>],
+    like: V,
+    like8: F8,
+) -> bool {
+    let Some(rows) = Rows::new(rays, ends) else { return true };
+    let Some(packet) = Packet::new(&rows, &tree.bounds, like) else { return false };
+    let frustum = Frustum::new(&packet, like8);
+    let t_max = like.gather(&rows.ends);
+    let pad = like.like(SLAB_PAD);
+    let mut best = Nearest::new(t_max);
+    let mut end = t_max.greatest() * SLAB_PAD;
+    let mut stack: Stack<u64> = Stack::new();
+    stack.push(key(0.0, 0));
+    while let Some(key) = stack.pop() {
+        if entry(key) > end {
+            continue;
+        }
+        match Child::decode(key as u32) {
+            Child::Inner(index) => {
+                let node = &tree.nodes[index as usize];
+                let (near, met) = frustum.enter(node, like8.like(end));
+                push_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
+            }
+            Child::Leaf { first, count } => {
+                let mut any = 0;
+                for pack in &tree.packs[first as usize..(first + count) as usize] {
+                    for lane in 0..PACK {
+                        if pack.ids[lane] == u32::MAX {
+                            break;
+                        }
+                        any |= best.take(&packet, pack, lane, rays);
+                    }
+                }
+                if any != 0 {
+                    end = best.t.greatest() * SLAB_PAD;
+                }
+            }
+        }
+    }
+    best.write(hits);
+    true
+}
+
+/// Push the children that are met, farthest first, so that the nearest is on top.
+#[inline(always)]
+fn push_ordered<V: Lanes>(
+    tree: &WideBvh,
+    node: &Node,
+    near: F8,
+    met: u32,
+    stack: &mut Stack<u64>,
+    packet: &Packet<V>,
+    end: V,
+) {
+    let mut entries = [0.0_f32; 8];
+    near.store(&mut entries);
+    let (mut rest, mut pushed) = (met, 0);
+    while rest != 0 {
+        let slot = rest.trailing_zeros() as usize % 8;
+        rest &= rest - 1;
+        if !packet.meets(node, slot, end) {
+            continue;
+        }
+        prefetch(tree, node.children[slot]);
+        stack.insert(key(entries[slot], node.children[slot]), pushed);
+        pushed += 1;
+    }
+}

@@ -1,0 +1,49 @@
+//! A frustum around all rays of a packet.
+
+use super::rays::Packet;
+use crate::accel::wide_bvh::node::Node;
+use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
+use crate::geometry::aabb::SLAB_PAD;
+
+/// What holds for every ray of a packet, against eight boxes at a time. Subtraction and multiplication round monotonously, so
+/// that no ray enters a box before the frustum does, or leaves it later.
+pub struct Frustum {
+    /// Greatest origin where the rays go up, least where they go down: the one that is nearest to the near plane.
+    near_origin: [F8; 3],
+    far_origin: [F8; 3],
+    inverse: [[F8; 2]; 3],
+    near: [usize; 3],
+}
+
+impl Frustum {
+    #[inline(always)]
+    pub fn new<V: Lanes>(packet: &Packet<V>, like: F8) -> Self {
+        let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
+        let mut inverse = [[like; 2]; 3];
+        for axis in 0..3 {
+            let ends = packet.origins[axis];
+            let negative = packet.near[axis] & 1;
+            let margin = if negative == 1 { -packet.margin } else { packet.margin };
+            near_origin[axis] = like.like(ends[1 - negative] + margin);
+            far_origin[axis] = like.like(ends[negative] - margin);
+            let row = packet.inverse[axis];
+            inverse[axis] = [like.like(row.least()), like.like(row.greatest())];
+        }
+        Self { near_origin, far_origin, inverse, near: packet.near }
+    }
+
+    /// A bound on where the first ray enters each box, and a bit for each box that a ray may meet before `end`.
+    #[inline(always)]
+    pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
+        let pad = end.like(SLAB_PAD);
+        let (mut near, mut far) = (end.like(0.0), end);
+        for axis in 0..3 {
+            let [least, greatest] = self.inverse[axis];
+            let to_near = end.gather(&node.rows[self.near[axis]]) - self.near_origin[axis];
+            let to_far = end.gather(&node.rows[self.near[axis] ^ 1]) - self.far_origin[axis];
+            near = (to_near * least).min(to_near * greatest).max(near);
+            far = ((to_far * least).max(to_far * greatest) * pad).min(far);
+        }
+        (near, F8::bits(near.le(far)))
+    }
+}

@@ -1,0 +1,50 @@
+//! Sixteen rays at a time that go much the same way: what all of them miss is left out by one test of a frustum around them
+//! (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005), what is left is tested for sixteen rays
+//! side by side.
+
+mod any;
+mod closest;
+mod frustum;
+mod nearest;
+mod rays;
+mod rows;
+
+use super::lanes::{F8, F16, Lanes, Pair};
+use crate::accel::Ends;
+use crate::accel::wide_bvh::WideBvh;
+use crate::geometry::{Ray, ShapeHit};
+
+use any::any;
+use closest::closest;
+
+/// [`closest`] by AVX2.
+#[target_feature(enable = "avx2")]
+pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
+    closest(tree, rays, ends, hits, like, like8)
+}
+
+/// [`any`] by AVX2.
+#[target_feature(enable = "avx2")]
+pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
+    any(tree, rays, ends, except, like, like8)
+}
+
+/// [`closest`] by AVX-512.
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
+pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
+    closest(tree, rays, ends, hits, like, like8)
+}
+
+/// [`any`] by AVX-512.
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
+pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
+    // SAFETY: this function has the instructions.
+    let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
+    any(tree, rays, ends, except, like, like8)
+}

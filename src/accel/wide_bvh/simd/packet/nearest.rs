@@ -1,0 +1,99 @@
+//! The nearest hits of a packet's rays.
+
+use super::rays::Packet;
+use crate::accel::PACKET as SIZE;
+use crate::accel::wide_bvh::node::TrianglePack;
+use crate::accel::wide_bvh::simd::lanes::Lanes;
+use crate::accel::wide_bvh::simd::triangle;
+use crate::geometry::watertight::ShearedRay;
+use crate::geometry::{Ray, ShapeHit};
+
+/// The nearest hits so far.
+pub struct Nearest<V: Lanes> {
+    pub t: V,
+    u: V,
+    v: V,
+    /// Bits of the triangles' numbers.
+    id: V,
+    found: u32,
+}
+
+impl<V: Lanes> Nearest<V> {
+    /// Nothing yet, before these ends.
+    #[inline(always)]
+    pub fn new(ends: V) -> Self {
+        Self { t: ends, u: ends, v: ends, id: ends.like(f32::from_bits(u32::MAX)), found: 0 }
+    }
+
+    /// Take what is nearer, or as near with a lower number; a bit for each ray that took it.
+    #[inline(always)]
+    pub fn take(&mut self, packet: &Packet<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+        let hits = packet.hits(pack, lane, self.t);
+        if hits.hit | hits.doubtful == 0 {
+            return 0;
+        }
+        self.keep(&hits, pack, lane, rays)
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, hits: &triangle::Hits<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+        let own = pack.ids[lane];
+        let as_near = hits.hit & V::bits(hits.t.eq(self.t));
+        let mut taken = hits.hit & !as_near;
+        if taken != 0 {
+            let mask = V::mask(taken, self.t);
+            self.t = hits.t.or_else(mask, self.t);
+            self.u = hits.u.or_else(mask, self.u);
+            self.v = hits.v.or_else(mask, self.v);
+            self.id = self.t.like(f32::from_bits(own)).or_else(mask, self.id);
+            self.found |= taken;
+        }
+        let mut singly = as_near | hits.doubtful;
+        while singly != 0 {
+            let ray = singly.trailing_zeros() as usize;
+            singly &= singly - 1;
+            taken |= self.keep_one(ray, pack, lane, rays);
+        }
+        taken
+    }
+
+    /// The same for one ray, by the scalar test.
+    #[cold]
+    #[inline(never)]
+    fn keep_one(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+        let Some(own) = rays.get(ray) else { return 0 };
+        let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
+        self.t.store(&mut t);
+        self.u.store(&mut u);
+        self.v.store(&mut v);
+        self.id.store(&mut id);
+        let sheared = ShearedRay::new(own.origin, own.direction);
+        let Some(hit) = sheared.intersect(&pack.corners(lane), t[ray]) else { return 0 };
+        let number = pack.ids[lane];
+        if (hit.t, number) >= (t[ray], id[ray].to_bits()) {
+            return 0;
+        }
+        (t[ray], u[ray], v[ray], id[ray]) = (hit.t, hit.u, hit.v, f32::from_bits(number));
+        (self.t, self.u) = (self.t.gather(&t), self.t.gather(&u));
+        (self.v, self.id) = (self.t.gather(&v), self.t.gather(&id));
+        self.found |= 1 << ray;
+        1 << ray
+    }
+
+    #[inline(always)]
+    pub fn write(&self, hits: &mut [Option<ShapeHit>]) {
+        let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
+        self.t.store(&mut t);
+        self.u.store(&mut u);
+        self.v.store(&mut v);
+        self.id.store(&mut id);
+        for (ray, hit) in hits.iter_mut().enumerate().take(SIZE) {
+            *hit = (self.found & 1 << ray != 0).then(|| ShapeHit {
+                t: t[ray],
+                primitive: id[ray].to_bits(),
+                u: u[ray],
+                v: v[ray],
+            });
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The rays of a packet in registers, against a box or a triangle at a time.
+
+use super::rows::Rows;
+use crate::accel::wide_bvh::node::{Node, TrianglePack};
+use crate::accel::wide_bvh::simd::lanes::Lanes;
+use crate::accel::wide_bvh::simd::triangle;
+use crate::geometry::Aabb;
+use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
+use crate::geometry::watertight::ShearedRay;
+use crate::math::Vec3;
+
+/// The rows in registers, ready for boxes and triangles.
+pub struct Packet<V: Lanes> {
+    /// Origins for near and far planes, a margin apart.
+    near_origin: [V; 3],
+    far_origin: [V; 3],
+    pub inverse: [V; 3],
+    /// Origins along the axes of the sheared rays.
+    sheared_origin: [V; 3],
+    shear: [V; 3],
+    /// The axes of the world that are x, y and z of every sheared ray.
+    axes: [usize; 3],
+    /// Rows of a node that are near.
+    pub near: [usize; 3],
+    /// The least and the greatest origins along each axis.
+    pub origins: [[f32; 2]; 3],
+    /// The greatest margin that boxes need for any of the rays.
+    pub margin: f32,
+}
+
+impl<V: Lanes> Packet<V> {
+    /// None where the rays do not go the same way: along each axis to the same side, the longest the same for all.
+    #[inline(always)]
+    pub fn new(rows: &Rows, whole: &Aabb, like: V) -> Option<Self> {
+        let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();
+        let mut own = Self {
+            near_origin: [like; 3],
+            far_origin: [like; 3],
+            inverse: [like; 3],
+            sheared_origin: [like; 3],
+            shear: [like; 3],
+            axes,
+            near: [0; 3],
+            origins: [[0.0; 2]; 3],
+            margin: 0.0,
+        };
+        let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
+        for (axis, origin) in origin.iter_mut().enumerate() {
+            *origin = like.gather(&rows.origin[axis]);
+            own.origins[axis] = [origin.least(), origin.greatest()];
+        }
+        let corner = |side: usize| Vec3::from_array(own.origins.map(|ends| ends[side]));
+        own.margin = triangle_margin(corner(0), whole).max(triangle_margin(corner(1), whole));
+        let margin = like.like(own.margin);
+        let (zero, one) = (like.like(0.0), like.like(1.0));
+        let all = V::bits(zero.eq(zero));
+        for axis in 0..3 {
+            direction[axis] = like.gather(&rows.direction[axis]);
+            size[axis] = direction[axis].abs();
+            own.inverse[axis] = one.over(direction[axis]);
+            let up = V::bits(zero.lt(own.inverse[axis]) & own.inverse[axis].lt(like.like(f32::INFINITY)));
+            let down =
+                V::bits(own.inverse[axis].lt(zero) & like.like(f32::NEG_INFINITY).lt(own.inverse[axis]));
+            let finite = V::bits(origin[axis].abs().lt(like.like(f32::INFINITY)));
+            if (up != all && down != all) || finite != all {
+                return None;
+            }
+            let (before, after) = (origin[axis] - margin, origin[axis] + margin);
+            own.near_origin[axis] = if down == all { before } else { after };
+            own.far_origin[axis] = if down == all { after } else { before };
+            own.near[axis] = 2 * axis + usize::from(down == all);
+        }
+        // `ShearedRay::new`, side by side: which axis is the longest, and the shears.
+        let x_over_y = V::bits(size[1].lt(size[0]));
+        let longest = match axes[2] {
+            0 => x_over_y & V::bits(size[2].lt(size[0])),
+            1 => !x_over_y & V::bits(size[2].lt(size[1])),
+            _ => !(x_over_y & V::bits(size[2].lt(size[0])) | !x_over_y & V::bits(size[2].lt(size[1]))),
+        };
+        if longest & all != all {
+            return None;
+        }
+        let scale = own.inverse[axes[2] % 3];
+        own.shear = [direction[axes[0] % 3] * scale, direction[axes[1] % 3] * scale, scale];
+        own.sheared_origin = [origin[axes[0] % 3], origin[axes[1] % 3], origin[axes[2] % 3]];
+        Some(own)
+    }
+
+    /// Whether any ray meets the box in a slot before its end, `SlabRay::enter` side by side.
+    #[inline(always)]
+    pub fn meets(&self, node: &Node, slot: usize, end: V) -> bool {
+        let pad = end.like(SLAB_PAD);
+        let (mut near, mut far) = (end.like(0.0), end);
+        for axis in 0..3 {
+            let row = self.near[axis] % 6;
+            let (to_near, to_far) = (end.like(node.rows[row][slot]), end.like(node.rows[row ^ 1][slot]));
+            near = ((to_near - self.near_origin[axis]) * self.inverse[axis]).max(near);
+            far = ((to_far - self.far_origin[axis]) * self.inverse[axis] * pad).min(far);
+        }
+        V::bits(near.le(far)) != 0
+    }
+
+    /// Test the triangle in a lane of a pack against all rays.
+    #[inline(always)]
+    pub fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
+        let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
+        triangle::hits(&[a, b, c], self.shear[2], t_max, None)
+    }
+
+    /// A corner as each ray sees it; `row` is its first.
+    #[inline(always)]
+    fn corner(&self, pack: &TrianglePack, row: usize, lane: usize) -> [V; 3] {
+        let z = self.coordinate(pack, row, 2, lane);
+        let x = self.coordinate(pack, row, 0, lane) - self.shear[0] * z;
+        let y = self.coordinate(pack, row, 1, lane) - self.shear[1] * z;
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    fn coordinate(&self, pack: &TrianglePack, row: usize, i: usize, lane: usize) -> V {
+        let axis = self.axes[i] % 3;
+        self.shear[0].like(pack.rows[row + axis][lane]) - self.sheared_origin[i]
+    }
+}

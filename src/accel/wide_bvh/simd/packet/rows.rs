@@ -1,0 +1,61 @@
+//! Rays side by side in memory.
+
+use crate::accel::{Ends, PACKET as SIZE};
+use crate::geometry::Ray;
+
+/// Rows of a packet, one value for each ray.
+type Row = [f32; SIZE];
+
+/// Rays side by side.
+pub struct Rows {
+    pub origin: [Row; 3],
+    pub direction: [Row; 3],
+    pub ends: Ends,
+    /// A bit for each ray that is traced.
+    pub traced: u32,
+    /// The first of them.
+    pub first: Ray,
+}
+
+/// A bit for each lane.
+const ALL: u32 = (1 << SIZE) - 1;
+
+impl Rows {
+    #[inline(always)]
+    fn set(&mut self, lane: usize, ray: &Ray) {
+        for axis in 0..3 {
+            self.origin[axis][lane] = ray.origin[axis];
+            self.direction[axis][lane] = ray.direction[axis];
+        }
+    }
+
+    /// Lanes without a ray, or with one that ends below 0, repeat the first; none where there is no ray.
+    #[inline(always)]
+    pub fn new(rays: &[Ray], ends: &Ends) -> Option<Self> {
+        let count = rays.len().min(SIZE);
+        let mut traced = 0;
+        for (lane, &end) in ends.iter().enumerate().take(count) {
+            traced |= u32::from(end >= 0.0) << lane;
+        }
+        let first_lane = traced.trailing_zeros() as usize;
+        let first = *rays.get(first_lane)?;
+        let mut rows =
+            Self { origin: [[0.0; SIZE]; 3], direction: [[0.0; SIZE]; 3], ends: [-1.0; SIZE], traced, first };
+        match <&[Ray; SIZE]>::try_from(rays) {
+            Ok(rays) if traced == ALL => {
+                for (lane, ray) in rays.iter().enumerate() {
+                    rows.set(lane, ray);
+                }
+                rows.ends = *ends;
+            }
+            _ => {
+                for lane in 0..SIZE {
+                    let is_traced = traced & 1 << lane != 0;
+                    rows.set(lane, &rays[if is_traced { lane } else { first_lane }]);
+                    rows.ends[lane] = if is_traced { ends[lane] } else { -1.0 };
+                }
+            }
+        }
+        Some(rows)
+    }
+}

@@ -1,0 +1,110 @@
+//! Which file a path leads to, whatever its name.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::ErrorKind;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use super::place::{directory_of, follow};
+
+/// A regular file, there or not yet: two paths with the same one lead to the same file. Links of both kinds, `..` and
+/// file systems that do not tell small letters from capitals are seen through.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum FileIdentity {
+    /// A file that is there.
+    Existing {
+        /// Of its file system.
+        device: u64,
+        /// Its number there.
+        inode: u64,
+    },
+    /// A file that is not there yet, in a folder that is.
+    New {
+        /// Of the folder's file system.
+        device: u64,
+        /// The folder's number there.
+        inode: u64,
+        /// Its name in that folder.
+        name: OsString,
+    },
+}
+
+impl FileIdentity {
+    /// None where a write would replace nothing: folders, devices, pipes, and paths that cannot be followed.
+    pub fn of(path: &Path) -> Option<Self> {
+        match fs::metadata(path) {
+            Ok(found) if found.is_file() => Some(Self::Existing { device: found.dev(), inode: found.ino() }),
+            Err(error) if error.kind() == ErrorKind::NotFound => Self::of_new(path),
+            Ok(_) | Err(_) => None,
+        }
+    }
+
+    /// Whether it is that of an open file.
+    pub fn is_of(&self, file: &File) -> bool {
+        let found = |found: fs::Metadata| Self::Existing { device: found.dev(), inode: found.ino() };
+        file.metadata().is_ok_and(|metadata| found(metadata) == *self)
+    }
+
+    fn of_new(path: &Path) -> Option<Self> {
+        let (target, _) = follow(path).ok()?;
+        let folder = fs::metadata(directory_of(&target)).ok()?;
+        let name = target.file_name()?.to_owned();
+        Some(Self::New { device: folder.dev(), inode: folder.ino(), name })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    #[test]
+    fn one_file_has_one_identity_by_all_its_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("far/away")).expect("folders");
+        fs::write(at("a"), "").expect("written");
+        fs::write(at("far/b"), "").expect("written");
+        symlink("a", at("link")).expect("a link");
+        fs::hard_link(at("a"), at("hard")).expect("a link");
+        symlink("far/away", at("near")).expect("a link");
+        let of = |name: &str| FileIdentity::of(&at(name)).expect(name);
+        for name in ["./a", "far/../a", "link", "hard", "far/away/../../a"] {
+            assert_eq!(of(name), of("a"), "{name}");
+        }
+        assert_eq!(of("near/../b"), of("far/b"), "`..` is the folder above that which the link leads to");
+        assert_ne!(of("far/b"), of("a"));
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_yet_has_one_too() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("far/away")).expect("folders");
+        symlink("far/away", at("near")).expect("a link");
+        symlink("second", at("first")).expect("a link");
+        symlink("near/new", at("second")).expect("a link");
+        let of = |name: &str| FileIdentity::of(&at(name));
+        for name in ["near/new", "./far/away/new", "first", "second"] {
+            assert_eq!(of(name), of("far/away/new"), "{name}");
+            assert!(matches!(of(name), Some(FileIdentity::New { .. })), "{name}");
+        }
+        assert_ne!(of("new"), of("far/away/new"));
+        assert_ne!(of("near/../new"), of("new"));
+        assert_eq!(of("nowhere/new"), None, "nothing can be written there");
+    }
+
+    #[test]
+    fn what_is_not_replaced_has_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let circle = folder.path().join("circle");
+        symlink("circle", &circle).expect("a link");
+        for path in
+            [folder.path(), Path::new("/dev/null"), Path::new("/dev/null/x"), &circle, Path::new("..")]
+        {
+            assert_eq!(FileIdentity::of(path), None, "{}", path.display());
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Which files a scene reads or names: the one list that every write is held against.
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::stages::meshes::Meshes;
+use super::watch::content::FileRead;
+use crate::output::FileIdentity;
+use crate::scene::Loaded;
+use crate::scene::description::Camera;
+
+/// A file that must not be written.
+#[derive(Clone, Debug)]
+pub(super) struct Input {
+    pub(super) path: PathBuf,
+    /// What it is to the scene, in words.
+    pub(super) role: String,
+    /// The scene, and where it names the file.
+    pub(super) place: Option<(Arc<Loaded>, Range<usize>)>,
+}
+
+/// All of them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Inputs(Vec<Input>);
+
+impl Inputs {
+    /// The scene file and what it names, used or not.
+    pub(super) fn of_scene(loaded: &Arc<Loaded>) -> Self {
+        let scene = &loaded.scene;
+        let path = loaded.path.clone();
+        let mut inputs = Self(vec![Input { path, role: "the scene file".to_owned(), place: None }]);
+        let mut add = |path: &Path, span: &Range<usize>, role: String| {
+            let place = Some((Arc::clone(loaded), span.clone()));
+            inputs.0.push(Input { path: path.to_owned(), role, place });
+        };
+        match &scene.camera {
+            Camera::Orbiter { file, .. } => {
+                add(&file.value, &file.span, "the camera's orbiter file".to_owned());
+            }
+            Camera::LookAt { .. } => {}
+        }
+        for texture in &scene.textures {
+            add(&texture.file.value, &texture.file.span, format!("the file of texture `{}`", texture.name));
+        }
+        for mesh in &scene.mesh_files {
+            add(&mesh.value, &mesh.span, "a mesh file of the scene".to_owned());
+        }
+        inputs
+    }
+
+    /// The material libraries that mesh files name, and the pictures that those name.
+    pub(super) fn add_meshes(&mut self, loaded: &Arc<Loaded>, meshes: &Meshes) {
+        for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
+            let name = file.value.file_name().unwrap_or_default().to_string_lossy();
+            let mut add = |path: &PathBuf, role: String| {
+                let place = Some((Arc::clone(loaded), file.span.clone()));
+                self.0.push(Input { path: path.clone(), role, place });
+            };
+            for library in &kept.mesh.companions {
+                add(library, format!("a material file of {name}"));
+            }
+            for picture in &kept.mesh.pictures {
+                add(picture, format!("a picture that a material of {name} names"));
+            }
+        }
+    }
+
+    /// Whatever else was read or tried.
+    pub(super) fn add_read(&mut self, files: &[FileRead]) {
+        let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
+        for file in files.iter().filter(|file| !known.contains(&file.path)) {
+            let role = "a file that the scene reads".to_owned();
+            self.0.push(Input { path: file.path.clone(), role, place: None });
+        }
+    }
+
+    /// Those of another scene as well.
+    pub(super) fn add(&mut self, others: Self) {
+        let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
+        self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
+    }
+
+    /// Which files they are now.
+    pub(super) fn identities(&self) -> HashMap<FileIdentity, &Input> {
+        let mut identities = HashMap::new();
+        for input in &self.0 {
+            if let Some(identity) = FileIdentity::of(&input.path) {
+                identities.entry(identity).or_insert(input);
+            }
+        }
+        identities
+    }
+
+    /// Whether this path leads to one of them now.
+    pub(super) fn contain(&self, path: &Path) -> bool {
+        FileIdentity::of(path).is_some_and(|identity| self.identities().contains_key(&identity))
+    }
+}

@@ -1,0 +1,146 @@
+//! The files that a request writes, held against those that it reads, against each other, and against what a person
+//! did not mean to lose.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use super::inputs::{Input, Inputs};
+use super::plan::Plan;
+use crate::output::write::Guard;
+use crate::output::{FileIdentity, OutputError, holds_foreign_picture, holds_foreign_report};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+
+/// Who named the files for the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NamedBy {
+    /// `-o`.
+    Call,
+    /// `output` in `[render]`.
+    Scene,
+    /// Nobody: the scene's name with `.png`.
+    Nobody,
+}
+
+/// A file to be written.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Target<'a> {
+    path: &'a Path,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Picture(NamedBy),
+    Report,
+}
+
+/// Everything that keeps the files of this plan from being written, one for each of them. It is what holds now: links
+/// and files may change.
+pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
+    let inputs = inputs.identities();
+    targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs)).collect()
+}
+
+/// Writes a file of the plan, unless it is found at the last moment that it must not be.
+///
+/// # Errors
+/// Those of writing; [`OutputError::Refused`].
+pub(super) fn guarded<T>(
+    plan: &Plan,
+    inputs: &Inputs,
+    path: &Path,
+    write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
+) -> Result<T, OutputError> {
+    let may_replace = |real: &Path| {
+        let inputs = inputs.identities();
+        let mut found = targets(plan).filter(|target| target.path == path);
+        match found.find_map(|target| conflict(plan, target, real, &inputs)) {
+            Some(conflict) => Err(OutputError::Refused { reason: in_a_line(&conflict) }),
+            None => Ok(()),
+        }
+    };
+    write(&Guard { is_kept: &|path| inputs.contain(path), may_replace: &may_replace })
+}
+
+/// For messages that have no room for more.
+fn in_a_line(conflict: &Diagnostic) -> String {
+    let help = conflict.help.as_ref().map_or(String::new(), |help| format!("; {help}"));
+    format!("{}{help}", conflict.message)
+}
+
+/// The pictures, then the report.
+fn targets(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
+    let picture = |path| Target { path, kind: Kind::Picture(plan.named_by) };
+    let report = plan.report.iter().map(|path| Target { path, kind: Kind::Report });
+    plan.outputs.iter().map(PathBuf::as_path).map(picture).chain(report)
+}
+
+/// Why this target, which leads to `at`, must not be written.
+fn conflict(
+    plan: &Plan,
+    target: Target<'_>,
+    at: &Path,
+    inputs: &HashMap<FileIdentity, &Input>,
+) -> Option<Diagnostic> {
+    if let Some(identity) = FileIdentity::of(at) {
+        if let Some(input) = inputs.get(&identity) {
+            return Some(is_input(target, input));
+        }
+        let mut earlier = targets(plan).take_while(|other| *other != target);
+        if let Some(twin) = earlier.find(|other| FileIdentity::of(other.path).as_ref() == Some(&identity)) {
+            return Some(is_twin(target, twin.path));
+        }
+    }
+    is_foreign(target, at)
+}
+
+fn is_input(target: Target<'_>, input: &Input) -> Diagnostic {
+    let is_same_name = target.path == input.path;
+    let other = if is_same_name { String::new() } else { format!("{}, ", input.path.display()) };
+    let message = format!("cannot write {}: it is {other}{}", target.path.display(), input.role);
+    let help = Some(way_out(target.kind).to_owned());
+    match &input.place {
+        Some((loaded, span)) => loaded.diagnostic_at(span.clone(), Severity::Error, message, help),
+        None => of_call(message, help),
+    }
+}
+
+fn is_twin(target: Target<'_>, twin: &Path) -> Diagnostic {
+    let (name, twin) = (target.path.display(), twin.display());
+    let message = match target.kind {
+        Kind::Picture(_) => format!("the outputs {twin} and {name} are one file"),
+        Kind::Report => format!("the picture {twin} and the report {name} are one file"),
+    };
+    of_call(message, Some(format!("each needs a file of its own: {}", way_out(target.kind))))
+}
+
+/// What is there already and was not written by glimt.
+fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
+    let name = target.path.display();
+    let (message, help) = match target.kind {
+        Kind::Picture(NamedBy::Nobody) if holds_foreign_picture(at) => (
+            format!("cannot write {name}: there is a file of this name that glimt did not write"),
+            format!("{}; -o {name} replaces it", way_out(target.kind)),
+        ),
+        Kind::Report if holds_foreign_report(at) => (
+            format!("cannot write {name}: there is a file of this name that is no report"),
+            format!("{}, such as {name}.json, or remove that file", way_out(target.kind)),
+        ),
+        Kind::Picture(_) | Kind::Report => return None,
+    };
+    Some(of_call(message, Some(help)))
+}
+
+fn way_out(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Picture(NamedBy::Call) => "name another file with -o FILE",
+        Kind::Picture(NamedBy::Scene) => "name another file with -o FILE, or as `output` in [render]",
+        Kind::Picture(NamedBy::Nobody) => "name a file with -o FILE, or with `output = \"FILE\"` in [render]",
+        Kind::Report => "name another file with --report FILE.json",
+    }
+}
+
+/// What is about the call stands at no place of the scene.
+fn of_call(message: String, help: Option<String>) -> Diagnostic {
+    Diagnostic { severity: Severity::Error, message, path: PathBuf::new(), place: None, help }
+}

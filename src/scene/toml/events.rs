@@ -1,0 +1,310 @@
+//! The events of `toml_parser` become headers, keys and values.
+//!
+//! Where the text is broken, the events are too: a close without its open, a key where a value is due. What is made of
+//! those is what the `toml` crate makes of them.
+
+use std::borrow::Cow;
+
+use toml_parser::Source;
+use toml_parser::decoder::{IntegerRadix, ScalarKind};
+use toml_parser::parser::{Event, EventKind};
+
+use super::DEEPEST;
+use super::assembly::{Assembly, Header, Sink};
+use super::error::SyntaxError;
+use super::tree::{Kind, Name, Node, Origin, Radix, Span};
+
+/// The events of one expression.
+pub(super) struct Events<'e, 's> {
+    pub(super) events: &'e [Event],
+    /// The text that the events point into, and where it begins in the document.
+    pub(super) source: Source<'s>,
+    pub(super) base: usize,
+    pub(super) assembly: &'e mut Assembly<'s>,
+}
+
+impl<'s> Events<'_, 's> {
+    /// Reads all of them.
+    pub(super) fn read(mut self) {
+        if self.assembly.open.is_some() {
+            self.header();
+        }
+        while let (false, Some(event)) = (self.assembly.is_lost, self.next()) {
+            match event.kind() {
+                EventKind::StdTableOpen | EventKind::ArrayTableOpen => {
+                    self.assembly.finish_table();
+                    let is_list = event.kind() == EventKind::ArrayTableOpen;
+                    let span = self.span(event);
+                    self.assembly.open = Some(Header { path: Vec::new(), key: None, span, is_list });
+                    self.header();
+                }
+                EventKind::SimpleKey => self.key_value(event),
+                EventKind::StdTableClose
+                | EventKind::ArrayTableClose
+                | EventKind::InlineTableOpen
+                | EventKind::InlineTableClose
+                | EventKind::ArrayOpen
+                | EventKind::ArrayClose
+                | EventKind::KeySep
+                | EventKind::KeyValSep
+                | EventKind::Scalar
+                | EventKind::ValueSep
+                | EventKind::Whitespace
+                | EventKind::Comment
+                | EventKind::Newline
+                | EventKind::Error => {}
+            }
+        }
+    }
+
+    fn next(&mut self) -> Option<Event> {
+        let (first, rest) = self.events.split_first()?;
+        self.events = rest;
+        Some(*first)
+    }
+
+    fn next_if(&mut self, kind: EventKind) -> Option<Event> {
+        let is_next = self.events.first().is_some_and(|event| event.kind() == kind);
+        if is_next { self.next() } else { None }
+    }
+
+    fn span(&self, event: Event) -> Span {
+        Span::new(self.base + event.span().start(), self.base + event.span().end())
+    }
+
+    /// The rest of the open header. A header that is not closed takes the key and the end of the next one.
+    fn header(&mut self) {
+        let Some(mut header) = self.assembly.open.take() else { return };
+        while let Some(event) = self.next() {
+            match event.kind() {
+                EventKind::StdTableClose | EventKind::ArrayTableClose => {
+                    header.span.end = self.span(event).end;
+                    self.assembly.start_table(header);
+                    return;
+                }
+                EventKind::SimpleKey => (header.path, header.key) = self.key(event),
+                EventKind::StdTableOpen
+                | EventKind::ArrayTableOpen
+                | EventKind::InlineTableOpen
+                | EventKind::InlineTableClose
+                | EventKind::ArrayOpen
+                | EventKind::ArrayClose
+                | EventKind::KeySep
+                | EventKind::KeyValSep
+                | EventKind::Scalar
+                | EventKind::ValueSep
+                | EventKind::Whitespace
+                | EventKind::Comment
+                | EventKind::Newline
+                | EventKind::Error => {}
+            }
+        }
+        self.assembly.open = Some(header);
+    }
+
+    fn key_value(&mut self, event: Event) {
+        let (path, key) = self.key(event);
+        self.next_if(EventKind::Whitespace);
+        let (Some(key), Some(_)) = (key, self.next_if(EventKind::KeyValSep)) else {
+            self.assembly.is_lost = true;
+            return;
+        };
+        self.next_if(EventKind::Whitespace);
+        let value = self.next().and_then(|event| self.value(event)).unwrap_or_else(|| self.no_value());
+        self.assembly.key_value(&path, key, value);
+    }
+
+    /// What stands for a value that is missing.
+    fn no_value(&mut self) -> Node {
+        let span = Span::default();
+        let text = self.assembly.text(span, Cow::Borrowed("0"));
+        Node { span, kind: Kind::Integer(text, Radix::Decimal) }
+    }
+
+    /// A key and the keys that it is dotted with: all but the last, and the last, if there are not too many.
+    fn key(&mut self, event: Event) -> (Vec<Name<'s>>, Option<Name<'s>>) {
+        let mut path = Vec::new();
+        let mut last = event;
+        let mut parts = 1;
+        while self.has_separator() {
+            while let Some(event) = self.next() {
+                match event.kind() {
+                    EventKind::SimpleKey => {
+                        if parts < DEEPEST {
+                            let name = self.name(last);
+                            path.push(name);
+                        }
+                        parts += 1;
+                        last = event;
+                        break;
+                    }
+                    EventKind::StdTableOpen
+                    | EventKind::StdTableClose
+                    | EventKind::ArrayTableOpen
+                    | EventKind::ArrayTableClose
+                    | EventKind::InlineTableOpen
+                    | EventKind::InlineTableClose
+                    | EventKind::ArrayOpen
+                    | EventKind::ArrayClose
+                    | EventKind::KeySep
+                    | EventKind::KeyValSep
+                    | EventKind::Scalar
+                    | EventKind::ValueSep
+                    | EventKind::Whitespace
+                    | EventKind::Comment
+                    | EventKind::Newline
+                    | EventKind::Error => {}
+                }
+            }
+        }
+        if parts > DEEPEST {
+            let span = Span { end: self.span(last).end, ..self.span(event) };
+            self.assembly.meaning.push_with(|| SyntaxError::at(span.range(), "recursion limit"));
+            return (Vec::new(), None);
+        }
+        let name = self.name(last);
+        (path, Some(name))
+    }
+
+    fn has_separator(&self) -> bool {
+        let kind = |at: usize| self.events.get(at).map(|event: &Event| event.kind());
+        match kind(0) {
+            Some(EventKind::KeySep) => true,
+            Some(EventKind::Whitespace) => kind(1) == Some(EventKind::KeySep),
+            _ => false,
+        }
+    }
+
+    fn name(&mut self, event: Event) -> Name<'s> {
+        let mut text = Cow::Borrowed("");
+        let mut sink = Sink { errors: &mut self.assembly.meaning, base: self.base };
+        if let Some(raw) = self.source.get(event) {
+            raw.decode_key(&mut text, &mut sink);
+        }
+        Name { span: self.span(event), text }
+    }
+
+    fn value(&mut self, event: Event) -> Option<Node> {
+        match event.kind() {
+            EventKind::InlineTableOpen => Some(self.inline_table(event)),
+            EventKind::ArrayOpen => Some(self.array(event)),
+            EventKind::Scalar => Some(self.scalar(event)),
+            EventKind::StdTableOpen
+            | EventKind::StdTableClose
+            | EventKind::ArrayTableOpen
+            | EventKind::ArrayTableClose
+            | EventKind::InlineTableClose
+            | EventKind::ArrayClose
+            | EventKind::SimpleKey
+            | EventKind::KeySep
+            | EventKind::KeyValSep
+            | EventKind::ValueSep
+            | EventKind::Whitespace
+            | EventKind::Comment
+            | EventKind::Newline
+            | EventKind::Error => None,
+        }
+    }
+
+    fn scalar(&mut self, event: Event) -> Node {
+        let span = self.span(event);
+        let mut decoded = Cow::Borrowed("");
+        let mut sink = Sink { errors: &mut self.assembly.meaning, base: self.base };
+        let raw = self.source.get(event);
+        let kind = raw.map_or(ScalarKind::String, |raw| raw.decode_scalar(&mut decoded, &mut sink));
+        if kind == ScalarKind::DateTime
+            && let Err(error) = decoded.parse::<toml_datetime::Datetime>()
+        {
+            self.assembly.meaning.push_with(|| SyntaxError::at(span.range(), error.to_string()));
+        }
+        let mut text = || self.assembly.text(span, std::mem::take(&mut decoded));
+        let kind = match kind {
+            ScalarKind::String => Kind::String(text()),
+            ScalarKind::Boolean(value) => Kind::Boolean(value),
+            ScalarKind::DateTime => Kind::Datetime,
+            ScalarKind::Float => Kind::Float(text()),
+            ScalarKind::Integer(radix) => Kind::Integer(text(), base_of(radix)),
+        };
+        Node { span, kind }
+    }
+
+    /// An array up to its end, or to where it cannot go on.
+    fn array(&mut self, open: Event) -> Node {
+        let first = self.assembly.elements.len();
+        let mut span = self.span(open);
+        let mut value = None;
+        while let Some(event) = self.next() {
+            span.end = self.span(event).end;
+            match event.kind() {
+                EventKind::InlineTableOpen | EventKind::ArrayOpen | EventKind::Scalar => {
+                    value = self.value(event);
+                }
+                EventKind::ValueSep => self.assembly.elements.extend(value.take()),
+                EventKind::ArrayClose => {
+                    self.assembly.elements.extend(value.take());
+                    break;
+                }
+                EventKind::Whitespace | EventKind::Comment | EventKind::Newline | EventKind::Error => {}
+                EventKind::StdTableOpen
+                | EventKind::StdTableClose
+                | EventKind::ArrayTableOpen
+                | EventKind::ArrayTableClose
+                | EventKind::InlineTableClose
+                | EventKind::SimpleKey
+                | EventKind::KeySep
+                | EventKind::KeyValSep => break,
+            }
+        }
+        Node { span, kind: self.assembly.end_array(first) }
+    }
+
+    /// An inline table up to its end, or to where it cannot go on.
+    fn inline_table(&mut self, open: Event) -> Node {
+        let origin = Origin { is_inline: true, ..Origin::default() };
+        let table = self.assembly.document.add_table(origin);
+        let mut span = self.span(open);
+        let (mut key, mut value) = (None, None);
+        while let Some(event) = self.next() {
+            span.end = self.span(event).end;
+            match event.kind() {
+                EventKind::SimpleKey => {
+                    if let (path, Some(last)) = self.key(event) {
+                        key = Some((path, last));
+                    }
+                }
+                EventKind::InlineTableOpen | EventKind::ArrayOpen | EventKind::Scalar => {
+                    value = self.value(event);
+                }
+                EventKind::ValueSep | EventKind::InlineTableClose => {
+                    if let (Some((path, key)), Some(value)) = (key.take(), value.take()) {
+                        self.assembly.inline_key_value(table, &path, key, value);
+                    }
+                    if event.kind() == EventKind::InlineTableClose {
+                        break;
+                    }
+                }
+                EventKind::KeyValSep
+                | EventKind::Whitespace
+                | EventKind::Comment
+                | EventKind::Newline
+                | EventKind::Error => {}
+                EventKind::StdTableOpen
+                | EventKind::StdTableClose
+                | EventKind::ArrayTableOpen
+                | EventKind::ArrayTableClose
+                | EventKind::ArrayClose
+                | EventKind::KeySep => break,
+            }
+        }
+        Node { span, kind: Kind::Table(table) }
+    }
+}
+
+fn base_of(radix: IntegerRadix) -> Radix {
+    match radix {
+        IntegerRadix::Dec => Radix::Decimal,
+        IntegerRadix::Hex => Radix::Hexadecimal,
+        IntegerRadix::Oct => Radix::Octal,
+        IntegerRadix::Bin => Radix::Binary,
+    }
+}

@@ -1,0 +1,43 @@
+//! TOML text as a compact tree that points into the text.
+//!
+//! [`parse`] reads a document line by line. [`plain`] reads the simplest lines, of which large scenes consist; every
+//! other expression is cut out by [`expression`], read by the events of `toml_parser` and made into values by
+//! [`events`]. [`assembly`] puts the keys and values into tables by the rules of TOML, [`tree`] holds them. Nothing here
+//! knows what a scene is. Documents with errors are read as far as they can be understood.
+
+mod assembly;
+mod error;
+mod events;
+mod expression;
+mod plain;
+mod tree;
+
+use assembly::Assembly;
+use expression::Expressions;
+
+pub(super) use error::SyntaxError;
+pub(super) use tree::{Entries, Item, KeyValue, Value};
+
+use tree::Document;
+
+/// Arrays and tables may lie in each other this deep, and dotted keys have at most this many parts.
+const DEEPEST: u32 = 80;
+
+/// A byte order mark, which may begin a text and is no part of it.
+const MARK: &str = "\u{feff}";
+
+/// The tree of a text of less than 4 GiB, and its first errors: those of the syntax, then those of keys and values,
+/// each in the order of the text.
+pub(super) fn parse(source: &str) -> (Document<'_>, Vec<SyntaxError>) {
+    let mut assembly = Assembly::new(source);
+    let mut expressions = Expressions::default();
+    let mut at = if source.starts_with(MARK) { MARK.len() } else { 0 };
+    while at < source.len() {
+        let plain = if assembly.is_in_header() { None } else { plain::read(source, at, &mut assembly) };
+        at = plain.unwrap_or_else(|| expressions.read(source, at, &mut assembly));
+    }
+    assembly.finish()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,165 @@
+//! What is wanted on the screen, led there slice by slice as the line has room.
+
+use std::time::{Duration, Instant};
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::color::ColorDepth;
+use super::input::Answer;
+use super::line::{Line, Question};
+use super::paint::{Fidelity, Painter};
+use super::state::FrameReport;
+use super::writer;
+
+/// Whether the terminal draws what lies between two marks at once (mode 2026), and, last of all, what it is (DA1).
+const FIRST_QUESTIONS: &[u8] = b"\x1b[?2026$p\x1b[c";
+/// A status report (DSR).
+const STATUS: &[u8] = b"\x1b[5n";
+const BEGIN: &[u8] = b"\x1b[?2026h";
+const END: &[u8] = b"\x1b[?2026l";
+/// Smaller slices do not flicker.
+const LARGE: usize = 2_000;
+
+/// The screen as the loop sees it.
+pub(super) struct Display {
+    painter: Painter,
+    line: Line,
+    /// Inside tmux or screen, which answer themselves and draw when they like.
+    is_multiplexed: bool,
+    /// Whether the terminal knows mode 2026.
+    is_synchronized: bool,
+    /// Whether all that is wanted has been sent.
+    is_complete: bool,
+    /// Bytes of the picture under way.
+    frame: Option<usize>,
+    /// Of the last picture.
+    report: Option<FrameReport>,
+    /// Whether that is news.
+    is_reported: bool,
+}
+
+impl Display {
+    /// A screen of which nothing is known.
+    pub(super) fn new(depth: ColorDepth, is_multiplexed: bool, now: Instant) -> Self {
+        let mut display = Self {
+            painter: Painter::new(depth),
+            line: Line::new(is_multiplexed, now),
+            is_multiplexed,
+            is_synchronized: false,
+            is_complete: true,
+            frame: None,
+            report: None,
+            is_reported: true,
+        };
+        display.restart(now);
+        display
+    }
+
+    /// Somebody else used the terminal: its content is unknown, and so is the line.
+    pub(super) fn restart(&mut self, now: Instant) {
+        self.painter.forget();
+        self.line = Line::new(self.is_multiplexed, now);
+        self.is_complete = false;
+        self.send(FIRST_QUESTIONS.to_vec(), Some(Question::Attributes), now);
+    }
+
+    /// Leads to this from now on. `is_new`: with a picture that was not wanted before.
+    pub(super) fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, is_new: bool) {
+        self.painter.aim(wanted, picture, fidelity);
+        self.is_complete = false;
+        if is_new {
+            self.frame = Some(0);
+        }
+    }
+
+    /// Sends what the line has room for; whether that was anything.
+    pub(super) fn pump(&mut self, now: Instant) -> bool {
+        let mut has_sent = false;
+        while !self.is_complete {
+            let room = self.line.room(now);
+            if room == 0 {
+                break;
+            }
+            let slice = self.painter.slice(room.saturating_sub(BEGIN.len() + END.len()));
+            if slice.is_empty() {
+                self.complete();
+                break;
+            }
+            has_sent = true;
+            self.send_slice(slice, now);
+        }
+        has_sent
+    }
+
+    fn complete(&mut self) {
+        self.is_complete = true;
+        if let Some(bytes) = self.frame.take() {
+            self.report = Some(FrameReport { bytes, round_trip: self.line.round_trip() });
+            self.is_reported = false;
+        }
+    }
+
+    fn send_slice(&mut self, mut slice: Vec<u8>, now: Instant) {
+        if self.is_synchronized && !self.is_multiplexed && slice.len() >= LARGE {
+            slice.splice(0..0, BEGIN.iter().copied());
+            slice.extend_from_slice(END);
+        }
+        let question = self.line.question();
+        if question.is_some() {
+            slice.extend_from_slice(STATUS);
+        }
+        if let Some(bytes) = &mut self.frame {
+            *bytes += slice.len();
+        }
+        self.send(slice, question, now);
+    }
+
+    fn send(&mut self, bytes: Vec<u8>, question: Option<Question>, now: Instant) {
+        self.line.send(bytes.len(), question, now);
+        writer::send(bytes);
+    }
+
+    /// The terminal answered.
+    pub(super) fn answered(&mut self, answer: Answer, now: Instant) {
+        match answer {
+            Answer::Ready => self.line.answered(Question::Status, now),
+            Answer::Attributes => self.line.answered(Question::Attributes, now),
+            Answer::Synchronized { is_known } => self.is_synchronized = is_known,
+            Answer::Other => {}
+        }
+    }
+
+    /// The system took so many bytes.
+    pub(super) fn written(&mut self, bytes: usize) {
+        self.line.written(bytes);
+    }
+
+    /// Whether all that is wanted has been sent.
+    pub(super) fn is_complete(&self) -> bool {
+        self.is_complete
+    }
+
+    /// When there may be room for what is left, without an answer.
+    pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
+        if self.is_complete { None } else { self.line.wake(now) }
+    }
+
+    /// The report on the last picture, once, and again when the terminal's first answer came after it.
+    pub(super) fn take_report(&mut self) -> Option<FrameReport> {
+        let report = self.report.as_mut()?;
+        if report.round_trip.is_none() && self.line.round_trip().is_some() {
+            report.round_trip = self.line.round_trip();
+            self.is_reported = false;
+        }
+        (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
+    }
+
+    /// How long to wait for answers that would else be typed into the shell; none: nothing is owed.
+    pub(super) fn patience(&self) -> Option<Duration> {
+        const LEAST: Duration = Duration::from_millis(200);
+        const MOST: Duration = Duration::from_secs(1);
+        let round_trip = self.line.round_trip().unwrap_or_default();
+        self.line.owes().then(|| (round_trip * 3 / 2).clamp(LEAST, MOST))
+    }
+}

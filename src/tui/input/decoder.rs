@@ -1,0 +1,204 @@
+//! Bytes as they come, split anywhere, into inputs.
+//!
+//! The escape character is a key and the beginning of nearly everything else; only time tells. What begins and does
+//! not end in time is given up, so that no byte can hold the keyboard.
+
+use std::time::{Duration, Instant};
+
+use crossterm::event::KeyCode;
+
+use super::Input;
+use super::keys::Meaning;
+use super::paste::Paste;
+use crate::tui::event::KeyPress;
+
+const ESCAPE: u8 = 0x1b;
+/// After this much silence an escape character was the key.
+const LONE_ESCAPE: Duration = Duration::from_millis(50);
+/// A sequence goes on within this time. Lines that lose packets are this slow.
+const SEQUENCE: Duration = Duration::from_secs(1);
+/// A sequence ends within this time and length, whatever comes: alt and `]` begin one that no key ends.
+const LONGEST: Duration = Duration::from_secs(2);
+const MOST_BYTES: usize = 4096;
+/// So long after the key was taken for pressed, `[` can still show that it was the beginning of a sequence.
+const REGRET: Duration = Duration::from_secs(2);
+/// How long such a `[` waits for the next byte, and how many bytes are kept in doubt.
+const DOUBT: Duration = Duration::from_millis(300);
+const LONGEST_ANSWER: usize = 32;
+
+/// Turns bytes into inputs.
+#[derive(Default)]
+pub(super) struct Decoder {
+    parser: vte::Parser,
+    meaning: Meaning,
+    held: Held,
+    /// When the last byte came.
+    last: Option<Instant>,
+    /// When silence made a key of an escape character.
+    escaped: Option<Instant>,
+}
+
+/// What began and has not ended.
+#[derive(Debug, Default)]
+enum Held {
+    #[default]
+    Nothing,
+    /// An escape character alone.
+    Escape,
+    /// A sequence that began then and has so many bytes.
+    Sequence {
+        begin: Instant,
+        bytes: usize,
+    },
+    /// Perhaps the rest of a sequence whose escape character was taken for the key; else these keys.
+    Doubtful(Vec<u8>),
+    Paste(Paste),
+}
+
+impl Decoder {
+    /// What these bytes say, together with those before.
+    pub(super) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<Input> {
+        // An escape character and a doubt are not over: what had to follow them is here, if late.
+        if matches!(self.held, Held::Sequence { .. } | Held::Paste(_)) {
+            self.expire_into_found(now);
+        }
+        self.last = Some(now);
+        for &byte in bytes {
+            self.take(byte, now);
+        }
+        std::mem::take(&mut self.meaning.found)
+    }
+
+    /// When [`Decoder::expire`] has something to do.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        let after = |wait| self.last.map(|last| last + wait);
+        match &self.held {
+            Held::Nothing => None,
+            Held::Escape => after(LONE_ESCAPE),
+            Held::Sequence { begin, .. } => after(SEQUENCE).map(|end| end.min(*begin + LONGEST)),
+            Held::Doubtful(_) => after(DOUBT),
+            Held::Paste(paste) => Some(paste.deadline()),
+        }
+    }
+
+    /// What silence says.
+    pub(super) fn expire(&mut self, now: Instant) -> Vec<Input> {
+        self.expire_into_found(now);
+        std::mem::take(&mut self.meaning.found)
+    }
+
+    fn expire_into_found(&mut self, now: Instant) {
+        if self.deadline().is_some_and(|deadline| now >= deadline) {
+            match self.give_up() {
+                Held::Escape => {
+                    self.escaped = Some(now);
+                    self.press_escape();
+                }
+                Held::Doubtful(bytes) => self.replay(&bytes),
+                Held::Paste(_) => self.meaning.found.push(Input::Paste),
+                Held::Nothing | Held::Sequence { .. } => {}
+            }
+        }
+    }
+
+    fn take(&mut self, byte: u8, now: Instant) {
+        match std::mem::take(&mut self.held) {
+            Held::Nothing => self.begin(byte, now),
+            Held::Escape => self.follow_escape(byte, now),
+            Held::Sequence { .. } if byte == ESCAPE => self.begin(byte, now),
+            Held::Sequence { begin, bytes } => self.go_on(byte, (begin, bytes + 1), now),
+            Held::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
+            Held::Paste(mut paste) => {
+                if paste.takes_last(byte, now) {
+                    self.meaning.found.push(Input::Paste);
+                } else {
+                    self.held = Held::Paste(paste);
+                }
+            }
+        }
+    }
+
+    fn begin(&mut self, byte: u8, now: Instant) {
+        let escaped = self.escaped.take().filter(|escaped| now < *escaped + REGRET);
+        match byte {
+            ESCAPE => {
+                self.meaning.forget();
+                self.parser.advance(&mut self.meaning, &[byte]);
+                self.held = Held::Escape;
+            }
+            b'[' if escaped.is_some() => {
+                self.parser.advance(&mut self.meaning, &[ESCAPE, byte]);
+                self.held = Held::Doubtful(vec![byte]);
+            }
+            _ => self.parser.advance(&mut self.meaning, &[byte]),
+        }
+    }
+
+    fn follow_escape(&mut self, byte: u8, now: Instant) {
+        match byte {
+            ESCAPE => {
+                self.press_escape();
+                self.held = Held::Escape;
+            }
+            // No sequence goes on like this.
+            0..0x20 | 0x7f.. => {
+                self.give_up();
+                self.press_escape();
+                self.begin(byte, now);
+            }
+            _ => self.go_on(byte, (now, 2), now),
+        }
+    }
+
+    /// The next byte of a sequence that began then and has so many bytes with this one.
+    fn go_on(&mut self, byte: u8, (begin, bytes): (Instant, usize), now: Instant) {
+        self.meaning.has_ended = false;
+        self.parser.advance(&mut self.meaning, &[byte]);
+        if std::mem::take(&mut self.meaning.is_paste) {
+            self.held = Held::Paste(Paste::new(now));
+        } else if bytes >= MOST_BYTES {
+            self.give_up();
+        } else if !self.meaning.has_ended {
+            self.held = Held::Sequence { begin, bytes };
+        }
+    }
+
+    fn follow_doubt(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
+        let before = self.meaning.found.len();
+        if (0x20..0x7f).contains(&byte) {
+            self.go_on(byte, (now, bytes.len()), now);
+        }
+        let is_known = self.meaning.found.len() > before || matches!(self.held, Held::Paste(_));
+        if is_known {
+            return;
+        }
+        let is_middle = matches!(byte, b' '..=b'?') && bytes.len() < LONGEST_ANSWER;
+        if is_middle {
+            bytes.push(byte);
+            self.held = Held::Doubtful(bytes);
+        } else {
+            self.give_up();
+            self.replay(&bytes);
+            self.begin(byte, now);
+        }
+    }
+
+    /// Forgets what began.
+    fn give_up(&mut self) -> Held {
+        self.meaning.forget();
+        self.parser = vte::Parser::default();
+        std::mem::take(&mut self.held)
+    }
+
+    fn replay(&mut self, bytes: &[u8]) {
+        self.parser.advance(&mut self.meaning, bytes);
+    }
+
+    fn press_escape(&mut self) {
+        self.meaning.found.push(Input::Key(KeyPress::special(KeyCode::Esc)));
+    }
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;

@@ -1,0 +1,101 @@
+//! What comes from the terminal: keys, pasted text, and the terminal's answers.
+//!
+//! One thread polls the terminal and reads whatever is there, so that nothing waits for the next byte. [`Decoder`]
+//! turns bytes into [`Input`], and is the one place that knows how keys are encoded.
+
+mod decoder;
+mod keys;
+mod paste;
+
+use std::io;
+use std::os::fd::AsFd;
+use std::sync::mpsc::Sender;
+use std::thread;
+use std::time::Instant;
+
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+
+use self::decoder::Decoder;
+use super::event::{Event, KeyPress, Source};
+
+/// One thing that the terminal sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Input {
+    Key(KeyPress),
+    /// Text was pasted; what it was is not kept.
+    Paste,
+    Answer(Answer),
+}
+
+/// What a terminal says when it is asked, or of its own accord.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// To a status report (DSR 5): all that was sent before has been processed.
+    Ready,
+    /// To a question for the primary device attributes (DA1).
+    Attributes,
+    /// Whether mode 2026 is known, by which large changes appear at once.
+    Synchronized { is_known: bool },
+    /// Any other report: the cursor's position, modes, colours, names, focus, the mouse.
+    Other,
+}
+
+impl From<Input> for Event {
+    fn from(input: Input) -> Self {
+        match input {
+            Input::Key(key) => Self::Key(key),
+            Input::Paste => Self::Paste,
+            Input::Answer(answer) => Self::Answer(answer),
+        }
+    }
+}
+
+/// Reads standard input, on a thread of its own, until it ends: then [`Source::Keys`] is lost.
+///
+/// # Errors
+/// The system has no thread left.
+pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
+    let events = events.clone();
+    let read = move || {
+        let mut decoder = Decoder::default();
+        while let Some(inputs) = next(&mut decoder) {
+            for input in inputs {
+                if events.send(input.into()).is_err() {
+                    return;
+                }
+            }
+        }
+        let _ = events.send(Event::Lost(Source::Keys));
+    };
+    thread::Builder::new().name("keys".to_owned()).spawn(read)?;
+    Ok(())
+}
+
+/// What the next bytes mean, or that there are none for as long as the decoder waits; none: the terminal is gone.
+fn next(decoder: &mut Decoder) -> Option<Vec<Input>> {
+    let mut bytes = [0; 4096];
+    match wait(decoder.deadline())
+        .and_then(|is_readable| if is_readable { read(&mut bytes) } else { Ok(None) })
+    {
+        Ok(Some(0)) => None,
+        Ok(Some(count)) => Some(decoder.decode(&bytes[..count], Instant::now())),
+        Ok(None) | Err(Errno::EINTR | Errno::EAGAIN) => Some(decoder.expire(Instant::now())),
+        Err(_) => None,
+    }
+}
+
+fn read(bytes: &mut [u8]) -> nix::Result<Option<usize>> {
+    nix::unistd::read(io::stdin().as_fd(), bytes).map(Some)
+}
+
+/// Waits for bytes, until the deadline if there is one; whether there are any, or the end.
+fn wait(deadline: Option<Instant>) -> nix::Result<bool> {
+    let stdin = io::stdin();
+    let mut ends = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
+    let timeout = deadline.map_or(PollTimeout::NONE, |deadline| {
+        let rest = deadline.saturating_duration_since(Instant::now()).as_micros().div_ceil(1000);
+        PollTimeout::try_from(rest).unwrap_or(PollTimeout::MAX)
+    });
+    poll(&mut ends, timeout).map(|count| count > 0)
+}

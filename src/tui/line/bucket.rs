@@ -1,0 +1,45 @@
+//! Pace by time: bytes that fill up at a steady rate, a bucketful at most.
+
+use std::time::{Duration, Instant};
+
+/// Below a line of 1 Mbit/s, 125 kB a second, so that its queue drains.
+const RATE: f64 = 100_000.0;
+/// What may be sent at once: 100 ms of that line.
+const FULL: f64 = 12_000.0;
+
+/// The bytes that may be sent.
+#[derive(Debug)]
+pub(super) struct Bucket {
+    tokens: f64,
+    at: Instant,
+}
+
+impl Bucket {
+    pub(super) fn full(now: Instant) -> Self {
+        Self { tokens: FULL, at: now }
+    }
+
+    /// How many there are now.
+    pub(super) fn tokens(&self, now: Instant) -> usize {
+        self.level(now).max(0.0) as usize
+    }
+
+    pub(super) fn take(&mut self, bytes: usize, now: Instant) {
+        (self.tokens, self.at) = (self.level(now) - bytes as f64, now);
+    }
+
+    /// When there are so many.
+    pub(super) fn when(&self, bytes: usize, now: Instant) -> Instant {
+        if self.tokens(now) >= bytes {
+            return now;
+        }
+        // One more, so that rounding leaves enough.
+        let missing = (bytes + 1) as f64 - self.level(now);
+        now + Duration::from_secs_f64(missing / RATE)
+    }
+
+    fn level(&self, now: Instant) -> f64 {
+        let filled = now.saturating_duration_since(self.at).as_secs_f64() * RATE;
+        (self.tokens + filled).min(FULL)
+    }
+}

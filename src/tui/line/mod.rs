@@ -1,0 +1,253 @@
+//! Flow control: how much may be sent to the terminal now.
+//!
+//! Between glimt and the eye lie buffers that would hold seconds of old pictures. So the terminal is asked after every
+//! slice whether it has come so far (a status report), and only so much is on its way as the line carries in its round
+//! trip and [`QUEUE`] more, [`MOST`] at most: what is sent next, the answer to a key, waits no longer than that. The
+//! window follows the round trips as in TCP Vegas (Brakmo and Peterson, 1995): the least one is the line's own, what is
+//! above it is queue.
+//!
+//! A terminal that answers nothing within [`PATIENCE`] is paced by time, and so is one inside a multiplexer, which
+//! answers itself and says nothing of the line behind it.
+
+mod bucket;
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use self::bucket::Bucket;
+
+/// Most bytes on their way that the terminal has not answered for: 24 kB with those that take the screen, which are not
+/// counted.
+const MOST: usize = 23_800;
+/// The window at the beginning, and the least one.
+const START: f64 = 8_000.0;
+const LEAST: f64 = 1_500.0;
+/// How long what is sent may wait in the line's queue.
+const QUEUE: Duration = Duration::from_millis(60);
+/// How long a terminal has to give its first answer.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// After this silence answers are taken for lost.
+const SILENCE: Duration = Duration::from_secs(3);
+/// The least round trip is that of the last one or two of these.
+const AGE: Duration = Duration::from_secs(15);
+/// Slices are this large at most, and no smaller ones than this are begun.
+const SLICE: usize = 8_000;
+const LEAST_SLICE: usize = 400;
+
+/// What the terminal can be asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Question {
+    /// Primary device attributes: the last of the first questions. What has not answered before it never will.
+    Attributes,
+    /// A status report.
+    Status,
+}
+
+/// Bytes on their way, with the question at their end.
+#[derive(Clone, Copy, Debug)]
+struct Slice {
+    question: Question,
+    bytes: usize,
+    sent: Instant,
+    /// Whether the window was what kept more from being sent.
+    is_limited: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pace {
+    /// Whether the terminal answers is not known until then.
+    Asked {
+        until: Instant,
+    },
+    Answers,
+    Silent,
+}
+
+/// The line to the terminal.
+#[derive(Debug)]
+pub(super) struct Line {
+    pace: Pace,
+    is_multiplexed: bool,
+    flight: VecDeque<Slice>,
+    in_flight: usize,
+    /// Bytes that may be in flight.
+    window: f64,
+    /// When the window last shrank: slices from before say nothing new.
+    shrunk: Option<Instant>,
+    round_trips: RoundTrips,
+    /// When an answer last came, or one began to be owed.
+    heard: Instant,
+    bucket: Bucket,
+    /// Bytes that the system has not taken yet.
+    unwritten: usize,
+}
+
+impl Line {
+    /// A line of which nothing is known. `is_multiplexed`: what answers is not the terminal itself.
+    pub(super) fn new(is_multiplexed: bool, now: Instant) -> Self {
+        Self {
+            pace: Pace::Asked { until: now + PATIENCE },
+            is_multiplexed,
+            flight: VecDeque::new(),
+            in_flight: 0,
+            window: START,
+            shrunk: None,
+            round_trips: RoundTrips::default(),
+            heard: now,
+            bucket: Bucket::full(now),
+            unwritten: 0,
+        }
+    }
+
+    /// Bytes that the next slice may have, its question not counted; 0: not now.
+    pub(super) fn room(&mut self, now: Instant) -> usize {
+        self.lose_patience(now);
+        let window = self.window_bytes().saturating_sub(self.in_flight);
+        let tokens = self.bucket.tokens(now);
+        let room = match self.pace {
+            Pace::Answers if !self.is_multiplexed => window,
+            Pace::Answers => window.min(tokens),
+            Pace::Asked { .. } => (MOST - self.in_flight.min(MOST)).min(tokens),
+            Pace::Silent if self.unwritten > 0 => 0,
+            Pace::Silent => tokens,
+        };
+        // Several slices fill a window, so that the line does not run dry while an answer is under way.
+        let slice = (self.window_bytes() / 3).clamp(LEAST_SLICE, SLICE);
+        let room = room.saturating_sub(ASKED_BYTES).min(slice);
+        if room < LEAST_SLICE { 0 } else { room }
+    }
+
+    /// What to ask after the next slice.
+    pub(super) fn question(&self) -> Option<Question> {
+        (self.pace != Pace::Silent).then_some(Question::Status)
+    }
+
+    /// A slice goes out; its bytes with those of the question.
+    pub(super) fn send(&mut self, bytes: usize, question: Option<Question>, now: Instant) {
+        self.unwritten += bytes;
+        self.bucket.take(bytes, now);
+        let Some(question) = question else { return };
+        if self.flight.is_empty() {
+            self.heard = now;
+        }
+        self.in_flight += bytes;
+        let is_limited =
+            self.in_flight + LEAST_SLICE + SLICE.min(self.window_bytes() / 3) > self.window_bytes();
+        self.flight.push_back(Slice { question, bytes, sent: now, is_limited });
+    }
+
+    /// The system took so many bytes.
+    pub(super) fn written(&mut self, bytes: usize) {
+        self.unwritten = self.unwritten.saturating_sub(bytes);
+    }
+
+    /// The terminal answered.
+    pub(super) fn answered(&mut self, question: Question, now: Instant) {
+        self.pace = Pace::Answers;
+        self.heard = now;
+        let Some(place) = self.flight.iter().position(|slice| slice.question == question) else { return };
+        // Answers come in order: those before it are lost.
+        let passed: Vec<Slice> = self.flight.drain(..=place).collect();
+        for slice in passed {
+            self.in_flight -= slice.bytes;
+            if slice.question == question {
+                let round_trip = now.saturating_duration_since(slice.sent);
+                self.round_trips.add(round_trip, now);
+                self.fit(&slice, round_trip, now);
+            }
+        }
+    }
+
+    /// When there may be room without an answer, for who waits for it.
+    pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
+        let filled = self.bucket.when(LEAST_SLICE + ASKED_BYTES, now);
+        match self.pace {
+            Pace::Answers => {
+                let lost = (!self.flight.is_empty()).then_some(self.heard + SILENCE);
+                let filled = self.is_multiplexed.then_some(filled).filter(|filled| *filled > now);
+                [lost, filled].into_iter().flatten().min()
+            }
+            Pace::Asked { until } if filled <= now => Some(until),
+            Pace::Asked { until } => Some(filled.min(until)),
+            Pace::Silent => (self.unwritten == 0).then_some(filled),
+        }
+    }
+
+    /// Whether the terminal owes an answer.
+    pub(super) fn owes(&self) -> bool {
+        !self.flight.is_empty()
+    }
+
+    /// How long the terminal takes to answer when nothing is in its way; none: it does not answer.
+    pub(super) fn round_trip(&self) -> Option<Duration> {
+        self.round_trips.least().filter(|_| self.pace == Pace::Answers)
+    }
+
+    fn window_bytes(&self) -> usize {
+        (self.window as usize).min(MOST)
+    }
+
+    fn lose_patience(&mut self, now: Instant) {
+        match self.pace {
+            Pace::Asked { until } if now >= until => {
+                self.pace = Pace::Silent;
+                self.forget_flight();
+            }
+            Pace::Answers if self.owes() && now >= self.heard + SILENCE => {
+                // The line stands still, or an answer was lost. Little is sent until one comes.
+                self.forget_flight();
+                self.window = LEAST;
+            }
+            Pace::Asked { .. } | Pace::Answers | Pace::Silent => {}
+        }
+    }
+
+    fn forget_flight(&mut self) {
+        self.flight.clear();
+        self.in_flight = 0;
+    }
+
+    /// Fits the window to the queue that a slice met.
+    fn fit(&mut self, slice: &Slice, round_trip: Duration, now: Instant) {
+        let Some(least) = self.round_trips.least() else { return };
+        let queue = round_trip.saturating_sub(least);
+        if queue <= QUEUE {
+            if slice.is_limited {
+                self.window += slice.bytes as f64 * (1.0 - queue.div_duration_f64(QUEUE));
+            }
+        } else if self.shrunk.is_none_or(|shrunk| slice.sent >= shrunk) {
+            self.window *= (least + QUEUE).div_duration_f64(round_trip);
+            self.shrunk = Some(now);
+        }
+        self.window = self.window.clamp(LEAST, MOST as f64);
+    }
+}
+
+/// Bytes of a question.
+const ASKED_BYTES: usize = 4;
+
+/// The least round trip of late.
+#[derive(Debug, Default)]
+struct RoundTrips {
+    current: Option<(Instant, Duration)>,
+    before: Option<Duration>,
+}
+
+impl RoundTrips {
+    fn add(&mut self, round_trip: Duration, now: Instant) {
+        self.current = match self.current {
+            Some((since, least)) if now < since + AGE => Some((since, least.min(round_trip))),
+            last => {
+                self.before = last.map(|(_, least)| least);
+                Some((now, round_trip))
+            }
+        };
+    }
+
+    fn least(&self) -> Option<Duration> {
+        let current = self.current.map(|(_, least)| least);
+        current.into_iter().chain(self.before).min()
+    }
+}

@@ -1,0 +1,168 @@
+use super::*;
+
+/// A line with a terminal at its end, in simulated time, to which as much is sent as the flow control allows.
+struct Relay {
+    line: Line,
+    start: Instant,
+    now: Instant,
+    bytes_a_second: f64,
+    round_trip: Duration,
+    answers: bool,
+    /// When the last byte leaves the line's queue.
+    busy: Instant,
+    /// Answers under way.
+    due: VecDeque<(Instant, Question)>,
+    carried: usize,
+    /// Most bytes and longest wait in the queue, since the last look.
+    most_in_flight: usize,
+    longest: Duration,
+}
+
+impl Relay {
+    fn new(bytes_a_second: f64, milliseconds: u64, answers: bool, is_multiplexed: bool) -> Self {
+        let now = Instant::now();
+        let mut relay = Self {
+            line: Line::new(is_multiplexed, now),
+            start: now,
+            now,
+            bytes_a_second,
+            round_trip: Duration::from_millis(milliseconds),
+            answers,
+            busy: now,
+            due: VecDeque::new(),
+            carried: 0,
+            most_in_flight: 0,
+            longest: Duration::ZERO,
+        };
+        relay.send(12, Some(Question::Attributes));
+        relay
+    }
+
+    fn send(&mut self, bytes: usize, question: Option<Question>) {
+        self.line.send(bytes, question, self.now);
+        self.line.written(bytes);
+        self.busy = self.busy.max(self.now) + Duration::from_secs_f64(bytes as f64 / self.bytes_a_second);
+        self.carried += bytes;
+        self.longest = self.longest.max(self.busy - self.now);
+        self.most_in_flight = self.most_in_flight.max(self.line.in_flight);
+        if let Some(question) = question.filter(|_| self.answers) {
+            let multiplexed = self.line.is_multiplexed;
+            let when = if multiplexed { self.now } else { self.busy + self.round_trip };
+            self.due.push_back((when, question));
+        }
+    }
+
+    /// Sends without end for so long.
+    fn run(&mut self, milliseconds: u64) {
+        let end = self.now + Duration::from_millis(milliseconds);
+        (self.carried, self.longest) = (0, Duration::ZERO);
+        while self.now < end {
+            while let Some((_, question)) = self.due.pop_front_if(|(when, _)| *when <= self.now) {
+                self.line.answered(question, self.now);
+            }
+            loop {
+                let room = self.line.room(self.now);
+                if room == 0 {
+                    break;
+                }
+                let question = self.line.question();
+                self.send(room + question.map_or(0, |_| ASKED_BYTES), question);
+            }
+            let next = [self.due.front().map(|(when, _)| *when), self.line.wake(self.now)];
+            self.now =
+                next.into_iter().flatten().filter(|next| *next > self.now).min().unwrap_or(end).min(end);
+        }
+    }
+
+    /// Share of what the line can carry that was carried in the last run.
+    fn share(&self, milliseconds: u64) -> f64 {
+        self.carried as f64 / (self.bytes_a_second * milliseconds as f64 / 1e3)
+    }
+}
+
+#[test]
+fn lines_are_filled_and_their_queues_stay_short() {
+    for (bytes_a_second, milliseconds) in
+        [(125e3, 150), (125e3, 20), (1.25e6, 150), (16e3, 150), (16e3, 600), (1e8, 1), (6e3, 300)]
+    {
+        let mut relay = Relay::new(bytes_a_second, milliseconds, true, false);
+        relay.run(10_000);
+        relay.run(10_000);
+        let name = format!("{bytes_a_second} B/s, {milliseconds} ms");
+        assert!(relay.most_in_flight <= MOST, "{name}: {}", relay.most_in_flight);
+        // The least window is more than the slowest lines carry in time.
+        let longest = QUEUE.as_secs_f64() * 2.0 + LEAST / bytes_a_second;
+        assert!(relay.longest.as_secs_f64() <= longest, "{name}: {:?}", relay.longest);
+        let most = MOST as f64 / (bytes_a_second * milliseconds as f64 / 1e3);
+        assert!(relay.share(10_000) >= 0.6 * most.min(1.0), "{name}: {}", relay.share(10_000));
+        let measured = relay.line.round_trip().expect("it answers").as_millis();
+        assert!(measured >= u128::from(milliseconds), "{name}: {measured}");
+    }
+}
+
+#[test]
+fn a_terminal_that_never_answers_is_paced_by_time() {
+    let mut relay = Relay::new(125e3, 150, false, false);
+    relay.run(900);
+    assert!(relay.most_in_flight <= MOST && relay.line.owes());
+    relay.run(10_000);
+    assert!(!relay.line.owes() && relay.line.round_trip().is_none() && relay.line.question().is_none());
+    assert!(relay.longest <= Duration::from_millis(140), "{:?}", relay.longest);
+    assert!(relay.share(10_000) > 0.7, "{}", relay.share(10_000));
+}
+
+#[test]
+fn a_late_answer_is_believed() {
+    let mut relay = Relay::new(125e3, 1500, true, false);
+    relay.run(1200);
+    assert_eq!(relay.line.pace, Pace::Silent);
+    relay.run(2000);
+    assert_eq!(relay.line.pace, Pace::Answers);
+}
+
+#[test]
+fn behind_a_multiplexer_time_counts_as_well() {
+    let mut relay = Relay::new(125e3, 150, true, true);
+    relay.run(10_000);
+    assert!(relay.longest <= Duration::from_millis(140), "{:?}", relay.longest);
+    assert!(relay.share(10_000) > 0.7, "{}", relay.share(10_000));
+}
+
+#[test]
+fn a_line_that_stands_still_gets_little_and_recovers() {
+    let mut relay = Relay::new(125e3, 150, true, false);
+    relay.run(3_000);
+    let lost = std::mem::take(&mut relay.due);
+    assert!(!lost.is_empty());
+    relay.answers = false;
+    relay.run(20_000);
+    assert!(relay.carried <= MOST + 8 * LEAST as usize, "{}", relay.carried);
+    relay.answers = true;
+    relay.run(10_000);
+    assert!(relay.share(10_000) > 0.6, "{}", relay.share(10_000));
+}
+
+#[test]
+fn nothing_is_due_while_nothing_is_owed() {
+    let mut relay = Relay::new(1e8, 1, true, false);
+    relay.run(100);
+    relay.now += Duration::from_secs(1);
+    while let Some((_, question)) = relay.due.pop_front() {
+        relay.line.answered(question, relay.now);
+    }
+    assert!(!relay.line.owes());
+    assert_eq!(relay.line.wake(relay.now), None);
+    assert!(relay.now > relay.start);
+}
+
+#[test]
+fn answers_that_nobody_asked_for_change_nothing() {
+    let mut line = Line::new(false, Instant::now());
+    let now = Instant::now();
+    line.answered(Question::Status, now);
+    line.send(100, Some(Question::Attributes), now);
+    line.answered(Question::Status, now);
+    assert!(line.owes());
+    line.answered(Question::Attributes, now);
+    assert!(!line.owes() && line.in_flight == 0);
+}

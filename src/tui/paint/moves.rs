@@ -1,0 +1,122 @@
+//! Moves of the cursor in few bytes.
+
+use super::shade::push_number;
+
+/// A cell: column and row, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) x: u16,
+    pub(super) y: u16,
+}
+
+/// Appends the shortest move. `from` is none where the cursor may be anywhere, as after a character in the last column.
+/// None of the moves scrolls, wraps or depends on modes.
+pub(super) fn go(from: Option<Place>, to: Place, out: &mut Vec<u8>) {
+    let Some(from) = from else { return absolute(to, out) };
+    if from == to {
+        return;
+    }
+    let mut best = Vec::new();
+    absolute(to, &mut best);
+    let mut consider = |other: Vec<u8>| {
+        if other.len() < best.len() {
+            best = other;
+        }
+    };
+    if from.y == to.y {
+        consider(along(from.x, to.x));
+        consider(with_return(&[], to.x));
+    } else if from.y < to.y {
+        let down = usize::from(to.y - from.y);
+        // Below the start of a line; a line feed alone would depend on the modes of the line.
+        if down <= 8 {
+            consider(with_return(&vec![b'\n'; down], to.x));
+        }
+        if from.x == to.x {
+            consider(control(to.y - from.y, b'B'));
+        }
+    } else if from.x == to.x {
+        consider(control(from.y - to.y, b'A'));
+    }
+    out.extend_from_slice(&best);
+}
+
+/// CUP.
+fn absolute(to: Place, out: &mut Vec<u8>) {
+    out.extend_from_slice(b"\x1b[");
+    if to.y > 0 || to.x > 0 {
+        push_number(to.y + 1, out);
+    }
+    if to.x > 0 {
+        out.push(b';');
+        push_number(to.x + 1, out);
+    }
+    out.push(b'H');
+}
+
+/// CUF or CUB; CHA is never shorter than both this and CUP.
+fn along(from: u16, to: u16) -> Vec<u8> {
+    if to >= from { control(to - from, b'C') } else { control(from - to, b'D') }
+}
+
+/// To the start of the line, down, and to the right.
+fn with_return(down: &[u8], column: u16) -> Vec<u8> {
+    let mut bytes = vec![b'\r'];
+    bytes.extend_from_slice(down);
+    if column > 0 {
+        bytes.extend(control(column, b'C'));
+    }
+    bytes
+}
+
+/// CSI with a count, which is left out where it is 1.
+pub(super) fn control(count: u16, end: u8) -> Vec<u8> {
+    let mut bytes = b"\x1b[".to_vec();
+    if count != 1 {
+        push_number(count, &mut bytes);
+    }
+    bytes.push(end);
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn moved(from: (u16, u16), to: (u16, u16)) -> String {
+        let mut out = Vec::new();
+        go(Some(Place { x: from.0, y: from.1 }), Place { x: to.0, y: to.1 }, &mut out);
+        String::from_utf8(out).expect("ASCII")
+    }
+
+    #[test]
+    fn moves_are_short() {
+        assert_eq!(moved((5, 5), (5, 5)), "");
+        assert_eq!(moved((5, 5), (6, 5)), "\x1b[C");
+        assert_eq!(moved((5, 5), (0, 5)), "\r");
+        assert_eq!(moved((5, 5), (0, 6)), "\r\n");
+        assert_eq!(moved((5, 15), (2, 16)), "\r\n\x1b[2C");
+        assert_eq!(moved((5, 5), (2, 6)), "\x1b[7;3H");
+        assert_eq!(moved((5, 5), (0, 0)), "\x1b[H");
+        assert_eq!(moved((5, 5), (5, 6)), "\x1b[B");
+        assert_eq!(moved((5, 5), (90, 30)), "\x1b[31;91H");
+    }
+
+    proptest! {
+        #[test]
+        fn every_move_arrives(from in (0_u16..120, 0_u16..40), to in (0_u16..120, 0_u16..40), known in any::<bool>()) {
+            let side = |length| std::num::NonZero::new(length).expect("not zero");
+            let mut parser = vt100::Parser::new(side(40), side(120), 0);
+            let (mut start, mut out) = (Vec::new(), Vec::new());
+            let from = Place { x: from.0, y: from.1 };
+            absolute(from, &mut start);
+            parser.process(&start);
+            go(known.then_some(from), Place { x: to.0, y: to.1 }, &mut out);
+            parser.process(&out);
+            prop_assert_eq!(parser.screen().cursor_position(), (to.1, to.0));
+            prop_assert!(out.len() <= "\x1b[40;120H".len());
+        }
+    }
+}

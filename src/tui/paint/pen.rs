@@ -1,0 +1,183 @@
+//! Colours and modifiers that the terminal writes with.
+
+use ratatui::style::Modifier;
+
+use super::shade::{Layer, Shade, push_number};
+
+/// What the next character is drawn with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Pen {
+    pub(super) fg: Shade,
+    pub(super) bg: Shade,
+    pub(super) modifier: Modifier,
+}
+
+/// What a pen has to be like.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wish {
+    /// None: any.
+    pub(super) fg: Option<Shade>,
+    /// None: any.
+    pub(super) bg: Option<Shade>,
+    /// Of those that matter.
+    pub(super) modifier: Modifier,
+    /// The others may be on or off.
+    pub(super) matters: Modifier,
+}
+
+/// Modifiers with the parameters of SGR that turn them on and off.
+const MODIFIERS: [(Modifier, u16, u16); 9] = [
+    (Modifier::BOLD, 1, 22),
+    (Modifier::DIM, 2, 22),
+    (Modifier::ITALIC, 3, 23),
+    (Modifier::UNDERLINED, 4, 24),
+    (Modifier::SLOW_BLINK, 5, 25),
+    (Modifier::RAPID_BLINK, 6, 25),
+    (Modifier::REVERSED, 7, 27),
+    (Modifier::HIDDEN, 8, 28),
+    (Modifier::CROSSED_OUT, 9, 29),
+];
+
+impl Pen {
+    /// After SGR 0.
+    pub(super) const RESET: Self = Self { fg: Shade::Ink, bg: Shade::Ground, modifier: Modifier::empty() };
+
+    /// This pen and nothing else.
+    pub(super) fn exactly(self) -> Wish {
+        Wish { fg: Some(self.fg), bg: Some(self.bg), modifier: self.modifier, matters: Modifier::all() }
+    }
+
+    /// Appends the shortest SGR after which the pen is as wished, and becomes that pen. Nothing where it is already.
+    pub(super) fn turn(&mut self, wish: &Wish, out: &mut Vec<u8>) {
+        let mut list = Vec::new();
+        let changed = self.changed(wish, &mut list);
+        if list.is_empty() {
+            return;
+        }
+        let mut afresh = b"0".to_vec();
+        let reset = Self::RESET.changed(wish, &mut afresh);
+        let is_shorter = afresh.len() < list.len();
+        out.extend_from_slice(b"\x1b[");
+        out.extend_from_slice(if is_shorter { &afresh } else { &list });
+        out.push(b'm');
+        *self = if is_shorter { reset } else { changed };
+    }
+
+    /// Appends the parameters that turn this pen into one as wished, which is returned.
+    fn changed(mut self, wish: &Wish, list: &mut Vec<u8>) -> Self {
+        let surplus = (self.modifier - wish.modifier) & wish.matters;
+        for (modifier, _, off) in MODIFIERS {
+            if surplus.contains(modifier) && self.modifier.contains(modifier) {
+                push_parameter(off, list);
+                // One parameter may turn two off.
+                for (other, _, other_off) in MODIFIERS {
+                    self.modifier.set(other, self.modifier.contains(other) && other_off != off);
+                }
+            }
+        }
+        let missing = (wish.modifier & wish.matters) - self.modifier;
+        for (modifier, on, _) in MODIFIERS {
+            if missing.contains(modifier) {
+                push_parameter(on, list);
+            }
+        }
+        self.modifier |= missing;
+        for (own, wished, layer) in
+            [(&mut self.fg, wish.fg, Layer::Foreground), (&mut self.bg, wish.bg, Layer::Background)]
+        {
+            if let Some(shade) = wished.filter(|shade| shade != own) {
+                separate(list);
+                shade.push(layer, list);
+                *own = shade;
+            }
+        }
+        self
+    }
+}
+
+fn push_parameter(number: u16, list: &mut Vec<u8>) {
+    separate(list);
+    push_number(number, list);
+}
+
+fn separate(list: &mut Vec<u8>) {
+    if !list.is_empty() {
+        list.push(b';');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn turned(from: Pen, to: Pen) -> String {
+        let (mut pen, mut out) = (from, Vec::new());
+        pen.turn(&to.exactly(), &mut out);
+        assert_eq!(pen, to);
+        String::from_utf8(out).expect("ASCII")
+    }
+
+    #[test]
+    fn what_stays_is_not_sent() {
+        let bold = Pen { modifier: Modifier::BOLD, ..Pen::RESET };
+        let red = Pen { fg: Shade::Palette(1), ..bold };
+        assert_eq!(turned(red, red), "");
+        assert_eq!(turned(Pen::RESET, red), "\x1b[1;31m");
+        assert_eq!(turned(red, bold), "\x1b[39m");
+        assert_eq!(turned(red, Pen::RESET), "\x1b[0m");
+        let dim = Pen { modifier: Modifier::DIM, ..red };
+        assert_eq!(turned(red, dim), "\x1b[22;2m");
+        let colours = Pen { fg: Shade::Rgb([1, 2, 3]), bg: Shade::Rgb([4, 5, 6]), ..Pen::RESET };
+        assert_eq!(turned(red, colours), "\x1b[0;38;2;1;2;3;48;2;4;5;6m");
+    }
+
+    fn pen() -> impl Strategy<Value = Pen> {
+        let shade = |own| {
+            prop_oneof![
+                Just(own),
+                any::<u8>().prop_map(Shade::Palette),
+                any::<[u8; 3]>().prop_map(Shade::Rgb)
+            ]
+        };
+        (shade(Shade::Ink), shade(Shade::Ground), any::<u16>()).prop_map(|(fg, bg, bits)| Pen {
+            fg,
+            bg,
+            // Some terminals cannot have both.
+            modifier: Modifier::from_bits_truncate(if bits & 3 == 3 { bits & !1 } else { bits }),
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn a_terminal_ends_at_the_pen_wished_for(pens in proptest::collection::vec(pen(), 1..8)) {
+            let side = |length| std::num::NonZero::new(length).expect("not zero");
+            let mut parser = vt100::Parser::new(side(1), side(80), 0);
+            let mut current = Pen::RESET;
+            for pen in pens {
+                let mut out = Vec::new();
+                current.turn(&pen.exactly(), &mut out);
+                parser.process(&out);
+                let screen = parser.screen();
+                let modifiers = [
+                    (Modifier::BOLD, screen.bold()),
+                    (Modifier::DIM, screen.dim()),
+                    (Modifier::ITALIC, screen.italic()),
+                    (Modifier::UNDERLINED, screen.underline()),
+                    (Modifier::REVERSED, screen.inverse()),
+                ];
+                for (modifier, is_on) in modifiers {
+                    prop_assert_eq!(pen.modifier.contains(modifier), is_on, "{:?} {:?}", modifier, pen);
+                }
+                let shade = |color, own| match color {
+                    vt100::Color::Default => own,
+                    vt100::Color::Idx(index) => Shade::Palette(index),
+                    vt100::Color::Rgb(r, g, b) => Shade::Rgb([r, g, b]),
+                };
+                prop_assert_eq!(shade(screen.fgcolor(), Shade::Ink), pen.fg);
+                prop_assert_eq!(shade(screen.bgcolor(), Shade::Ground), pen.bg);
+            }
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! A terminal that is fed with the slices shows what was aimed at.
+
+use proptest::prelude::*;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Modifier};
+
+use super::*;
+use crate::tui::paint::shade::Shade;
+
+/// A terminal with a painter in front of it.
+struct Desk {
+    painter: Painter,
+    terminal: vt100::Parser,
+    sent: usize,
+}
+
+impl Desk {
+    fn new(columns: u16, rows: u16, depth: ColorDepth) -> Self {
+        let side = |length| std::num::NonZero::new(length).expect("not zero");
+        let terminal = vt100::Parser::new(side(rows), side(columns), 0);
+        Self { painter: Painter::new(depth), terminal, sent: 0 }
+    }
+
+    /// Sends one slice; whether there was one.
+    fn slice(&mut self, most_bytes: usize) -> bool {
+        let bytes = self.painter.slice(most_bytes);
+        // One cell: a move, a pen with all its modifiers, a symbol.
+        assert!(bytes.len() <= most_bytes.max(96), "{} for {most_bytes}", bytes.len());
+        self.terminal.process(&bytes);
+        self.sent += bytes.len();
+        !bytes.is_empty()
+    }
+
+    /// Sends everything; how many bytes that was.
+    fn finish(&mut self, most_bytes: usize) -> usize {
+        let before = self.sent;
+        while self.slice(most_bytes) {}
+        self.sent - before
+    }
+
+    /// The largest difference of a channel between the screen and a buffer; panics where more than colours of
+    /// the picture differs.
+    fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
+        let mut largest = 0;
+        let looks = looks(wanted, depth);
+        for (i, look) in looks.iter().enumerate() {
+            let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
+            let cell = self.terminal.screen().cell(y, x).expect("a cell");
+            match (look, shown(cell)) {
+                (Look::Halves(a), Look::Halves(b)) => {
+                    for (a, b) in a.iter().zip(b) {
+                        largest =
+                            largest.max(distance(*a, b).unwrap_or_else(|| panic!("{x},{y}: {a:?} {b:?}")));
+                    }
+                }
+                (a, b) => assert_eq!(a, &b, "{x},{y}"),
+            }
+        }
+        largest
+    }
+}
+
+/// None: they cannot be compared.
+fn distance(a: Shade, b: Shade) -> Option<u32> {
+    if a == b {
+        return Some(0);
+    }
+    let (a, b) = (a.rgb()?, b.rgb()?);
+    a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b))).max()
+}
+
+/// What a terminal's cell looks like. Its parser knows fewer modifiers.
+fn shown(cell: &vt100::Cell) -> Look {
+    if cell.is_wide_continuation() {
+        return Look::Covered;
+    }
+    let mut as_buffer = ratatui::buffer::Cell::default();
+    let color = |color| match color {
+        vt100::Color::Default => Color::Reset,
+        vt100::Color::Idx(index) => Color::Indexed(index),
+        vt100::Color::Rgb(r, g, b) => Color::Rgb(r, g, b),
+    };
+    as_buffer.set_symbol(if cell.has_contents() { cell.contents() } else { " " });
+    as_buffer.set_fg(color(cell.fgcolor())).set_bg(color(cell.bgcolor()));
+    for (modifier, is_on) in [
+        (Modifier::BOLD, cell.bold()),
+        (Modifier::DIM, cell.dim()),
+        (Modifier::ITALIC, cell.italic()),
+        (Modifier::UNDERLINED, cell.underline()),
+        (Modifier::REVERSED, cell.inverse()),
+    ] {
+        as_buffer.modifier.set(modifier, is_on);
+    }
+    Look::of(&as_buffer, ColorDepth::TrueColor)
+}
+
+const COLUMNS: u16 = 24;
+const ROWS: u16 = 8;
+const PICTURE: Rect = Rect { x: 3, y: 1, width: 17, height: 6 };
+
+/// One cell: a symbol, colours, modifiers.
+#[derive(Clone, Debug)]
+struct Ink {
+    symbol: &'static str,
+    fg: Color,
+    bg: Color,
+    modifier: Modifier,
+}
+
+fn color() -> impl Strategy<Value = Color> {
+    prop_oneof![
+        Just(Color::Reset),
+        Just(Color::Red),
+        Just(Color::White),
+        (0..=255_u8).prop_map(Color::Indexed),
+        any::<[u8; 3]>().prop_map(|[r, g, b]| Color::Rgb(r, g, b)),
+        // Few colours close to each other.
+        (0..3_u8, 0..3_u8).prop_map(|(r, g)| Color::Rgb(98 + r, 8 + g, 250)),
+    ]
+}
+
+fn ink() -> impl Strategy<Value = Ink> {
+    let symbol = prop_oneof![
+        4 => Just("▀"),
+        2 => Just(" "),
+        1 => proptest::sample::select(vec!["▄", "█", "a", "B", "…", "━", "日", "한", "e\u{301}", "", "\t"]),
+    ];
+    let modifier = prop_oneof![
+        5 => Just(Modifier::empty()),
+        1 => proptest::sample::select(vec![
+            Modifier::BOLD,
+            Modifier::DIM,
+            Modifier::UNDERLINED | Modifier::ITALIC,
+            Modifier::REVERSED | Modifier::BOLD,
+        ]),
+    ];
+    (symbol, color(), color(), modifier).prop_map(|(symbol, fg, bg, modifier)| Ink {
+        symbol,
+        fg,
+        bg,
+        modifier,
+    })
+}
+
+fn buffer() -> impl Strategy<Value = Buffer> {
+    let cells = usize::from(COLUMNS) * usize::from(ROWS);
+    // Cells of few kinds, so that neighbours are often the same.
+    (proptest::collection::vec(ink(), 1..12), proptest::collection::vec(any::<u8>(), cells)).prop_map(
+        |(inks, choice)| {
+            let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
+            for (cell, choice) in buffer.content.iter_mut().zip(choice) {
+                let ink = &inks[usize::from(choice) % inks.len()];
+                cell.set_symbol(ink.symbol).set_fg(ink.fg).set_bg(ink.bg);
+                cell.modifier = ink.modifier;
+            }
+            buffer
+        },
+    )
+}
+
+fn depth() -> impl Strategy<Value = ColorDepth> {
+    proptest::sample::select(vec![
+        ColorDepth::TrueColor,
+        ColorDepth::Indexed256,
+        ColorDepth::Ansi16,
+        ColorDepth::None,
+    ])
+}
+
+fn fidelity() -> impl Strategy<Value = Fidelity> {
+    proptest::sample::select(vec![Fidelity::First, Fidelity::Moving, Fidelity::Still])
+}
+
+/// Something that happens to a painter.
+#[derive(Clone, Debug)]
+enum Step {
+    Aim(Buffer, Fidelity),
+    Slice(usize),
+    Forget,
+    /// Somebody else writes on the screen; the painter is told.
+    Litter,
+}
+
+fn step() -> impl Strategy<Value = Step> {
+    prop_oneof![
+        3 => (buffer(), fidelity()).prop_map(|(buffer, fidelity)| Step::Aim(buffer, fidelity)),
+        4 => (0..600_usize).prop_map(Step::Slice),
+        1 => Just(Step::Forget),
+        1 => Just(Step::Litter),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn a_still_picture_is_shown_exactly_whatever_was_before(
+        steps in proptest::collection::vec(step(), 0..12),
+        last in buffer(),
+        most_bytes in 1..400_usize,
+        depth in depth(),
+    ) {
+        let mut desk = Desk::new(COLUMNS, ROWS, depth);
+        for step in steps {
+            match step {
+                Step::Aim(buffer, fidelity) => desk.painter.aim(&buffer, PICTURE, fidelity),
+                Step::Slice(most_bytes) => {
+                    desk.slice(most_bytes);
+                }
+                Step::Forget => desk.painter.forget(),
+                Step::Litter => {
+                    desk.terminal.process(b"\x1b[7;31;44mshell$ \x1b[5;5Hx\n\n\n\n\n\n\n");
+                    desk.painter.forget();
+                }
+            }
+        }
+        desk.painter.aim(&last, PICTURE, Fidelity::Still);
+        desk.finish(most_bytes);
+        let largest = desk.difference(&last, depth);
+        prop_assert!(largest <= 1, "{largest}");
+        desk.painter.aim(&last, PICTURE, Fidelity::Still);
+        prop_assert_eq!(desk.finish(most_bytes), 0, "nothing is sent for what is shown");
+    }
+
+    #[test]
+    fn words_are_exact_at_every_fidelity(buffers in proptest::collection::vec((buffer(), fidelity()), 1..5), depth in depth()) {
+        let mut desk = Desk::new(COLUMNS, ROWS, depth);
+        for (buffer, fidelity) in buffers {
+            desk.painter.aim(&buffer, Rect::ZERO, fidelity);
+            desk.finish(100);
+            prop_assert_eq!(desk.difference(&buffer, depth), 0);
+        }
+    }
+}
+
+#[test]
+fn another_size_is_a_new_screen() {
+    let mut desk = Desk::new(COLUMNS, ROWS, ColorDepth::TrueColor);
+    for (columns, rows) in [(COLUMNS, ROWS), (10, 3), (24, 6), (1, 1)] {
+        let area = Rect::new(0, 0, columns, rows);
+        let mut buffer = Buffer::empty(area);
+        buffer.set_string(0, 0, "words", ratatui::style::Style::new());
+        desk.painter.aim(&buffer, area, Fidelity::Still);
+        desk.finish(1000);
+        assert_eq!(desk.difference(&buffer, ColorDepth::TrueColor), 0);
+    }
+}
+
+#[test]
+fn words_come_before_the_picture_and_the_picture_from_its_middle() {
+    let area = Rect::new(0, 0, 30, 9);
+    let mut buffer = Buffer::empty(area);
+    let picture = Rect::new(2, 1, 20, 7);
+    for y in picture.top()..picture.bottom() {
+        for x in picture.left()..picture.right() {
+            buffer[(x, y)]
+                .set_symbol("▀")
+                .set_fg(Color::Rgb(x as u8 * 9, 200, 9))
+                .set_bg(Color::Rgb(9, y as u8, 80));
+        }
+    }
+    buffer.set_string(0, 8, "words", ratatui::style::Style::new());
+    buffer.set_string(5, 3, "over_it", ratatui::style::Style::reset());
+    let mut desk = Desk::new(30, 9, ColorDepth::TrueColor);
+    desk.painter.aim(&buffer, picture, Fidelity::Still);
+    desk.slice(100);
+    let row = |desk: &Desk, y: u16| desk.terminal.screen().rows(0, 30).nth(usize::from(y)).expect("a row");
+    assert_eq!((row(&desk, 8), row(&desk, 3)), ("words".to_owned(), "     over_it".to_owned()));
+    let mut order = Vec::new();
+    while desk.slice(100) {
+        let is_drawn = |y: &u16| row(&desk, *y).ends_with('▀');
+        let new: Vec<u16> = (1..8).filter(is_drawn).filter(|y| !order.contains(y)).collect();
+        order.extend(new);
+    }
+    assert_eq!(order, [4, 5, 3, 6, 2, 7, 1]);
+}
+
+#[test]
+fn a_painter_that_was_not_aimed_says_nothing() {
+    let mut painter = Painter::new(ColorDepth::TrueColor);
+    assert_eq!(painter.slice(1000), b"");
+    painter.forget();
+    assert_eq!(painter.slice(1000), b"");
+}

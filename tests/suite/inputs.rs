@@ -1,0 +1,297 @@
+//! No file that a picture is made of is ever written over, whatever name leads to it.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+
+use super::desk::{Desk, SCENE};
+
+/// A picture that glimt did not write: a red texel.
+const PHOTOGRAPH: &[u8] = b"P6\n1 1\n255\n\xff\x20\x20";
+
+/// More than is ever rendered: a refusal that comes after the work is noticed.
+const ENDLESS: &str = "--once --samples 4000000000 --time 2";
+
+/// A ball with a texture, a mesh with a material file and its pictures, an orbiter camera, and a texture that no
+/// material uses.
+fn studio() -> Desk {
+    let desk = Desk::new();
+    fs::create_dir(desk.path("deep")).expect("a folder");
+    let camera = "orbiter = \"camera.txt\"\n";
+    let scene = SCENE
+        .replace("position = [0, 1, 4]\nlook_at = [0, 1, 0]\n", camera)
+        .replace("[materials.ball]", &format!("{}\n[materials.ball]", TEXTURES))
+        .replace("[0.8, 0.2, 0.1]", "{ texture = \"skin\" }");
+    desk.write("scene.toml", format!("{scene}\n[[mesh]]\nfile = \"deep/one.obj\"\n"));
+    for name in ["skin.ppm", "unused.ppm", "deep/wood.ppm", "deep/bumps.ppm", "deep/alpha.ppm"] {
+        desk.write(name, PHOTOGRAPH);
+    }
+    desk.write("camera.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 1\nf 40 4 3\n");
+    desk.write(
+        "deep/one.obj",
+        "mtllib one.mtl materials.json gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n",
+    );
+    desk.write("deep/materials.json", "newmtl other\n");
+    desk.write("deep/one.mtl", "newmtl m\nmap_Kd wood.ppm\nnorm bumps.ppm\nmap_d alpha.ppm\n");
+    desk
+}
+
+const TEXTURES: &str = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.unused]\nfile = \"unused.ppm\"\n";
+
+/// Every file below the desk with what it holds, links apart.
+fn everything(desk: &Desk) -> Vec<(std::path::PathBuf, Vec<u8>)> {
+    let mut folders = vec![desk.0.path().to_owned()];
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let entry = entry.expect("an entry");
+            let kind = entry.file_type().expect("a kind");
+            if kind.is_dir() {
+                folders.push(entry.path());
+            } else if kind.is_file() {
+                found.push((entry.path(), fs::read(entry.path()).expect("a file")));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Runs it; exit code 2, these words are said, nothing is rendered, and every file is as it was. Gives what is said.
+#[track_caller]
+fn refused(desk: &Desk, line: &str, words: &[&str]) -> String {
+    let before = everything(desk);
+    let stderr = desk.expect(line, 2);
+    for word in words {
+        assert!(stderr.contains(word), "{line}: {word}: {stderr}");
+    }
+    assert!(!stderr.lines().any(|line| line.starts_with("render")), "{line}: {stderr}");
+    assert!(everything(desk) == before, "{line}: a file was changed: {stderr}");
+    stderr
+}
+
+#[test]
+fn the_default_output_is_no_input() {
+    let desk = Desk::new();
+    let texture = "[textures.marble]\nfile = \"marble.png\"\n\n[materials.ball]";
+    let scene =
+        SCENE.replace("[materials.ball]", texture).replace("[0.8, 0.2, 0.1]", "{ texture = \"marble\" }");
+    desk.write("marble.toml", scene);
+    // Made by glimt: what the default output may replace, were it no input.
+    desk.expect("ball.toml --once -o marble.png", 0);
+    let stderr = refused(&desk, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
+    assert!(stderr.contains("marble.toml:11:8") && stderr.contains("`output = "), "{stderr}");
+    desk.expect("marble.toml --once -o other.png", 0);
+}
+
+#[test]
+fn a_scene_by_the_name_of_its_picture_stays() {
+    let desk = Desk::new();
+    desk.write("scene.png", SCENE);
+    refused(&desk, &format!("scene.png {ENDLESS}"), &["scene.png", "the scene file", "-o"]);
+    symlink("ball.toml", desk.path("ln.png")).expect("a link");
+    refused(&desk, &format!("ball.toml {ENDLESS} -o ln.png"), &["ln.png", "ball.toml", "-o"]);
+    fs::hard_link(desk.path("ball.toml"), desk.path("hard.png")).expect("a link");
+    refused(&desk, &format!("ball.toml {ENDLESS} -o hard.png"), &["hard.png", "ball.toml"]);
+}
+
+#[test]
+fn no_name_of_an_input_is_an_output() {
+    let desk = studio();
+    let skin = desk.path("skin.ppm");
+    symlink("skin.ppm", desk.path("link.ppm")).expect("a link");
+    symlink("link.ppm", desk.path("second.ppm")).expect("a link");
+    symlink(&skin, desk.path("deep/absolute.ppm")).expect("a link");
+    fs::hard_link(&skin, desk.path("hard.ppm")).expect("a link");
+    symlink("deep", desk.path("elsewhere")).expect("a link");
+    for output in [
+        "skin.ppm",
+        "./skin.ppm",
+        "deep/../skin.ppm",
+        "elsewhere/../skin.ppm",
+        "link.ppm",
+        "second.ppm",
+        "deep/absolute.ppm",
+        "hard.ppm",
+        skin.to_str().expect("UTF-8"),
+    ] {
+        refused(&desk, &format!("scene.toml {ENDLESS} -o {output}"), &[output, "skin.ppm", "texture `skin`"]);
+        refused(&desk, &format!("scene.toml {ENDLESS} -o good.png -o {output}"), &[output]);
+    }
+    // A folder by another name; `..` behind a link is where the link leads, and there is no skin.ppm.
+    refused(
+        &desk,
+        &format!("scene.toml {ENDLESS} -o elsewhere/wood.ppm"),
+        &["elsewhere/wood.ppm", "deep/wood.ppm"],
+    );
+    fs::create_dir_all(desk.path("far/away")).expect("folders");
+    symlink("far/away", desk.path("near")).expect("a link");
+    desk.expect("scene.toml --once -o near/../skin.ppm", 0);
+    assert!(desk.bytes("far/skin.ppm").starts_with(b"P6\n# Software: glimt"));
+    assert_eq!(desk.bytes("skin.ppm"), PHOTOGRAPH);
+}
+
+#[test]
+fn every_kind_of_input_stays() {
+    let desk = studio();
+    for (output, role) in [
+        ("skin.ppm", "texture `skin`"),
+        ("unused.ppm", "texture `unused`"),
+        ("deep/wood.ppm", "one.obj"),
+        ("deep/bumps.ppm", "one.obj"),
+        // Named by the material file, though nothing looks it up.
+        ("deep/alpha.ppm", "one.obj"),
+    ] {
+        let stderr = refused(&desk, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
+        assert!(stderr.contains("--> scene.toml:"), "{output}: where the scene names it: {stderr}");
+    }
+    for (report, role) in [
+        ("scene.toml", "the scene file"),
+        ("camera.txt", "orbiter"),
+        ("deep/one.obj", "mesh"),
+        ("deep/materials.json", "one.obj"),
+        // Seen to be no report before the mesh is read.
+        ("deep/one.mtl", "no report"),
+        ("deep/wood.ppm", "no report"),
+        // Not there yet, and read as soon as it is.
+        ("deep/gone.mtl", "one.obj"),
+    ] {
+        refused(&desk, &format!("scene.toml {ENDLESS} --report {report}"), &[report, role, "--report"]);
+        refused(&desk, &format!("scene.toml {ENDLESS} --report deep/../{report}"), &[report, role]);
+    }
+    // Materials of the file that the scene replaces: still its pictures.
+    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
+    desk.write("scene.toml", text.replace("one.obj\"", "one.obj\"\nmaterial = \"ball\""));
+    refused(&desk, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
+}
+
+#[test]
+fn an_output_that_the_scene_names_is_compared_too() {
+    let desk = studio();
+    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
+    desk.write("scene.toml", text.replace("[render]", "[render]\noutput = \"deep/../skin.ppm\""));
+    let words = ["deep/../skin.ppm", "texture `skin`", "--> scene.toml:", "`output`"];
+    refused(&desk, &format!("scene.toml {ENDLESS}"), &words);
+    let output = desk.run("check scene.toml");
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    desk.expect("scene.toml --once -o other.png", 0);
+}
+
+#[test]
+fn outputs_and_the_report_are_files_of_their_own() {
+    let desk = Desk::new();
+    fs::create_dir_all(desk.path("o/p")).expect("folders");
+    symlink("o", desk.path("q")).expect("a link");
+    symlink("p/new.png", desk.path("o/dangling.png")).expect("a link");
+    desk.write("there.png", PHOTOGRAPH);
+    fs::hard_link(desk.path("there.png"), desk.path("hard.png")).expect("a link");
+    for line in [
+        "-o a.png -o ./a.png",
+        "-o a.png -o o/../a.png",
+        "-o o/a.png -o q/a.png",
+        "-o o/p/new.png -o o/dangling.png",
+        "-o b.png -o o/dangling.png -o q/p/new.png",
+        "-o there.png -o hard.png",
+        "-o a.png --report a.png",
+        "-o a.png --report o/../a.png",
+        "--report ball.png",
+        "--report q/../ball.png",
+        "-o o/p/new.png --report o/dangling.png",
+    ] {
+        let names = line.split_whitespace().filter(|word| !word.starts_with('-'));
+        let names: Vec<&str> = names.skip_while(|name| *name == "b.png").collect();
+        let stderr = refused(&desk, &format!("ball.toml {ENDLESS} {line}"), &names);
+        assert!(stderr.contains("one file") || stderr.contains("is given twice"), "{line}: {stderr}");
+    }
+    desk.expect("ball.toml --once -o o/a.png -o a.png --report o/p/a.png.json", 0);
+}
+
+#[test]
+fn by_default_only_a_picture_of_glimt_is_replaced() {
+    let desk = Desk::new();
+    desk.expect("ball.toml --once", 0);
+    let own = desk.bytes("ball.png");
+    desk.expect("ball.toml --once --seed 3", 0);
+    assert_ne!(desk.bytes("ball.png"), own, "its own picture is replaced");
+    let ways = ["ball.png", "-o", "`output = "];
+    let truncated = &own[..20];
+    let mut other = own.clone();
+    let at = other.windows(6).position(|window| window == b"glimt ").expect("its name");
+    other[at] = b'G';
+    for foreign in [PHOTOGRAPH, b"", b"\x89PNG\r\n\x1a\n", truncated, SCENE.as_bytes(), &other] {
+        desk.write("ball.png", foreign);
+        refused(&desk, &format!("ball.toml {ENDLESS}"), &ways);
+    }
+    // As any encoder writes it, without glimt's text.
+    image::RgbImage::new(3, 2).save(desk.path("ball.png")).expect("a photograph");
+    refused(&desk, &format!("ball.toml {ENDLESS}"), &ways);
+    desk.write("photo.png", desk.bytes("ball.png"));
+    fs::remove_file(desk.path("ball.png")).expect("removed");
+    symlink("photo.png", desk.path("ball.png")).expect("a link");
+    refused(&desk, &format!("ball.toml {ENDLESS}"), &ways);
+    // Whoever names it means it.
+    desk.expect("ball.toml --once -o ball.png", 0);
+    assert_eq!(desk.bytes("photo.png").len(), own.len());
+    desk.expect("ball.toml --once", 0);
+    fs::remove_file(desk.path("photo.png")).expect("removed");
+    desk.expect("ball.toml --once", 0);
+    assert_eq!(desk.bytes("photo.png"), own, "a link to a file that is not there yet");
+    let scene = SCENE.replace("[render]", "[render]\noutput = \"own.png\"");
+    desk.write("ball.toml", scene);
+    desk.write("own.png", PHOTOGRAPH);
+    desk.expect("ball.toml --once", 0);
+    assert!(desk.bytes("own.png").starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn a_report_replaces_json_and_nothing_else() {
+    let desk = Desk::new();
+    let report = |name: &str| desk.expect(&format!("ball.toml --once --report {name}"), 0);
+    for name in ["new", "new", "new.txt", "new.txt", "r.json"] {
+        report(name);
+    }
+    desk.write("r.json", "[1, 2]");
+    report("r.json");
+    desk.write("empty", "");
+    report("empty");
+    for (name, content) in [("m.obj", b"v 0 0 0\n".as_slice()), ("notes", b"glimt"), ("x.ppm", PHOTOGRAPH)] {
+        desk.write(name, content);
+        refused(&desk, &format!("ball.toml {ENDLESS} --report {name}"), &[name, ".json"]);
+    }
+    // A stream is appended to.
+    desk.write("log", "before\n");
+    let log = fs::OpenOptions::new().append(true).open(desk.path("log")).expect("a file");
+    let status = desk.glimt("ball.toml --once --report /dev/stdout").stdout(log).status().expect("it runs");
+    assert!(status.success() && desk.bytes("log").starts_with(b"before\n{"));
+    let scene = fs::OpenOptions::new().append(true).open(desk.path("ball.toml")).expect("a file");
+    let status = desk.glimt("ball.toml --once --report /dev/stdout").stdout(scene).status().expect("it runs");
+    assert_eq!((status.code(), desk.bytes("ball.toml")), (Some(2), SCENE.into()));
+}
+
+#[test]
+fn an_input_by_the_name_of_a_temporary_file_stays() {
+    let desk = studio();
+    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
+    let (scene, camera, stale) = (".s.glimt-1-2.tmp", ".c.glimt-999999-0.tmp", ".a.glimt-999999-1.tmp");
+    desk.write(scene, text.replace("camera.txt", camera));
+    desk.write(camera, desk.bytes("camera.txt"));
+    desk.write(stale, "left behind");
+    desk.expect(&format!("{scene} --once -o a.png --report r.json"), 0);
+    assert!(desk.path(scene).exists() && desk.path(camera).exists());
+    assert!(!desk.path(stale).exists(), "others are removed");
+}
+
+#[test]
+fn new_takes_the_place_of_nothing() {
+    let desk = Desk::new();
+    symlink("nowhere.toml", desk.path("dangling.toml")).expect("a link");
+    symlink("ball.toml", desk.path("link.toml")).expect("a link");
+    fs::create_dir(desk.path("folder.toml")).expect("a folder");
+    for name in ["dangling.toml", "link.toml", "folder.toml", "deep/../ball.toml", "ball.toml"] {
+        fs::create_dir_all(desk.path("deep")).expect("a folder");
+        refused(&desk, &format!("new {name}"), &[name, "left as it is"]);
+    }
+    assert!(!desk.path("nowhere.toml").exists());
+    assert!(fs::symlink_metadata(desk.path("dangling.toml")).expect("a link").is_symlink());
+    let stderr = desk.expect("new dangling.toml", 2);
+    assert!(stderr.contains("symbolic link"), "{stderr}");
+}

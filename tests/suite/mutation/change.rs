@@ -1,0 +1,317 @@
+//! Ways to change a file.
+
+use std::ops::Range;
+
+use super::random::Random;
+
+/// Longest result: longer ones only take longer.
+const MOST_BYTES: usize = 1 << 20;
+
+/// Words that programs stumble over.
+const WORDS: &[&str] = &[
+    "0",
+    "-1",
+    "1",
+    "nan",
+    "inf",
+    "-inf",
+    "-0.0",
+    "1e999",
+    "-1e999",
+    "1e-999",
+    "1e38",
+    "3.5e38",
+    "1e20",
+    "1e308",
+    "-1e308",
+    "2147483647",
+    "2147483648",
+    "-2147483648",
+    "4294967295",
+    "4294967296",
+    "9223372036854775807",
+    "9223372036854775808",
+    "18446744073709551615",
+    "99999999999999999999999999",
+    "1_000",
+    "0x7fffffff",
+    "0b1",
+    "1.0.0",
+    "1e",
+    "+",
+    "-",
+    ".",
+    "''",
+    "\"\"",
+    "\"",
+    "'''",
+    "\"\"\"",
+    "#",
+    "\\",
+    "/",
+    "//",
+    "1//1",
+    "1/1/1",
+    "-1/-1/-1",
+    "0/0/0",
+    "[",
+    "]",
+    "[[",
+    "]]",
+    "{",
+    "}",
+    "[]",
+    "{}",
+    "[[]]",
+    "=",
+    ",",
+    "\n",
+    "\r",
+    "\t",
+    "true",
+    "false",
+    "1979-05-27T07:32:00Z",
+    "\u{feff}",
+    "\u{202e}",
+    "\u{1b}[2J",
+    "\u{0}",
+    "../../..",
+    "/",
+    "/dev/zero",
+    "/dev/tty",
+    ".",
+    "case.obj",
+    "f",
+    "v",
+    "vt",
+    "vn",
+    "usemtl",
+    "mtllib case.mtl",
+    "mtllib case.obj",
+    "element",
+    "property list uchar int",
+    "end_header",
+    "OFF",
+    "STCN4OFF",
+    "BINARY",
+];
+
+/// Numbers that stand at the edges of their types.
+const EDGES: &[u64] = &[
+    0,
+    1,
+    0x7f,
+    0x80,
+    0xff,
+    0x100,
+    0x7fff,
+    0x8000,
+    0xffff,
+    0x10000,
+    0x7fff_ffff,
+    0x8000_0000,
+    0xffff_ffff,
+    0x1_0000_0000,
+    0x7fff_ffff_ffff_ffff,
+    0xffff_ffff_ffff_ffff,
+];
+
+/// One to five changes, one after another.
+pub(super) fn changed(bytes: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for _ in 0..=random.below(5) {
+        change(&mut bytes, other, random);
+        bytes.truncate(MOST_BYTES);
+    }
+    bytes
+}
+
+type Change = fn(&mut Vec<u8>, &[u8], &mut Random);
+
+const CHANGES: &[Change] = &[
+    flip_bits,
+    set_bytes,
+    set_number,
+    cut,
+    delete_line,
+    repeat_line,
+    swap_lines,
+    swap_words,
+    replace_word,
+    replace_word,
+    grow_number,
+    insert_word,
+    insert_bytes,
+    nest,
+    repeat_part,
+    delete_part,
+    splice,
+];
+
+fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
+    if bytes.is_empty() {
+        bytes.extend_from_slice(other);
+    }
+    if !bytes.is_empty() {
+        random.pick(CHANGES)(bytes, other, random);
+    }
+}
+
+/// A place, more often near the start, where headers are.
+fn place(bytes: &[u8], random: &mut Random) -> usize {
+    let within = if random.below(2) == 0 { bytes.len().min(256) } else { bytes.len() };
+    random.below(within)
+}
+
+fn flip_bits(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    for _ in 0..=random.below(8) {
+        let at = place(bytes, random);
+        bytes[at] ^= 1 << random.below(8);
+    }
+}
+
+fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    for _ in 0..=random.below(8) {
+        let at = place(bytes, random);
+        bytes[at] = random.next() as u8;
+    }
+}
+
+/// A number of 1, 2, 4 or 8 bytes in either order.
+fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let (at, length) = (place(bytes, random), 1 << random.below(4));
+    let number = *random.pick(EDGES);
+    let mut number = number.to_le_bytes()[..length].to_vec();
+    if random.below(2) == 0 {
+        number.reverse();
+    }
+    bytes.iter_mut().skip(at).zip(number).for_each(|(byte, new)| *byte = new);
+}
+
+fn cut(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    bytes.truncate(random.below(bytes.len()));
+}
+
+/// Pieces between bytes for which `is_gap` holds; at least one.
+fn pieces(bytes: &[u8], is_gap: fn(u8) -> bool) -> Vec<Range<usize>> {
+    let mut pieces = Vec::new();
+    let mut start = 0;
+    for (at, _) in bytes.iter().enumerate().filter(|(_, byte)| is_gap(**byte)) {
+        if at > start {
+            pieces.push(start..at);
+        }
+        start = at + 1;
+    }
+    if start < bytes.len() || pieces.is_empty() {
+        pieces.push(start.min(bytes.len())..bytes.len());
+    }
+    pieces
+}
+
+fn lines(bytes: &[u8]) -> Vec<Range<usize>> {
+    pieces(bytes, |byte| byte == b'\n')
+}
+
+fn words(bytes: &[u8]) -> Vec<Range<usize>> {
+    pieces(bytes, |byte| byte.is_ascii_whitespace() || b"[]{}=,\"/".contains(&byte))
+}
+
+fn delete_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let line = random.pick(&lines(bytes)).clone();
+    bytes.drain(line);
+}
+
+fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let line = random.pick(&lines(bytes)).clone();
+    let text = [b"\n", &bytes[line.clone()]].concat().repeat(1 << random.below(12));
+    bytes.splice(line.end..line.end, text);
+}
+
+fn swap_lines(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let lines = lines(bytes);
+    swap(bytes, random.pick(&lines).clone(), random.pick(&lines).clone());
+}
+
+fn swap_words(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let words = words(bytes);
+    swap(bytes, random.pick(&words).clone(), random.pick(&words).clone());
+}
+
+fn swap(bytes: &mut Vec<u8>, one: Range<usize>, other: Range<usize>) {
+    let (first, second) = if one.start <= other.start { (one, other) } else { (other, one) };
+    if first.end <= second.start {
+        let (before, behind) = (bytes[first.clone()].to_vec(), bytes[second.clone()].to_vec());
+        bytes.splice(second, before);
+        bytes.splice(first, behind);
+    }
+}
+
+fn replace_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let word = random.pick(&words(bytes)).clone();
+    bytes.splice(word, random.pick(WORDS).bytes());
+}
+
+/// More digits, or another sign, for a word that begins like a number.
+fn grow_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let mut numbers = words(bytes);
+    numbers.retain(|word| bytes.get(word.start).is_some_and(|byte| byte.is_ascii_digit() || *byte == b'-'));
+    if numbers.is_empty() {
+        return;
+    }
+    let number = random.pick(&numbers).clone();
+    match random.below(4) {
+        0 => bytes.insert(number.start, b'-'),
+        1 => drop(bytes.splice(number.end..number.end, "0".repeat(1 + random.below(40)).into_bytes())),
+        2 => drop(bytes.splice(number.end..number.end, format!("e{}", random.below(400)).into_bytes())),
+        _ => drop(bytes.splice(number.start..number.start, "9".repeat(1 + random.below(25)).into_bytes())),
+    }
+}
+
+fn insert_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let word = random.pick(&words(bytes)).clone();
+    let text = format!(" {} ", random.pick(WORDS));
+    bytes.splice(word.end..word.end, text.into_bytes());
+}
+
+/// Bytes that are no UTF-8, or no text at all.
+fn insert_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let at = place(bytes, random);
+    let new: Vec<u8> = (0..=random.below(16)).map(|_| random.next() as u8 | 0x80).collect();
+    bytes.splice(at..at, new);
+}
+
+fn nest(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let word = random.pick(&words(bytes)).clone();
+    let depth = 1 << random.below(18);
+    let (open, close) =
+        *random.pick(&[("[", "]"), ("{a=", "}"), ("[{a=", "}]"), ("a.", ""), ("[[", "]]"), ("(", ")")]);
+    let tail = if random.below(2) == 0 { close.repeat(depth) } else { String::new() };
+    bytes.splice(word.end..word.end, tail.into_bytes());
+    bytes.splice(word.start..word.start, open.repeat(depth).into_bytes());
+}
+
+fn part(bytes: &[u8], random: &mut Random) -> Range<usize> {
+    let start = place(bytes, random);
+    let most = 1 << random.below(12);
+    let length = 1 + random.below((bytes.len() - start).min(most));
+    start..start + length
+}
+
+fn repeat_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let part = part(bytes, random);
+    let text = bytes[part.clone()].repeat(1 << random.below(10));
+    bytes.splice(part.end..part.end, text);
+}
+
+fn delete_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
+    let part = part(bytes, random);
+    bytes.drain(part);
+}
+
+/// The start of one, the end of another.
+fn splice(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
+    bytes.truncate(random.below(bytes.len()) + 1);
+    if !other.is_empty() {
+        bytes.extend_from_slice(&other[random.below(other.len())..]);
+    }
+}

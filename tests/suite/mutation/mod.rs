@@ -1,0 +1,134 @@
+//! Scenes and assets that were changed at random, through `check`: no crash, no hang, exit codes 0 and 2 only, little
+//! memory, nothing on the screen that a terminal would act on.
+//!
+//! The short version runs with the suite. The long one, about ten minutes on two cores:
+//!
+//! ```text
+//! GLIMT_MUTATIONS=20000,5000,500 cargo test --profile quick --test suite mutation -- --nocapture
+//! ```
+//!
+//! The numbers: scenes and assets checked in worker processes by the library, and how many of each kind by the program
+//! itself. `GLIMT_MUTATION_SEED` (a whole number, 1 by default) chooses other ones. The same seed gives the same files; those that
+//! fail are kept in the folder that the message names.
+
+mod change;
+mod program;
+mod random;
+mod seeds;
+mod worker;
+
+use std::fmt;
+use std::fs;
+use std::path::PathBuf;
+
+use random::Random;
+use seeds::{Seed, assets, scenes};
+
+/// What is changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Scene,
+    Asset,
+}
+
+/// One file to be checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Case {
+    kind: Kind,
+    seed: u64,
+    number: u64,
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, seed, number } = self;
+        write!(f, "{kind:?} {number} of seed {seed}")
+    }
+}
+
+/// The seeds of all cases.
+struct Material {
+    scenes: Vec<Seed>,
+    assets: Vec<Seed>,
+}
+
+impl Material {
+    fn new() -> Self {
+        Self { scenes: scenes(), assets: assets() }
+    }
+
+    /// The changed file of a case, under the name of what it was made from.
+    fn make(&self, case: Case) -> Seed {
+        let seeds = match case.kind {
+            Kind::Scene => &self.scenes,
+            Kind::Asset => &self.assets,
+        };
+        let mut random = Random::new(case.seed ^ (case.kind as u64) << 32, case.number);
+        let seed = random.pick(seeds);
+        let other = random.pick(seeds);
+        Seed { bytes: change::changed(&seed.bytes, &other.bytes, &mut random), ..seed.clone() }
+    }
+}
+
+/// How many scenes, assets, and of each kind by the program.
+fn counts() -> [u64; 3] {
+    let asked = std::env::var("GLIMT_MUTATIONS").unwrap_or_else(|_| "250,250,15".to_owned());
+    let numbers: Vec<u64> =
+        asked.split(',').map(|number| number.trim().parse().expect("three numbers")).collect();
+    numbers.try_into().expect("GLIMT_MUTATIONS is three numbers: scenes,assets,program")
+}
+
+fn seed() -> u64 {
+    std::env::var("GLIMT_MUTATION_SEED").map_or(1, |seed| seed.parse().expect("a whole number"))
+}
+
+/// Keep the files of cases that failed, and say where.
+fn settle(failures: &[(Case, String)]) {
+    if failures.is_empty() {
+        return;
+    }
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("mutation");
+    fs::create_dir_all(&folder).expect("a folder");
+    let material = Material::new();
+    let mut text = String::new();
+    for (case, reason) in failures {
+        let made = material.make(*case);
+        let path = folder.join(format!("{:?}-{}-{}-{}", case.kind, case.seed, case.number, made.file));
+        fs::write(&path, &made.bytes).expect("written");
+        text.push_str(&format!("{case}: {reason}\n    {}\n", path.display()));
+    }
+    panic!("{} failed:\n{text}", failures.len());
+}
+
+#[test]
+fn changed_scenes_are_checked_or_refused() {
+    settle(&worker::check_all(Kind::Scene, seed(), counts()[0]));
+}
+
+#[test]
+fn changed_assets_are_checked_or_refused() {
+    settle(&worker::check_all(Kind::Asset, seed(), counts()[1]));
+}
+
+#[test]
+fn the_program_ends_with_0_or_2() {
+    let [_, _, count] = counts();
+    settle(
+        &[program::check_all(Kind::Scene, seed(), count), program::check_all(Kind::Asset, seed(), count)]
+            .concat(),
+    );
+}
+
+#[test]
+fn the_same_seed_makes_the_same_files() {
+    let (one, other) = (Material::new(), Material::new());
+    let mut changed = 0;
+    for number in 0..100 {
+        for kind in [Kind::Scene, Kind::Asset] {
+            let case = Case { kind, seed: 3, number };
+            assert_eq!(one.make(case), other.make(case), "{case}");
+            changed += usize::from(one.make(case) != one.make(Case { seed: 4, ..case }));
+        }
+    }
+    assert!(changed > 190, "{changed}");
+}

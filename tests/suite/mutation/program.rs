@@ -1,0 +1,54 @@
+//! `glimt check` as it is called.
+
+use std::process::{Command, Output, Stdio};
+use std::sync::mpsc::channel;
+
+use assert_cmd::cargo::CommandCargoExt;
+
+use super::worker::{AT_MOST, Desk, TRIES, harmful};
+use super::{Case, Kind, Material};
+
+/// The cases of a kind that failed, with the reason.
+pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)> {
+    let desk = Desk::new();
+    let material = Material::new();
+    let cases = (0..count).map(|number| Case { kind, seed, number });
+    let check = |case: Case| {
+        let scene = desk.lay(case, &material.make(case));
+        let run = || run(Command::cargo_bin("glimt").expect("the program").arg("check").arg(&scene));
+        let Some(output) = (0..TRIES).find_map(|_| run()) else {
+            return Some((case, "it takes more than 2 s".to_owned()));
+        };
+        judge(&output).err().map(|reason| (case, reason))
+    };
+    cases.filter_map(check).collect()
+}
+
+/// None where it takes too long.
+fn run(command: &mut Command) -> Option<Output> {
+    let child =
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+    let process = nix::unistd::Pid::from_raw(child.id() as i32);
+    let (send, output) = channel();
+    let waiting = std::thread::spawn(move || send.send(child.wait_with_output()));
+    let output = output.recv_timeout(AT_MOST).ok().map(|output| output.expect("its output"));
+    if output.is_none() {
+        // It has not been waited for: the number is its own.
+        let _ = nix::sys::signal::kill(process, nix::sys::signal::Signal::SIGKILL);
+    }
+    let _ = waiting.join();
+    output
+}
+
+fn judge(output: &Output) -> Result<(), String> {
+    let code = output.status.code();
+    let stderr = String::from_utf8(output.stderr.clone()).map_err(|_| "stderr is no UTF-8".to_owned())?;
+    if code != Some(0) && code != Some(2) {
+        return Err(format!("{}: {stderr}", output.status));
+    }
+    if code == Some(2) && !stderr.contains("error") {
+        return Err(format!("refused without a reason: {stderr}"));
+    }
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr;
+    harmful(&said).map_or(Ok(()), |harmful| Err(format!("the message has {harmful:?}")))
+}

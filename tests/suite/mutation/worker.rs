@@ -1,0 +1,255 @@
+//! `check` by the library in processes of their own, so that a stack overflow, a hang and too much memory are seen.
+
+use std::io::{BufRead, BufReader, Write};
+use std::panic::{self, AssertUnwindSafe};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use glimt::pipeline::check;
+use glimt::pipeline::protocol::Failure;
+use glimt::scene::report::{Style, render};
+use nix::sys::resource::{Resource, UsageWho, getrusage, setrlimit};
+
+use super::seeds::{Seed, root};
+use super::{Case, Kind, Material};
+
+/// Longest time of a case.
+pub(super) const AT_MOST: Duration = Duration::from_secs(2);
+
+/// Longest wait for a case to be made; only a machine that stands still takes so long.
+const TO_BEGIN: Duration = Duration::from_secs(120);
+
+/// How often a case that takes longer is tried again, alone: the machine may be busy with other things.
+pub(super) const TRIES: usize = 3;
+
+/// Most memory that is really used, a worker's own included. The largest that a small file may claim and get is an
+/// image, whose pixels are allocated before the file turns out to be too short.
+const MEMORY_BYTES: u64 = 1 << 30;
+
+/// Most memory that may be asked for.
+const ADDRESS_BYTES: u64 = 16 << 30;
+
+/// Processes at work.
+const LANES: u64 = 2;
+
+/// Says to a process of this test that it is a worker, and which cases are its own.
+const ORDER: &str = "GLIMT_MUTATION_WORKER";
+
+/// The cases of a kind that failed, with the reason.
+pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)> {
+    let failures = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for lane in 0..LANES {
+            let failures = &failures;
+            scope.spawn(move || {
+                let numbers = count * lane / LANES..count * (lane + 1) / LANES;
+                let mut next = numbers.start;
+                while next < numbers.end {
+                    let first = Case { kind, seed, number: next };
+                    match follow(first, numbers.end) {
+                        Ok(()) => return,
+                        Err((case, reason)) => {
+                            let is_slow = reason == SLOW;
+                            if !is_slow || (1..TRIES).all(|_| follow(case, case.number + 1).is_err()) {
+                                eprintln!("{case}: {reason}");
+                                failures.lock().expect("no panic").push((case, reason));
+                            }
+                            next = case.number + 1;
+                        }
+                    }
+                }
+            });
+        }
+    });
+    failures.into_inner().expect("no panic")
+}
+
+/// What is said of a case that takes too long.
+const SLOW: &str = "it takes more than 2 s";
+
+/// Let a worker do the cases from this one up to a number; the error is the first that fails.
+fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
+    let Case { kind, seed, number } = first;
+    let mut worker = Command::new(std::env::current_exe().expect("this program"))
+        .args(["mutation::worker::worker", "--exact", "--nocapture"])
+        .env(ORDER, format!("{kind:?} {seed} {number} {end}"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("a worker");
+    let lines = lines_of(&mut worker);
+    let mut result = Ok(());
+    for number in number..end {
+        let case = Case { number, ..first };
+        if let Err(reason) = next_result(&lines) {
+            result = Err((case, reason));
+            break;
+        }
+    }
+    // It may have ended by itself.
+    let _ = worker.kill();
+    let status = worker.wait().expect("its end");
+    result.map_err(
+        |(case, reason)| if reason == GONE { (case, format!("{reason}: {status}")) } else { (case, reason) },
+    )
+}
+
+/// What is said of a worker that ended within a case.
+const GONE: &str = "the process ended";
+
+fn lines_of(worker: &mut Child) -> Receiver<String> {
+    let (send, lines) = channel();
+    let output = BufReader::new(worker.stdout.take().expect("its stdout"));
+    std::thread::spawn(move || {
+        for line in output.lines().map_while(Result::ok) {
+            // What the test harness says itself has no mark.
+            if let Some(line) = line.strip_prefix("@ ")
+                && send.send(line.to_owned()).is_err()
+            {
+                return;
+            }
+        }
+    });
+    lines
+}
+
+/// The worker makes a case in its own time; from then on the time counts.
+fn next_result(lines: &Receiver<String>) -> Result<(), String> {
+    let next = |at_most: Duration| match lines.recv_timeout(at_most) {
+        Ok(line) => Ok(line),
+        Err(RecvTimeoutError::Timeout) => Err(SLOW.to_owned()),
+        Err(RecvTimeoutError::Disconnected) => Err(GONE.to_owned()),
+    };
+    next(TO_BEGIN)?;
+    let said = next(AT_MOST)?;
+    if said == "right" { Ok(()) } else { Err(said) }
+}
+
+/// Does nothing where nobody ordered it.
+#[test]
+fn worker() {
+    let Ok(order) = std::env::var(ORDER) else { return };
+    let words: Vec<&str> = order.split(' ').collect();
+    let kind = if words[0] == "Scene" { Kind::Scene } else { Kind::Asset };
+    let [seed, from, to] = [1, 2, 3].map(|word| words[word].parse().expect("a number"));
+    setrlimit(Resource::RLIMIT_AS, ADDRESS_BYTES, ADDRESS_BYTES).expect("a limit");
+    let desk = Desk::new();
+    let material = Material::new();
+    listen_to_panics(&desk);
+    for number in from..to {
+        let case = Case { kind, seed, number };
+        let scene = desk.lay(case, &material.make(case));
+        say("begin");
+        let said = one(&scene).map_or_else(|reason| reason.replace('\n', " "), |()| "right".to_owned());
+        say(&said);
+    }
+}
+
+/// A line to who started this worker.
+fn say(text: &str) {
+    writeln!(std::io::stdout(), "\n@ {text}").expect("somebody listens");
+}
+
+/// The last panic, wherever it was caught.
+static PANIC: Mutex<Option<String>> = Mutex::new(None);
+
+/// The library silences panics that it contains, from its first work on; this hook hears them all.
+fn listen_to_panics(desk: &Desk) {
+    let _ = check(&desk.lay(
+        Case { kind: Kind::Asset, seed: 0, number: 0 },
+        &Seed { file: "case.obj".to_owned(), bytes: b"v".to_vec() },
+    ));
+    panic::set_hook(Box::new(|info| {
+        let place = info.location().map_or(String::new(), ToString::to_string);
+        *PANIC.lock().expect("no panic") = Some(format!("{info} at {place}"));
+    }));
+}
+
+fn one(scene: &Path) -> Result<(), String> {
+    let checked = panic::catch_unwind(AssertUnwindSafe(|| check(scene)));
+    if let Some(panic) = PANIC.lock().expect("no panic").take() {
+        // Decoders of others may panic: it is contained, and an error of the file.
+        let is_foreign = panic.contains("/.cargo/registry/") || panic.contains("/registry/src/");
+        if checked.is_err() || !is_foreign {
+            return Err(format!("a panic: {panic}"));
+        }
+    }
+    let diagnostics = match checked {
+        Ok(Ok(checked)) => checked.warnings,
+        Ok(Err(Failure::Scene(diagnostics))) if diagnostics.is_empty() => {
+            return Err("refused without a reason".to_owned());
+        }
+        Ok(Err(Failure::Scene(diagnostics))) => diagnostics,
+        Ok(Err(Failure::Work(message))) => return Err(format!("exit code 1: {message}")),
+        Err(_) => return Err("a panic without a message".to_owned()),
+    };
+    let text = render(&diagnostics, 60, Style::Plain);
+    if let Some(harmful) = harmful(&text) {
+        return Err(format!("the message has {harmful:?}"));
+    }
+    let used = getrusage(UsageWho::RUSAGE_SELF).map_or(0, |usage| usage.max_rss() as u64 * 1024);
+    if used > MEMORY_BYTES { Err(format!("it takes {} MiB of memory", used >> 20)) } else { Ok(()) }
+}
+
+/// A character that a terminal would act on.
+pub(super) fn harmful(text: &str) -> Option<char> {
+    text.chars().find(|c| (c.is_control() && *c != '\n') || ('\u{202a}'..='\u{202e}').contains(c))
+}
+
+const MTL: &str = "newmtl red\nKd 1 0 0\n";
+
+/// A folder with all that scenes may name.
+pub(super) struct Desk(tempfile::TempDir);
+
+impl Desk {
+    pub(super) fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scenes = folder.path().join("scenes");
+        std::fs::create_dir(&scenes).expect("a folder");
+        let link =
+            |from: &str, to: PathBuf| std::os::unix::fs::symlink(root().join(from), to).expect("a link");
+        link("assets", folder.path().join("assets"));
+        link("tests/broken/files", scenes.join("files"));
+        std::fs::copy(root().join("assets/textures/checker.png"), scenes.join("small.png")).expect("copied");
+        std::fs::write(scenes.join("case.mtl"), MTL).expect("written");
+        Self(folder)
+    }
+
+    /// Put the file of a case in its place; gives the scene to check.
+    pub(super) fn lay(&self, case: Case, made: &Seed) -> PathBuf {
+        let folder = self.0.path().join("scenes");
+        let scene = folder.join("case.toml");
+        std::fs::write(folder.join(&made.file), &made.bytes).expect("written");
+        if case.kind == Kind::Asset {
+            if made.file != "case.mtl" {
+                std::fs::write(folder.join("case.mtl"), MTL).expect("written");
+            }
+            std::fs::write(&scene, scene_of(&made.file)).expect("written");
+            if made.file == "case.mtl" {
+                let obj = "mtllib case.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+                std::fs::write(folder.join("case.obj"), obj).expect("written");
+            }
+        }
+        scene
+    }
+}
+
+/// A scene that reads an asset.
+fn scene_of(file: &str) -> String {
+    let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+    let ball = "[[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"m\"\n";
+    match file.rsplit_once('.').map_or("", |(_, ending)| ending) {
+        "txt" => format!("[camera]\norbiter = \"{file}\"\n[materials.m]\ntype = \"phong\"\n{ball}"),
+        "obj" | "off" | "ply" => format!(
+            "{camera}[[mesh]]\nfile = \"{file}\"\nmaterial = \"m\"\n[materials.m]\ntype = \"phong\"\n"
+        ),
+        "mtl" => format!("{camera}[[mesh]]\nfile = \"case.obj\"\n"),
+        _ => format!(
+            "{camera}[textures.t]\nfile = \"{file}\"\n[materials.m]\ntype = \"phong\"\ndiffuse = {{ texture = \"t\" }}\n{ball}"
+        ),
+    }
+}

@@ -1,0 +1,121 @@
+//! In the live program no input is written over either: it says so, and renders on.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::time::Duration;
+
+use super::pty::{Folder, GREEN, RED, SCENE};
+
+/// A red picture of one texel.
+const PAINT: &str = "P3\n1 1\n255\n230 20 20\n";
+
+/// The scene with this file as the texture of its board.
+fn textured(file: &str) -> String {
+    let texture = format!("[textures.paint]\nfile = \"{file}\"\n[materials]");
+    SCENE.replace(RED, "{ texture = \"paint\" }").replace("[materials]", &texture)
+}
+
+/// Long enough for a loop through the watcher to show.
+fn wait_a_while() {
+    std::thread::sleep(Duration::from_millis(1500));
+}
+
+#[test]
+fn a_texture_by_the_name_of_the_picture_stays_and_nothing_goes_round() {
+    let folder = Folder::new();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([230, 20, 20]))
+        .save(folder.path("scene.png"))
+        .expect("saved");
+    folder.write("scene.toml", &textured("scene.png"));
+    let before = folder.bytes("scene.png");
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.wait_for("scene.png");
+    terminal.wait_for("-o FILE");
+    wait_a_while();
+    terminal.wait_for_render(1);
+    assert_eq!(folder.bytes("scene.png"), before);
+    terminal.press("\x1b");
+    terminal.wait_for_color("red");
+    terminal.press("w");
+    terminal.wait_for("nothing is written");
+    assert_eq!(folder.bytes("scene.png"), before);
+    folder
+        .write("scene.toml", &textured("scene.png").replace("[render]", "[render]\noutput = \"other.png\""));
+    terminal.wait_for_render(2);
+    terminal.wait("no error", |screen| !screen.contents().contains("error"));
+    assert!(folder.path("other.png").is_file());
+    assert_eq!(folder.bytes("scene.png"), before);
+}
+
+#[test]
+fn an_edit_that_makes_the_output_an_input_ends_the_writing() {
+    let folder = Folder::new();
+    let terminal = folder.terminal_with(&[folder.program(), "scene.toml", "--report", "r.json"], &[]);
+    terminal.wait_for_render(1);
+    let (picture, report) = (folder.bytes("scene.png"), folder.bytes("r.json"));
+    folder.write("scene.toml", &textured("scene.png"));
+    terminal.wait_for("texture `paint`");
+    wait_a_while();
+    assert_eq!((folder.bytes("scene.png"), folder.bytes("r.json")), (picture, report), "nothing is written");
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    terminal.wait_for_color("green");
+    terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
+}
+
+#[test]
+fn a_photograph_that_takes_the_place_of_the_picture_stays() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    image::RgbImage::new(3, 2).save(folder.path("scene.png")).expect("saved");
+    let photograph = folder.bytes("scene.png");
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    terminal.wait_for("-o FILE");
+    terminal.wait_for_render(2);
+    assert_eq!(folder.bytes("scene.png"), photograph);
+}
+
+#[test]
+fn a_link_that_changes_during_the_render_is_seen() {
+    let folder = Folder::new();
+    folder.write("paint.ppm", PAINT);
+    symlink("first.ppm", folder.path("out.ppm")).expect("a link");
+    let endless = textured("paint.ppm").replace("samples = 4", "samples = 10000000");
+    folder.write("scene.toml", &endless);
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "-o", "out.ppm"], &[]);
+    terminal.wait_for_color("red");
+    terminal.wait_for("ETA");
+    terminal.press("w");
+    terminal.wait_for("wrote out.ppm");
+    assert!(folder.path("first.ppm").is_file());
+    fs::remove_file(folder.path("out.ppm")).expect("removed");
+    symlink("paint.ppm", folder.path("out.ppm")).expect("a link");
+    terminal.press("w");
+    terminal.wait_for("texture `paint`");
+    assert_eq!(folder.bytes("paint.ppm"), PAINT.as_bytes());
+}
+
+#[test]
+fn what_is_written_beside_the_scene_wakes_nobody() {
+    let folder = Folder::new();
+    folder.write("paint.ppm", PAINT);
+    folder.write("scene.toml", &textured("paint.ppm"));
+    let command = [folder.program(), "scene.toml", "-o", "a.png", "-o", "b.ppm", "--report", "r.json"];
+    for poll in [&[][..], &["--poll"]] {
+        let mut terminal = folder.terminal_with(&[&command[..], poll].concat(), &[]);
+        terminal.wait_for_render(1);
+        for _ in 0..3 {
+            terminal.press("w");
+            terminal.wait_for("wrote a.png");
+        }
+        wait_a_while();
+        terminal.wait_for_render(1);
+        let report = folder.bytes("r.json");
+        terminal.press("r");
+        terminal.wait_for_render(2);
+        wait_a_while();
+        terminal.wait_for_render(2);
+        assert_ne!(folder.bytes("r.json"), report, "a render has its report");
+    }
+}

@@ -1,0 +1,188 @@
+//! The program at the end of a thin line: 1 Mbit/s, 150 ms there and back, buffers that take 2 MB (ssh's window).
+//!
+//! A relay lies between the pseudo-terminal and the person's screen. It answers as a terminal does, or as tmux does
+//! (at once, in the terminal's place), or not at all.
+
+use std::collections::VecDeque;
+use std::io::{Read, Write};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Bytes a second: 1 Mbit/s.
+const RATE: f64 = 125_000.0;
+/// One way.
+const DELAY: Duration = Duration::from_millis(75);
+const QUESTIONS: [(&[u8], &[u8]); 3] =
+    [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
+
+/// What answers the program's questions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answers {
+    /// The terminal, at the far end.
+    Terminal,
+    /// A multiplexer at the near end.
+    Multiplexer,
+    Nothing,
+}
+
+/// What was seen on the way.
+#[derive(Debug, Default)]
+pub struct Seen {
+    /// Bytes that came out of the program.
+    pub sent: usize,
+    /// Bytes that are on the person's screen.
+    pub shown: usize,
+    /// Bytes up to the last question whose answer the program has got.
+    answered: usize,
+    /// Most bytes that had not been answered for.
+    pub most_unanswered: usize,
+    /// Most bytes that were in the line.
+    pub most_waiting: usize,
+}
+
+/// Bytes on their way: when they arrive, and, of an answer, how much had been sent when it was asked for.
+struct Due {
+    when: Instant,
+    bytes: Vec<u8>,
+    asked: Option<usize>,
+}
+
+impl Due {
+    fn answer((bytes, asked): (&'static [u8], usize), when: Instant) -> Self {
+        Self { when, bytes: bytes.to_vec(), asked: Some(asked) }
+    }
+}
+
+/// The two directions of a line.
+pub struct Relay {
+    pub seen: Arc<Mutex<Seen>>,
+    up: Sender<Due>,
+}
+
+impl Relay {
+    /// Between what the program writes (`output`), what it reads (`input`), and the person's screen.
+    pub fn start(
+        mut output: Box<dyn Read + Send>,
+        input: Arc<Mutex<Box<dyn Write + Send>>>,
+        screen: Arc<Mutex<vt100::Parser>>,
+        answers: Answers,
+    ) -> Self {
+        let seen = Arc::new(Mutex::new(Seen::default()));
+        let (down, arriving) = channel::<Due>();
+        let (up, rising) = channel::<Due>();
+        let (at_ends, to_answer) = (up.clone(), up.clone());
+
+        let noted = seen.clone();
+        thread::spawn(move || {
+            let (mut bytes, mut free, mut tail) = ([0; 1 << 12], Instant::now(), Scanner::default());
+            while let Ok(count @ 1..) = output.read(&mut bytes) {
+                let now = Instant::now();
+                let bytes = &bytes[..count];
+                note_sent(&noted, count);
+                if answers == Answers::Multiplexer {
+                    for answer in tail.answers(bytes) {
+                        let _ = to_answer.send(Due::answer(answer, now));
+                    }
+                }
+                // The line is a clock: what comes later waits for what came before.
+                for part in bytes.chunks(250) {
+                    free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / RATE);
+                    let _ = down.send(Due { when: free + DELAY, bytes: part.to_vec(), asked: None });
+                }
+            }
+        });
+        let noted = seen.clone();
+        thread::spawn(move || show(&arriving, &screen, &noted, answers, &at_ends));
+        let noted = seen.clone();
+        thread::spawn(move || raise(&rising, &input, &noted));
+        Self { seen, up }
+    }
+
+    /// The person presses keys.
+    pub fn press(&self, keys: &str) {
+        let when = Instant::now() + DELAY;
+        let _ = self.up.send(Due { when, bytes: keys.as_bytes().to_vec(), asked: None });
+    }
+}
+
+fn note_sent(seen: &Mutex<Seen>, count: usize) {
+    let mut seen = seen.lock().expect("no panic");
+    seen.sent += count;
+    seen.most_unanswered = seen.most_unanswered.max(seen.sent - seen.answered);
+    seen.most_waiting = seen.most_waiting.max(seen.sent - seen.shown);
+}
+
+fn show(
+    arriving: &Receiver<Due>,
+    screen: &Mutex<vt100::Parser>,
+    seen: &Mutex<Seen>,
+    answers: Answers,
+    up: &Sender<Due>,
+) {
+    let mut tail = Scanner::default();
+    while let Ok(Due { when, bytes, .. }) = arriving.recv() {
+        thread::sleep(when.saturating_duration_since(Instant::now()));
+        screen.lock().expect("no panic").process(&bytes);
+        seen.lock().expect("no panic").shown += bytes.len();
+        if answers == Answers::Terminal {
+            for answer in tail.answers(&bytes) {
+                let _ = up.send(Due::answer(answer, Instant::now() + DELAY));
+            }
+        }
+    }
+}
+
+/// Keys and answers, each when it is due.
+fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mutex<Seen>) {
+    let mut waiting: VecDeque<Due> = VecDeque::new();
+    loop {
+        let next = match waiting.front() {
+            Some(next) => rising.recv_timeout(next.when.saturating_duration_since(Instant::now())),
+            None => rising.recv().map_err(RecvTimeoutError::from),
+        };
+        match next {
+            Ok(due) => {
+                let place = waiting.iter().position(|other| other.when > due.when).unwrap_or(waiting.len());
+                waiting.insert(place, due);
+            }
+            Err(RecvTimeoutError::Disconnected) => return,
+            Err(RecvTimeoutError::Timeout) => {
+                let Some(Due { bytes, asked, .. }) = waiting.pop_front() else { continue };
+                if let Some(asked) = asked {
+                    let mut seen = seen.lock().expect("no panic");
+                    seen.answered = seen.answered.max(asked);
+                }
+                if input.lock().expect("no panic").write_all(&bytes).is_err() {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// Finds questions in a stream that is cut anywhere.
+#[derive(Default)]
+struct Scanner {
+    last: Vec<u8>,
+    /// Bytes so far.
+    count: usize,
+}
+
+impl Scanner {
+    /// The answers, each with the number of bytes up to its question.
+    fn answers(&mut self, bytes: &[u8]) -> Vec<(&'static [u8], usize)> {
+        let mut found = Vec::new();
+        for byte in bytes {
+            self.last.push(*byte);
+            self.count += 1;
+            if let Some((_, answer)) = QUESTIONS.iter().find(|(question, _)| self.last.ends_with(question)) {
+                found.push((*answer, self.count));
+            }
+        }
+        let spare = self.last.len().saturating_sub(16);
+        self.last.drain(..spare);
+        found
+    }
+}

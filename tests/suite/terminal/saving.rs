@@ -1,0 +1,167 @@
+//! However a file is saved: one render, and no error on the way.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use super::pty::{BLUE, Folder, GREEN, RED, SCENE, Terminal};
+
+/// A way of saving: the file gets this text.
+type Save = fn(&Path, &str);
+
+const WAYS: [(&str, Save); 6] = [
+    ("truncate and write", |path, text| fs::write(path, text).expect("written")),
+    ("atomic rename", |path, text| {
+        fs::write(beside(path, ".new"), text).expect("written");
+        fs::rename(beside(path, ".new"), path).expect("renamed");
+    }),
+    ("vim", |path, text| {
+        fs::write(beside(path, "4913"), "").expect("written");
+        fs::remove_file(beside(path, "4913")).expect("removed");
+        fs::rename(path, beside(path, "~")).expect("renamed");
+        fs::write(path, text).expect("written");
+        let mode = fs::metadata(beside(path, "~")).expect("the backup").permissions();
+        fs::set_permissions(path, mode).expect("permitted");
+        fs::remove_file(beside(path, "~")).expect("removed");
+    }),
+    ("Emacs", |path, text| {
+        fs::rename(path, beside(path, "~")).expect("renamed");
+        fs::write(path, text).expect("written");
+    }),
+    ("unlink and write", |path, text| {
+        fs::remove_file(path).expect("removed");
+        fs::write(path, text).expect("written");
+    }),
+    ("the target of a link is replaced", |path, text| {
+        // The first time it becomes a link, which changes nothing that it holds: what is beyond is then found without
+        // a hint.
+        let folder = beside(path, ".d");
+        if !folder.is_dir() {
+            fs::create_dir(&folder).expect("a folder");
+            fs::rename(path, folder.join("real")).expect("renamed");
+            std::os::unix::fs::symlink(folder.join("real"), path).expect("a link");
+        }
+        fs::write(folder.join("new"), text).expect("written");
+        fs::rename(folder.join("new"), folder.join("real")).expect("renamed");
+    }),
+];
+
+fn beside(path: &Path, ending: &str) -> std::path::PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    name.into()
+}
+
+/// Two colours in turns, by which one can see which save is shown.
+fn shades() -> impl Iterator<Item = (&'static str, &'static str)> {
+    [("green", GREEN), ("blue", BLUE)].into_iter().cycle()
+}
+
+#[test]
+fn every_way_of_saving_a_scene_renders_once() {
+    for options in [&[][..], &["--poll"]] {
+        let folder = Folder::new();
+        let terminal = folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[]);
+        terminal.wait_for_render(1);
+        for ((render, (way, save)), (color, value)) in (2..).zip(WAYS).zip(shades()) {
+            save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
+            terminal.wait_for_color(color);
+            terminal.wait_for_render(render);
+            // The same once more is no reason to render: the count of the next round shows it.
+            save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
+            println!("{way} {options:?}");
+        }
+        terminal.wait_for_render(WAYS.len() + 1);
+    }
+}
+
+#[test]
+fn every_way_of_saving_an_asset_renders_once() {
+    for options in [&[][..], &["--poll"]] {
+        let folder = Folder::new();
+        let texture = "[textures.paint]\nfile = \"paint.ppm\"\n";
+        let scene = SCENE.replace(RED, "{ texture = \"paint\" }");
+        folder.write("scene.toml", &scene.replace("[materials]", &format!("{texture}[materials]")));
+        folder.write("paint.ppm", "P3\n1 1\n255\n230 20 20\n");
+        let terminal = folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[]);
+        terminal.wait_for_render(1);
+        for ((render, (way, save)), (color, _)) in (2..).zip(WAYS).zip(shades()) {
+            let paint = if color == "green" { "20 230 20" } else { "20 20 230" };
+            save(&folder.path("paint.ppm"), &format!("P3\n1 1\n255\n{paint}\n"));
+            terminal.wait_for_color(color);
+            terminal.wait_for_render(render);
+            println!("{way} {options:?}");
+        }
+    }
+}
+
+/// No error is on the screen until a render of this colour is.
+#[track_caller]
+fn no_error_until(terminal: &Terminal, color: &'static str, render: usize) {
+    terminal.wait(color, |screen| {
+        let text = screen.contents();
+        assert!(!text.contains("error") && !text.contains("broken"), "an error in between\n{text}");
+        super::Colors::of(screen).is_most(color)
+    });
+    terminal.wait_for_render(render);
+}
+
+/// Cut in the middle of a line.
+fn halves(text: &str) -> (&str, &str) {
+    text.split_at(text.find("diffuse").expect("a material") + 4)
+}
+
+/// How long the writer pauses. A machine that makes more of it than the requirement is, tells nothing.
+const PAUSE: Duration = Duration::from_millis(200);
+
+#[test]
+fn a_slow_writer_shows_no_error_in_between() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let mut render = 1;
+    for (number, (color, value)) in (0..6).zip(shades()) {
+        let text = SCENE.replace(RED, value);
+        let (first, second) = halves(&text);
+        let begin;
+        if number % 3 == 0 {
+            let mut file = fs::File::create(folder.path("scene.toml")).expect("opened");
+            file.write_all(first.as_bytes()).expect("written");
+            begin = Instant::now();
+            std::thread::sleep(PAUSE);
+            file.write_all(second.as_bytes()).expect("written");
+        } else {
+            folder.write("scene.toml", first);
+            begin = Instant::now();
+            std::thread::sleep(PAUSE);
+            let mut file =
+                fs::OpenOptions::new().append(true).open(folder.path("scene.toml")).expect("opened");
+            file.write_all(second.as_bytes()).expect("written");
+        }
+        render += 1;
+        if begin.elapsed() < PAUSE + PAUSE / 4 {
+            no_error_until(&terminal, color, render);
+        } else {
+            terminal.wait_for_color(color);
+            terminal.wait_for_render(render);
+        }
+    }
+}
+
+#[test]
+fn an_error_that_stays_is_shown() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let (half, _) = halves(SCENE);
+    let mut file = fs::File::create(folder.path("scene.toml")).expect("opened");
+    file.write_all(half.as_bytes()).expect("written");
+    // Held open: shown all the same in the end.
+    terminal.wait_for("broken");
+    drop(file);
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    terminal.wait_for_color("green");
+    folder.write("scene.toml", half);
+    terminal.wait_for("broken");
+}

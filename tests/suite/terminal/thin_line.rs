@@ -1,0 +1,117 @@
+//! Over a thin line a key is answered at once, whatever is on the way, and the shell is back at once.
+
+use std::time::{Duration, Instant};
+
+use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
+use super::relay::Answers;
+
+/// Most bytes on their way that the terminal has not answered for.
+const MOST: usize = 24_000;
+/// From a key to its first changed cells, and from `q` to the shell.
+const SEEN: Duration = Duration::from_millis(400);
+
+const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Nothing];
+
+/// A render that does not end.
+fn endless(answers: Answers) -> (Folder, Terminal) {
+    let folder = Folder::new();
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    let terminal = folder.thin_line(answers);
+    terminal.wait_for("ETA");
+    terminal.wait("a picture", |screen| super::Colors::of(screen).red > 500);
+    (folder, terminal)
+}
+
+/// How long a key takes to show.
+fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> Duration {
+    let begin = Instant::now();
+    terminal.press(key);
+    terminal.wait(what, holds);
+    begin.elapsed()
+}
+
+#[test]
+fn keys_are_seen_at_once_and_little_is_on_the_way() {
+    for answers in ALL {
+        let (folder, mut terminal) = endless(answers);
+        for words in ["shadows hard", "shadows off", "shadows soft"] {
+            std::thread::sleep(Duration::from_millis(700));
+            let taken = time(&mut terminal, "s", words, |screen| screen.contents().contains(words));
+            assert!(taken <= SEEN, "{answers:?}: {words} after {taken:?}");
+        }
+        // An edit while the line is full: the newest picture only.
+        folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
+        terminal.wait_for_color("green");
+        let (unanswered, waiting) = terminal.line(|seen| (seen.most_unanswered, seen.most_waiting));
+        if answers == Answers::Terminal {
+            assert!(unanswered <= MOST, "{unanswered} B without an answer");
+        } else {
+            assert!(waiting <= MOST, "{answers:?}: {waiting} B in the line");
+        }
+    }
+}
+
+#[test]
+fn the_shell_is_back_at_once() {
+    for answers in ALL {
+        let (_folder, mut terminal) = endless(answers);
+        let taken = time(&mut terminal, "q", "the shell's screen", |screen| !screen.alternate_screen());
+        assert!(taken <= SEEN, "{answers:?}: the screen after {taken:?}");
+        assert_eq!(terminal.end(), 0);
+    }
+}
+
+#[test]
+fn nothing_is_sent_when_nothing_happens() {
+    for answers in ALL {
+        let folder = Folder::new();
+        let terminal = folder.thin_line(answers);
+        terminal.wait_for_render(1);
+        // The last exact picture may still be on its way.
+        std::thread::sleep(Duration::from_secs(3));
+        let before = terminal.line(|seen| seen.sent);
+        std::thread::sleep(Duration::from_secs(1));
+        assert_eq!(terminal.line(|seen| seen.sent), before, "{answers:?}");
+    }
+}
+
+#[test]
+fn the_line_is_measured_and_shown() {
+    let folder = Folder::new();
+    let mut terminal = folder.thin_line(Answers::Terminal);
+    terminal.wait_for_render(1);
+    terminal.wait("kB and ms", |screen| {
+        let text = screen.contents();
+        let status = text.lines().find(|line| line.contains("shadows soft")).unwrap_or_default();
+        let words: Vec<&str> = status.split_whitespace().collect();
+        let amount = |unit: &str| {
+            let place = words.iter().position(|word| *word == unit)?;
+            words.get(place.checked_sub(1)?)?.parse::<u32>().ok()
+        };
+        amount("kB").is_some_and(|size| (1..200).contains(&size))
+            && amount("ms").is_some_and(|time| (150..400).contains(&time))
+    });
+    terminal.press("?");
+    terminal.wait_for("the terminal's time to answer");
+}
+
+#[test]
+fn a_terminal_that_takes_nothing_does_not_hold_up_the_end() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    let mut terminal = folder.terminal();
+    terminal.wait_for("ETA");
+    terminal.set_reading(false);
+    // Each view is another picture, until nothing more fits in.
+    for _ in 0..40 {
+        terminal.press("v");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    let begin = Instant::now();
+    terminal.press("q");
+    assert_eq!(terminal.code(), 0);
+    let taken = begin.elapsed();
+    assert!(taken <= SEEN, "{taken:?}");
+    terminal.set_reading(true);
+    assert_eq!(terminal.end(), 0);
+}
