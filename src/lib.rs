@@ -8,6 +8,7 @@
 //! | room | what it knows |
 //! | --- | --- |
 //! | [`system`] | the operating system's errors in plain words, which files have an end |
+//! | [`choice`] | values that are chosen by name |
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
@@ -32,22 +33,23 @@
 //!
 //! ```text
 //! system      ->
+//! choice      ->
 //! math        ->
 //! control     ->
-//! geometry    -> math
+//! geometry    -> sampling math
 //! accel       -> geometry math control
-//! sampling    -> math
-//! materials   -> math
-//! lights      -> geometry sampling math
-//! scene       -> math system
+//! sampling    -> math choice
+//! materials   -> math choice
+//! lights      -> geometry sampling math choice
+//! scene       -> geometry materials lights sampling film math choice system
 //! assets      -> geometry materials math control system
 //! world       -> scene assets accel materials lights geometry math control
-//! film        -> math
-//! integrators -> world scene materials lights geometry sampling film math control
+//! film        -> math choice
+//! integrators -> world scene materials lights geometry sampling film math choice control
 //! output      -> film math control system
-//! pipeline    -> integrators world assets scene film output materials math control system
-//! tui         -> pipeline scene film math
-//! cli         -> pipeline tui output scene film
+//! pipeline    -> integrators world assets scene film output lights materials math choice control system
+//! tui         -> pipeline scene film math choice
+//! cli         -> pipeline tui output scene film choice
 //! ```
 //!
 //! ## What holds everywhere
@@ -64,6 +66,7 @@
 
 pub mod accel;
 pub mod assets;
+pub mod choice;
 pub mod cli;
 pub mod control;
 pub mod film;

@@ -3,11 +3,16 @@
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
+use clap::Parser;
 use clap::builder::styling::{AnsiColor, Styles};
-use clap::{Parser, ValueEnum};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use crate::choice;
+use crate::choice::Choice;
 use crate::film::Rect;
-use crate::scene::description::MOST_SCATTERINGS;
+use crate::pipeline::settings::{Overrides, View};
+use crate::scene::description::{Accel, Integrator, MOST_SCATTERINGS, Shadows};
+use crate::tui::{ColorChoice, PreviewChoice};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -44,7 +49,7 @@ pub struct Args {
 
 impl Args {
     /// The colours asked for, by whatever command.
-    pub(super) fn color(&self) -> Color {
+    pub(super) fn color(&self) -> ColorChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
             _ => self.render.color,
@@ -60,8 +65,8 @@ pub enum Subcommand {
         /// The scene file
         scene: PathBuf,
         /// Colours of the messages
-        #[arg(long, value_enum, default_value_t, value_name = "HOW")]
-        color: Color,
+        #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
+        color: ColorChoice,
     },
     /// Write a commented scene to start from; refuses to overwrite
     New {
@@ -107,157 +112,114 @@ pub struct RenderArgs {
     #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
     pub crop: Option<Rect>,
     /// What the picture shows
-    #[arg(long, value_enum, value_name = "NAME", help_heading = "Picture")]
+    #[arg(long, value_parser = one_of::<View>(), value_name = "NAME", help_heading = "Picture")]
     pub view: Option<View>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, help_heading = "Picture")]
     pub seed: Option<u32>,
 
     /// How light is followed
-    #[arg(long, value_enum, value_name = "NAME", help_heading = "Method")]
+    #[arg(long, value_parser = one_of::<Integrator>(), value_name = "NAME", help_heading = "Method")]
     pub integrator: Option<Integrator>,
     /// Scatterings along one path; 0: emitted light only, 1: direct light
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = depth, help_heading = "Method")]
     pub max_depth: Option<u32>,
     /// Shadows; hard: one ray to the middle of an area light
-    #[arg(long, value_enum, value_name = "HOW", help_heading = "Method")]
+    #[arg(long, value_parser = one_of::<Shadows>(), value_name = "HOW", help_heading = "Method")]
     pub shadows: Option<Shadows>,
     /// Photon maps; accepted, but not rendered by this version
-    #[arg(long, value_enum, value_name = "on|off", help_heading = "Method")]
+    #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "Method")]
     pub photons: Option<Switch>,
     /// Depth of field, where the camera has an aperture
-    #[arg(long, value_enum, value_name = "on|off", help_heading = "Method")]
+    #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "Method")]
     pub dof: Option<Switch>,
     /// Acceleration structure
-    #[arg(long, value_enum, value_name = "NAME", help_heading = "Method")]
+    #[arg(long, value_parser = one_of::<Accel>(), value_name = "NAME", help_heading = "Method")]
     pub accel: Option<Accel>,
     /// Threads that render; 0: one per core
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Method")]
     pub threads: Option<usize>,
 
     /// How progress is said on stderr with --once
-    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: Progress,
     /// How the preview is drawn
-    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Terminal")]
-    pub preview: Preview,
+    #[arg(long, value_parser = one_of::<PreviewChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub preview: PreviewChoice,
     /// Colours of the preview and of messages; auto looks at the terminal and at NO_COLOR
-    #[arg(long, value_enum, default_value_t, value_name = "HOW", help_heading = "Terminal")]
-    pub color: Color,
+    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub color: ColorChoice,
     /// Look at the files several times a second rather than rely on the system's notifications
     #[arg(long, help_heading = "Terminal")]
     pub poll: bool,
 }
 
-/// On or off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Switch {
-    /// Yes
-    On,
-    /// No
-    Off,
-}
-
-/// Methods.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Integrator {
-    /// Direct light, mirrors and glass
-    Whitted,
-    /// All light paths (not available in this version)
-    Path,
-}
-
-/// Shadows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Shadows {
-    /// Nothing stops light
-    Off,
-    /// One ray to the middle of a light
-    Hard,
-    /// The visible part of a light
-    Soft,
-}
-
-/// Acceleration structures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Accel {
-    /// Bounding volume hierarchy
-    Bvh,
-    /// The same with large triangles cut: longer to build, faster where they lie askew
-    BvhHigh,
-    /// kd-tree over the triangles of meshes
-    Kdtree,
-}
-
-/// Ways to say progress.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Progress {
-    /// Bars on a terminal, plain lines elsewhere
-    #[default]
-    Auto,
-    /// Lines now and then
-    Plain,
-    /// One JSON object a line: its key "event" is stage, asset, progress, written, done, failed or cancelled
-    Json,
-    /// Nothing but errors and warnings
-    None,
-}
-
-/// Ways to draw the preview.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Preview {
-    /// Half blocks where there is colour, characters elsewhere
-    #[default]
-    Auto,
-    /// Two pixels a cell
-    Halfblock,
-    /// Characters by brightness
-    Ascii,
-    /// None
-    None,
-}
-
-/// Colours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Color {
-    /// What the terminal can show
-    #[default]
-    Auto,
-    /// 24 bits
-    Truecolor,
-    /// The palette of 256
-    #[value(name = "256")]
-    Palette256,
-    /// The palette of 16
-    #[value(name = "16")]
-    Palette16,
-    /// None
-    None,
-}
-
-/// What a picture shows; see [`crate::pipeline::settings::View`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct View(pub crate::pipeline::settings::View);
-
-impl ValueEnum for View {
-    fn value_variants<'a>() -> &'a [Self] {
-        use crate::pipeline::settings::View as V;
-        const ALL: [View; V::ALL.len()] = {
-            let mut all = [View(V::Beauty); V::ALL.len()];
-            let mut i = 0;
-            while i < all.len() {
-                all[i] = View(V::ALL[i]);
-                i += 1;
-            }
-            all
-        };
-        &ALL
-    }
-
-    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
-        Some(clap::builder::PossibleValue::new(self.0.name()))
+impl RenderArgs {
+    /// What they change of a scene.
+    pub(super) fn overrides(&self) -> Overrides {
+        Overrides {
+            outputs: self.outputs.clone(),
+            report: self.report.clone(),
+            width: self.width,
+            height: self.height,
+            samples: self.samples,
+            time_seconds: self.time,
+            max_depth: self.max_depth,
+            integrator: self.integrator,
+            shadows: self.shadows,
+            photons: self.photons.map(bool::from),
+            dof: self.dof.map(bool::from),
+            accel: self.accel,
+            view: self.view,
+            seed: self.seed,
+            crop: self.crop,
+            threads: self.threads,
+            bit_depth: self.bit_depth,
+        }
     }
 }
+
+choice! {
+    /// Ways to say progress.
+    pub enum Progress {
+        /// Bars on a terminal, plain lines elsewhere.
+        Auto = "auto",
+        /// Lines now and then.
+        Plain = "plain",
+        /// One JSON object a line: its key "event" is stage, asset, progress, written, done, failed or cancelled.
+        Json = "json",
+        /// Nothing but errors and warnings.
+        None = "none",
+    }
+}
+
+choice! {
+    /// On or off.
+    pub enum Switch {
+        /// Yes.
+        On = "on",
+        /// No.
+        Off = "off",
+    }
+}
+
+impl From<Switch> for bool {
+    fn from(switch: Switch) -> Self {
+        switch == Switch::On
+    }
+}
+
+/// Reads a choice by its name; help lists the names with what they mean.
+fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
+    let known = C::ALL.iter().map(|one| PossibleValue::new(one.name()).help(one.meaning()));
+    let other = C::UNAVAILABLE.iter().map(|&name| PossibleValue::new(name).help(UNAVAILABLE));
+    PossibleValuesParser::new(known.chain(other)).try_map(|name| {
+        let names = || C::ALL.iter().map(|one| one.name()).collect::<Vec<_>>().join(", ");
+        C::named(&name).ok_or_else(|| format!("{UNAVAILABLE}; use {}", names()))
+    })
+}
+
+const UNAVAILABLE: &str = "not available in this version";
 
 fn bit_depth(text: &str) -> Result<u8, String> {
     match text {

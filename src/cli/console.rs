@@ -3,11 +3,11 @@
 
 use std::io::{IsTerminal, Write};
 
-use super::args::Color;
 use super::exit::Exit;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::{Style, render};
 use crate::scene::sanitize::visible;
+use crate::tui::ColorChoice;
 
 /// The two streams.
 #[derive(Clone, Copy, Debug)]
@@ -20,14 +20,14 @@ pub(super) struct Console {
 const PLAIN_COLUMNS: usize = 120;
 
 impl Console {
-    pub(super) fn new(color: Color) -> Self {
+    pub(super) fn new(color: ColorChoice) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
         let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
         let colored = match color {
-            Color::None => false,
-            Color::Auto => is_terminal && !is_set("NO_COLOR") && !is_dumb,
-            Color::Truecolor | Color::Palette256 | Color::Palette16 => true,
+            ColorChoice::None => false,
+            ColorChoice::Auto => is_terminal && !is_set("NO_COLOR") && !is_dumb,
+            ColorChoice::TrueColor | ColorChoice::Indexed256 | ColorChoice::Ansi16 => true,
         };
         Self { style: if colored { Style::Ansi } else { Style::Plain }, is_terminal: is_terminal && !is_dumb }
     }

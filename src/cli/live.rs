@@ -4,7 +4,6 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::args;
 use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
@@ -13,7 +12,7 @@ use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
 use crate::scene::NO_SUCH_FILE;
 use crate::scene::diagnostic::Diagnostic;
-use crate::tui::{self, ColorChoice, Options, PreviewChoice, TuiError};
+use crate::tui::{self, Options, TuiError};
 
 /// How long a file that is being written may take at the end.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -45,8 +44,8 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let outcome = tui::run(Options {
         scene: order.scene,
         overrides: order.overrides,
-        color: color(order.color),
-        preview: preview(order.preview),
+        color: order.color,
+        preview: order.preview,
         cell_aspect: None,
         commands: Box::new(move |command| {
             if matches!(command, Command::Write) {
@@ -128,25 +127,6 @@ fn await_scene(problem: &mut Diagnostic) {
         let typo = problem.help.take().filter(|help| help.starts_with("did you mean"));
         let typo = typo.map_or(String::new(), |typo| format!("; {typo}"));
         problem.help = Some(format!("it is rendered as soon as it is there{typo}"));
-    }
-}
-
-fn color(color: args::Color) -> ColorChoice {
-    match color {
-        args::Color::Auto => ColorChoice::Auto,
-        args::Color::Truecolor => ColorChoice::TrueColor,
-        args::Color::Palette256 => ColorChoice::Indexed256,
-        args::Color::Palette16 => ColorChoice::Ansi16,
-        args::Color::None => ColorChoice::None,
-    }
-}
-
-fn preview(preview: args::Preview) -> PreviewChoice {
-    match preview {
-        args::Preview::Auto => PreviewChoice::Auto,
-        args::Preview::Halfblock => PreviewChoice::HalfBlock,
-        args::Preview::Ascii => PreviewChoice::Ascii,
-        args::Preview::None => PreviewChoice::None,
     }
 }
 

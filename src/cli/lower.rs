@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::args::{Accel, Color, Integrator, Preview, Progress, RenderArgs, Shadows, Switch};
+use super::args::{Progress, RenderArgs};
 use crate::output::Format;
 use crate::pipeline::settings::Overrides;
-use crate::scene::description;
+use crate::tui::{ColorChoice, PreviewChoice};
 
 /// What is to be done.
 #[derive(Clone, Debug)]
@@ -14,55 +14,19 @@ pub(super) struct Order {
     pub(super) overrides: Overrides,
     pub(super) is_once: bool,
     pub(super) progress: Progress,
-    pub(super) preview: Preview,
-    pub(super) color: Color,
+    pub(super) preview: PreviewChoice,
+    pub(super) color: ColorChoice,
     pub(super) poll: bool,
 }
 
 /// The meaning of the arguments.
 ///
 /// # Errors
-/// Something that this version does not have, in words with the way out.
+/// What is wrong with them, in words with the way out.
 pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
-    let scene = args.scene.ok_or("no scene is given; see glimt --help")?;
-    let integrator = match args.integrator {
-        Some(Integrator::Path) => {
-            return Err(
-                "--integrator path is not available in this version; use --integrator whitted".to_owned()
-            );
-        }
-        other => other.map(|_| description::Integrator::Whitted),
-    };
-    let accel = args.accel.map(|structure| match structure {
-        Accel::Bvh => description::Accel::Bvh,
-        Accel::BvhHigh => description::Accel::BvhHigh,
-        Accel::Kdtree => description::Accel::KdTree,
-    });
     check_outputs(&args.outputs)?;
-    let shadows = args.shadows.map(|how| match how {
-        Shadows::Off => description::Shadows::Off,
-        Shadows::Hard => description::Shadows::Hard,
-        Shadows::Soft => description::Shadows::Soft,
-    });
-    let overrides = Overrides {
-        outputs: args.outputs,
-        report: args.report,
-        width: args.width,
-        height: args.height,
-        samples: args.samples,
-        time_seconds: args.time,
-        max_depth: args.max_depth,
-        integrator,
-        shadows,
-        photons: args.photons.map(is_on),
-        dof: args.dof.map(is_on),
-        accel,
-        view: args.view.map(|view| view.0),
-        seed: args.seed,
-        crop: args.crop,
-        threads: args.threads,
-        bit_depth: args.bit_depth,
-    };
+    let overrides = args.overrides();
+    let scene = args.scene.ok_or("no scene is given; see glimt --help")?;
     Ok(Order {
         scene,
         overrides,
@@ -72,10 +36,6 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         color: args.color,
         poll: args.poll,
     })
-}
-
-fn is_on(switch: Switch) -> bool {
-    switch == Switch::On
 }
 
 /// Every ending must be known, and no file may be named twice.
@@ -95,8 +55,10 @@ mod tests {
 
     use super::super::args::{Args, Subcommand};
     use super::*;
+    use crate::choice::Choice;
     use crate::film::Rect;
     use crate::pipeline::settings::View;
+    use crate::scene::description;
 
     fn lowered(line: &str) -> Result<Order, String> {
         let words = std::iter::once("glimt").chain(line.split_whitespace());
@@ -144,7 +106,7 @@ mod tests {
         };
         assert_eq!(order.overrides, expected);
         assert!(order.is_once && order.poll);
-        assert_eq!((order.progress, order.color), (Progress::Json, Color::Palette256));
+        assert_eq!((order.progress, order.color), (Progress::Json, ColorChoice::Indexed256));
     }
 
     #[test]
@@ -183,7 +145,7 @@ mod tests {
 
     #[test]
     fn every_view_has_its_name() {
-        for view in View::ALL {
+        for &view in View::ALL {
             let order = lowered(&format!("a.toml --view {}", view.name())).expect("right");
             assert_eq!(order.overrides.view, Some(view));
         }

@@ -44,7 +44,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
 
 /// Help and the version are answers; everything else is a wrong call.
 fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
-    let console = Console::new(args::Color::Auto);
+    let console = Console::new(crate::tui::ColorChoice::Auto);
     if !error.use_stderr() {
         // A closed pipe: nobody reads the help.
         let _ = error.print();

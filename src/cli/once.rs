@@ -9,8 +9,8 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::signals;
-use crate::pipeline::protocol::{Command, Effective, Event, Failure, Report, Request, Writing};
-use crate::pipeline::settings::Overrides;
+use crate::pipeline::protocol::{Command, Event, Failure, Report, Request, Writing};
+use crate::pipeline::settings::{Effective, Overrides};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 

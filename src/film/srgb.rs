@@ -11,15 +11,15 @@ const ONE_BITS: u32 = 127 << 23;
 const BUCKET_SHIFT: u32 = 23 - 8;
 const BUCKETS: usize = ((ONE_BITS - FIRST_EXPONENT_BITS) >> BUCKET_SHIFT) as usize;
 
-struct Table {
+struct ByteTable {
     /// The byte at the start of each bucket.
     start: [u8; BUCKETS],
     /// The bits of the first float that becomes byte `i` or more.
     threshold: [u32; 256],
 }
 
-static TABLE: LazyLock<Table> = LazyLock::new(|| {
-    let mut table = Table { start: [0; BUCKETS], threshold: [0; 256] };
+static TABLE: LazyLock<ByteTable> = LazyLock::new(|| {
+    let mut table = ByteTable { start: [0; BUCKETS], threshold: [0; 256] };
     for (byte, threshold) in table.threshold.iter_mut().enumerate() {
         *threshold = first_bits_of(byte);
     }

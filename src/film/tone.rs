@@ -3,21 +3,29 @@
 use rayon::prelude::*;
 
 use super::{Picture, Picture16, RadianceImage, curves, is_in_pool, linear_to_srgb8};
+use crate::choice;
 use crate::math::Vec3;
 use crate::math::color::linear_to_srgb;
 
-/// Tone curves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Curve {
-    /// Clamp.
-    #[default]
-    None,
-    /// x/(1 + x) on luminance (Reinhard et al. 2002).
-    Reinhard,
-    /// A fit of the ACES filmic curve (Narkowicz 2015).
-    Aces,
-    /// AgX (Sobotka 2022).
-    Agx,
+choice! {
+    /// Tone curves.
+    pub enum Tonemap {
+        /// Clamp.
+        None = "none",
+        /// x/(1 + x) on luminance (Reinhard et al. 2002).
+        Reinhard = "reinhard",
+        /// A fit of the ACES filmic curve (Narkowicz 2015).
+        Aces = "aces",
+        /// AgX (Sobotka 2022).
+        Agx = "agx",
+    }
+}
+
+#[allow(clippy::derivable_impls, reason = "`choice!` writes the enum")]
+impl Default for Tonemap {
+    fn default() -> Self {
+        Self::None
+    }
 }
 
 /// How display light in [0, 1] is encoded.
@@ -36,7 +44,7 @@ pub struct ToneMapping {
     /// Radiance is multiplied by 2 to this power.
     pub exposure_stops: f32,
     /// What then brings it into [0, 1].
-    pub curve: Curve,
+    pub curve: Tonemap,
     /// How that is encoded.
     pub transfer: Transfer,
 }
@@ -48,7 +56,7 @@ const PARALLEL_PIXELS: usize = 1 << 18;
 
 impl ToneMapping {
     /// For pictures of numbers, whose values are what a display is sent: they are clamped and nothing else.
-    pub const DATA: Self = Self { exposure_stops: 0.0, curve: Curve::None, transfer: Transfer::Identity };
+    pub const DATA: Self = Self { exposure_stops: 0.0, curve: Tonemap::None, transfer: Transfer::Identity };
 
     /// One colour: linear display light in [0, 1], whatever is fed; NaN and negative components count as 0.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
@@ -59,10 +67,10 @@ impl ToneMapping {
         let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
         let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
         match self.curve {
-            Curve::None => color.min(Vec3::ONE),
-            Curve::Reinhard => curves::reinhard(color),
-            Curve::Aces => curves::aces(color),
-            Curve::Agx => curves::agx(color),
+            Tonemap::None => color.min(Vec3::ONE),
+            Tonemap::Reinhard => curves::reinhard(color),
+            Tonemap::Aces => curves::aces(color),
+            Tonemap::Agx => curves::agx(color),
         }
     }
 }
@@ -107,20 +115,19 @@ fn map_pixels<T: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::choice::Choice;
 
-    const CURVES: [Curve; 4] = [Curve::None, Curve::Reinhard, Curve::Aces, Curve::Agx];
-
-    fn tone(curve: Curve) -> ToneMapping {
+    fn tone(curve: Tonemap) -> ToneMapping {
         ToneMapping { curve, ..Default::default() }
     }
 
-    fn grey(curve: Curve, value: f32) -> f32 {
+    fn grey(curve: Tonemap, value: f32) -> f32 {
         tone(curve).apply(Vec3::splat(value)).y
     }
 
     #[test]
     fn a_brighter_grey_is_never_darker() {
-        for curve in CURVES {
+        for &curve in Tonemap::ALL {
             let mut before = grey(curve, 0.0);
             assert!(before.abs() < 1e-6, "{curve:?} takes black to {before}");
             for step in -200..=200 {
@@ -134,20 +141,20 @@ mod tests {
 
     #[test]
     fn known_values() {
-        assert_eq!(grey(Curve::None, 0.25), 0.25);
-        assert!((grey(Curve::Reinhard, 1.0) - 0.5).abs() < 1e-6);
-        assert!((grey(Curve::Reinhard, 3.0) - 0.75).abs() < 1e-6);
+        assert_eq!(grey(Tonemap::None, 0.25), 0.25);
+        assert!((grey(Tonemap::Reinhard, 1.0) - 0.5).abs() < 1e-6);
+        assert!((grey(Tonemap::Reinhard, 3.0) - 0.75).abs() < 1e-6);
         // On luminance: pure red of radiance 1 has 0.2126 of it.
-        let red = tone(Curve::Reinhard).apply(Vec3::X);
+        let red = tone(Tonemap::Reinhard).apply(Vec3::X);
         assert!((red - Vec3::X / 1.2126).abs().max_element() < 1e-6);
-        assert!((grey(Curve::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
+        assert!((grey(Tonemap::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
         // Middle grey is the sigmoid's pivot, ½ in a display of power 2.2.
-        assert!((grey(Curve::Agx, 0.18) - 0.5_f32.powf(2.2)).abs() < 1e-3);
+        assert!((grey(Tonemap::Agx, 0.18) - 0.5_f32.powf(2.2)).abs() < 1e-3);
     }
 
     #[test]
     fn agx_takes_bright_saturated_light_towards_white() {
-        let blue = tone(Curve::Agx).apply(Vec3::new(0.0, 0.0, 1000.0));
+        let blue = tone(Tonemap::Agx).apply(Vec3::new(0.0, 0.0, 1000.0));
         assert!(blue.min_element() > 0.3 && blue.z > 0.9, "{blue}");
     }
 
@@ -155,7 +162,7 @@ mod tests {
     fn exposure_is_in_stops() {
         let image = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::new(0.05, 0.1, 0.2)] };
         let brighter = RadianceImage { pixels: vec![Vec3::new(0.2, 0.4, 0.8)], width: 1, height: 1 };
-        for curve in CURVES {
+        for &curve in Tonemap::ALL {
             let exposed = ToneMapping { exposure_stops: 2.0, ..tone(curve) };
             assert_eq!(develop(&image, &exposed), develop(&brighter, &tone(curve)), "{curve:?}");
         }
@@ -165,7 +172,7 @@ mod tests {
     fn nothing_wraps() {
         let hostile =
             [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1e30, f32::MAX, 0.0, 1e-45];
-        for curve in CURVES {
+        for &curve in Tonemap::ALL {
             for exposure_stops in [0.0, 10.0, -10.0, 500.0, -500.0, f32::NAN] {
                 let mapping = ToneMapping { exposure_stops, ..tone(curve) };
                 for [r, g, b] in hostile.iter().flat_map(|&a| hostile.map(|b| [a, b, 0.5])) {
@@ -199,8 +206,8 @@ mod tests {
     fn sixteen_bits_refine_eight() {
         let pixels: Vec<_> = (0..=1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
         let image = RadianceImage { width: 1001, height: 1, pixels };
-        let coarse = develop(&image, &tone(Curve::None)).pixels;
-        let fine = develop16(&image, &tone(Curve::None)).pixels;
+        let coarse = develop(&image, &tone(Tonemap::None)).pixels;
+        let fine = develop16(&image, &tone(Tonemap::None)).pixels;
         for (eight, sixteen) in coarse.iter().zip(&fine) {
             assert!(
                 (f64::from(sixteen[0]) / 257.0 - f64::from(eight[0])).abs() <= 0.502,
@@ -216,7 +223,7 @@ mod tests {
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let threads = || {
             let named = |_: Vec3| std::thread::current().name().map(str::to_owned);
-            map_pixels(&image, &tone(Curve::None), named)
+            map_pixels(&image, &tone(Tonemap::None), named)
                 .into_iter()
                 .collect::<std::collections::HashSet<_>>()
         };
@@ -231,7 +238,7 @@ mod tests {
     fn many_pixels_are_the_same_as_one_by_one() {
         let pixels: Vec<_> = (0..PARALLEL_PIXELS + 7).map(|i| Vec3::splat(i as f32 * 1e-5)).collect();
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
-        let mapping = tone(Curve::Aces);
+        let mapping = tone(Tonemap::Aces);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
         let developed = pool.install(|| develop(&image, &mapping)).pixels;
         for (pixel, &radiance) in developed.iter().zip(&image.pixels) {

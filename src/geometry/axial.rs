@@ -1,5 +1,7 @@
 //! What shapes around an axis have in common: their frame, lines brought near them, and the parts that a line meets.
 
+use std::f64::consts::PI;
+
 use super::surface::flat_axes;
 use super::{Aabb, RayF64, ShapeHit};
 use crate::math::{DMat3, DVec2, DVec3};
@@ -131,6 +133,23 @@ pub fn meet(ray: &RayF64, line: &Line, side: Stretch, ends: Stretch, closed: boo
         return None;
     }
     [enter, leave].into_iter().find_map(accepted)
+}
+
+/// Sine of the angle to an axis, from its cosine.
+pub fn across(along: f64) -> f64 {
+    (1.0 - along * along).max(0.0).sqrt()
+}
+
+/// ∫max(0, a·cos φ + b) over an area whose normals lie evenly on a ring around an axis: what of it faces a direction, times
+/// the cosines. The normals have the product a·cos φ + b with the direction, at the angle φ around the axis.
+pub fn ring_shown(area: f64, a: f64, b: f64) -> f64 {
+    if b >= a {
+        area * b
+    } else if b <= -a {
+        0.0
+    } else {
+        area / PI * (((a - b) * (a + b)).sqrt() + b * (-b / a).acos())
+    }
 }
 
 /// A meeting as a hit.

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{self, AxialFrame, Line, Stretch, at_turn, exact_t, radial, turn};
+use super::axial::{self, AxialFrame, Line, Stretch, across, at_turn, exact_t, radial, ring_shown, turn};
 use super::disk::{BORDER, Disk};
-use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// A cone with a round base, or its bare side; the front is outside. Parts: 0 the side, 1 the cap at the base.
@@ -115,20 +115,30 @@ impl Cone {
         [PI * self.radius * self.slant, cap]
     }
 
+    /// A point of a part, uniform over its area.
+    pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
+        match part {
+            0 => {
+                let (point, normal) = self.side(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
+                AreaPoint { point, normal }
+            }
+            _ => self.base().place(0, u),
+        }
+    }
+
     /// Centre of area.
-    pub fn center(&self) -> DVec3 {
+    pub fn middle(&self) -> DVec3 {
         let [side, cap] = self.areas();
         self.frame.point(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
     }
 
-    /// Unit vector from the tip to the base.
-    pub fn axis(&self) -> DVec3 {
-        self.frame.axis()
-    }
-
-    /// Cosine and sine of the side's slope: of its normals, what is across the axis, and what is towards the tip.
-    pub fn slope(&self) -> (f64, f64) {
-        (self.height / self.slant, self.radius / self.slant)
+    /// The area that faces a unit direction, times the cosines.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        let along = self.frame.axis().dot(direction);
+        let [side, cap] = self.areas();
+        // Of the side's normals, what is across the axis, and what is towards the tip.
+        let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
+        ring_shown(side, cosine * across(along), -sine * along) + cap * along.max(0.0)
     }
 
     /// Whether a point is inside.

@@ -2,7 +2,7 @@
 
 use super::rows::{Ends, HitRows, RayRows, accept};
 use super::surface::flat_axes;
-use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec3, Vec2};
 
@@ -125,6 +125,36 @@ impl Cuboid {
             self.axes * (u * self.half * 2.0),
             self.axes * (v * self.half * 2.0),
         )
+    }
+
+    /// Areas of the faces.
+    pub fn areas(&self) -> [f64; 6] {
+        let [x, y, z] = (self.half * 2.0).to_array();
+        [y * z, y * z, x * z, x * z, x * y, x * y]
+    }
+
+    /// A point of a face, uniform over its area.
+    pub fn place(&self, face: u32, u: Vec2) -> AreaPoint {
+        let (corner, a, b) = self.face(face);
+        let point = corner + a * f64::from(u.x) + b * f64::from(u.y);
+        AreaPoint { point, normal: self.axes * face_normal(face).1 }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Whether a point is inside.
+    pub fn contains(&self, point: DVec3) -> bool {
+        (self.axes.transpose() * (point - self.center)).abs().cmplt(self.half).all()
+    }
+
+    /// The area that faces a unit direction, times the cosines.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        let along = (self.axes.transpose() * direction).abs();
+        let [x, _, y, _, z, _] = self.areas();
+        DVec3::new(x, y, z).dot(along)
     }
 }
 

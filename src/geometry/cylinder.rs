@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{self, AxialFrame, Line, Stretch, at_turn, exact_t, radial, turn};
+use super::axial::{self, AxialFrame, Line, Stretch, across, at_turn, exact_t, radial, ring_shown, turn};
 use super::disk::{BORDER, Disk};
-use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
 /// A round bar between two end points, or the bare tube; the front is outside. Parts: 0 the side, 1 the cap at the
@@ -102,14 +102,27 @@ impl Cylinder {
         [TAU * self.radius * 2.0 * self.half_length, cap, cap]
     }
 
-    /// The middle of its axis.
-    pub fn center(&self) -> DVec3 {
+    /// A point of a part, uniform over its area.
+    pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
+        match part {
+            0 => {
+                let (point, normal) = self.side(f64::from(u.x), f64::from(u.y));
+                AreaPoint { point, normal }
+            }
+            cap => self.cap(cap).place(0, u),
+        }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
         self.frame.origin
     }
 
-    /// Unit vector from the first end to the second.
-    pub fn axis(&self) -> DVec3 {
-        self.frame.axis()
+    /// The area that faces a unit direction, times the cosines.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        let along = self.frame.axis().dot(direction);
+        let [side, cap, _] = self.areas();
+        ring_shown(side, across(along), 0.0) + cap * along.abs()
     }
 
     /// Whether a point is inside.

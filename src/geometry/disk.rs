@@ -4,8 +4,9 @@ use std::f64::consts::PI;
 
 use super::axial::{AxialFrame, exact_t, hit};
 use super::rows::{Ends, HitRows, RayRows, accept};
-use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
-use crate::math::{DVec2, DVec3};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use crate::math::{DVec2, DVec3, Vec2};
+use crate::sampling::warp;
 
 /// Room given to a border in units of the size, so that two pieces which share it leave no gap; far below what an `f32`
 /// ray can tell apart.
@@ -77,8 +78,8 @@ impl Disk {
         self.frame.point((of_unit_disk * self.radius).extend(0.0))
     }
 
-    /// Centre.
-    pub fn center(&self) -> DVec3 {
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
         self.frame.origin
     }
 
@@ -87,9 +88,25 @@ impl Disk {
         self.frame.axis()
     }
 
-    /// Area.
-    pub fn area(&self) -> f64 {
-        PI * self.radius * self.radius
+    /// Area of its one part.
+    pub fn areas(&self) -> [f64; 1] {
+        [PI * self.radius * self.radius]
+    }
+
+    /// A point of the surface, uniform over the area.
+    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+        AreaPoint { point: self.point(warp::disk(u).as_dvec2()), normal: self.normal() }
+    }
+
+    /// Whether a point is inside, where nothing is.
+    pub fn contains(&self, _: DVec3) -> bool {
+        false
+    }
+
+    /// The area that faces a unit direction, times the cosine.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        let [area] = self.areas();
+        area * self.normal().dot(direction).max(0.0)
     }
 
     /// The box around it.

@@ -22,4 +22,285 @@ pub mod watertight;
 
 pub use aabb::Aabb;
 pub use ray::{Ray, RayF64};
-pub use surface::{ShapeHit, SurfacePoint};
+pub use surface::{AreaPoint, ShapeHit, SurfacePoint};
+
+use crate::math::{DVec3, Vec2, Vec3};
+use cone::Cone;
+use cuboid::Cuboid;
+use cylinder::Cylinder;
+use disk::Disk;
+use parallelogram::Parallelogram;
+use plane::Plane;
+use rows::{Ends, HitRows, RayRows};
+use sphere::Sphere;
+use torus::Torus;
+use triangle::Triangle;
+
+/// A shape that is computed from its numbers alone, in world coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A sphere.
+    Sphere(Sphere),
+    /// A parallelogram.
+    Quad(Parallelogram),
+    /// An infinite plane.
+    Plane(Plane),
+    /// An oriented box.
+    Box(Cuboid),
+    /// A single triangle.
+    Triangle(Triangle),
+    /// A disk.
+    Disk(Disk),
+    /// A cylinder.
+    Cylinder(Cylinder),
+    /// A cone.
+    Cone(Cone),
+    /// A torus.
+    Torus(Torus),
+}
+
+/// The same asked of a shape of any kind.
+macro_rules! of_any {
+    ($shape:expr, $it:ident => $asked:expr) => {
+        match $shape {
+            Shape::Sphere($it) => $asked,
+            Shape::Quad($it) => $asked,
+            Shape::Plane($it) => $asked,
+            Shape::Box($it) => $asked,
+            Shape::Triangle($it) => $asked,
+            Shape::Disk($it) => $asked,
+            Shape::Cylinder($it) => $asked,
+            Shape::Cone($it) => $asked,
+            Shape::Torus($it) => $asked,
+        }
+    };
+}
+
+impl Shape {
+    /// The nearest hit.
+    pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
+        of_any!(self, it => it.intersect(ray))
+    }
+
+    /// The nearest hits of the rays in `met`, side by side where the shape has a loop for that; the others end below 0. `found`
+    /// holds none before.
+    #[inline(always)]
+    pub fn intersect_rows(&self, rays: &[Ray], rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+        match self {
+            Self::Plane(plane) => plane.intersect_rows(rows, ends, found),
+            Self::Quad(quad) => quad.intersect_rows(rows, ends, found),
+            Self::Sphere(sphere) => sphere.intersect_rows(rows, ends, found),
+            Self::Box(cuboid) => cuboid.intersect_rows(rows, ends, found),
+            Self::Triangle(triangle) => triangle.intersect_rows(rows, ends, found),
+            Self::Disk(disk) => disk.intersect_rows(rows, ends, found),
+            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => self.one_by_one(rays, met, ends, found),
+        }
+    }
+
+    #[inline(never)]
+    fn one_by_one(&self, rays: &[Ray], met: u32, ends: &Ends, found: &mut HitRows) {
+        for lane in rows::lanes(met) {
+            if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays[lane] }.to_f64()) {
+                found.put(lane, &hit);
+            }
+        }
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        of_any!(self, it => it.surface(ray, hit))
+    }
+
+    /// The box around it; none where it has no end.
+    pub fn bounds(&self) -> Option<Aabb> {
+        match self {
+            Self::Sphere(sphere) => Some(sphere.bounds()),
+            Self::Quad(quad) => Some(quad.bounds()),
+            Self::Plane(_) => None,
+            Self::Box(cuboid) => Some(cuboid.bounds()),
+            Self::Triangle(triangle) => Some(triangle.bounds()),
+            Self::Disk(disk) => Some(disk.bounds()),
+            Self::Cylinder(cylinder) => Some(cylinder.bounds()),
+            Self::Cone(cone) => Some(cone.bounds()),
+            Self::Torus(torus) => Some(torus.bounds()),
+        }
+    }
+
+    /// Triangles that it is made of.
+    pub fn triangle_count(&self) -> u64 {
+        match self {
+            Self::Triangle(_) => 1,
+            Self::Sphere(_)
+            | Self::Quad(_)
+            | Self::Plane(_)
+            | Self::Box(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_) => 0,
+        }
+    }
+
+    /// Areas of its parts, by the numbers that hits give them; none where it has no end.
+    pub fn areas(&self) -> Vec<f64> {
+        of_any!(self, it => it.areas().to_vec())
+    }
+
+    /// A point of a part, uniform over its area for uniform `u` in [0, 1)².
+    pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
+        of_any!(self, it => it.place(part, u))
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        of_any!(self, it => it.middle())
+    }
+
+    /// Whether a point is inside.
+    pub fn contains(&self, point: DVec3) -> bool {
+        of_any!(self, it => it.contains(point))
+    }
+
+    /// The area whose front faces a unit direction, times the cosines; of a torus the mean over all directions.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        of_any!(self, it => it.shown(direction))
+    }
+
+    /// Where the shape may hide parts of itself from outside, a bound on the error of a point of its surface; none where no ray
+    /// to a point that faces it meets another one before.
+    pub fn concave_error(&self, point: Vec3) -> Option<Vec3> {
+        match self {
+            Self::Torus(torus) => Some(torus.error(point)),
+            Self::Sphere(_)
+            | Self::Quad(_)
+            | Self::Plane(_)
+            | Self::Box(_)
+            | Self::Triangle(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shapes() -> [Shape; 11] {
+        let (p, q) = (DVec3::new(0.3, -0.2, 0.1), DVec3::new(1.0, 0.5, -0.4));
+        [
+            Shape::Sphere(Sphere { center: p, radius: 0.7 }),
+            Shape::Quad(Parallelogram::new(p, DVec3::X, q)),
+            Shape::Box(Cuboid::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
+            Shape::Triangle(Triangle { a: p, b: q, c: DVec3::Y }),
+            Shape::Disk(Disk::new(p, q, 0.6)),
+            Shape::Cylinder(Cylinder::new(p, q, 0.5, true)),
+            Shape::Cylinder(Cylinder::new(p, q, 0.5, false)),
+            Shape::Cone(Cone::new(p, q, 0.4, true)),
+            Shape::Cone(Cone::new(p, q, 0.4, false)),
+            Shape::Torus(Torus::new(p, q, 1.0, 0.4)),
+            Shape::Plane(Plane::new(p, q)),
+        ]
+    }
+
+    const SIDE: u32 = 400;
+
+    /// The sum over the area of what is asked of its points.
+    fn integral(shape: &Shape, asked: impl Fn(&AreaPoint) -> f64) -> f64 {
+        let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
+        let over_part = |(part, area): (u32, f64)| {
+            let sum: f64 = (0..SIDE * SIDE).map(|i| asked(&shape.place(part, grid(i)))).sum();
+            sum * area / f64::from(SIDE * SIDE)
+        };
+        (0..).zip(shape.areas()).map(over_part).sum()
+    }
+
+    /// Hits of rays towards the shape from a sphere around it.
+    fn hits(shape: &Shape) -> impl Iterator<Item = (RayF64, ShapeHit)> + '_ {
+        (0..4000).filter_map(move |i| {
+            let around = Shape::Sphere(Sphere { center: shape.middle(), radius: 5.0 });
+            let u = |i: u32| Vec2::new(i as f32 * 0.618_034 % 1.0, i as f32 * 0.754_877_7 % 1.0);
+            let from = around.place(0, u(i)).point;
+            let near = Shape::Sphere(Sphere { center: shape.middle(), radius: 0.8 });
+            let to = near.place(0, u(3 * i + 7)).point;
+            let ray = Ray::new(from.as_vec3(), (to - from).as_vec3()).to_f64();
+            shape.intersect(&ray).map(|hit| (ray, hit))
+        })
+    }
+
+    #[test]
+    fn points_of_a_part_lie_where_rays_find_it_and_face_as_it_does() {
+        for shape in shapes() {
+            for (part, _) in (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0) {
+                for i in 0..200_u32 {
+                    let u = Vec2::new((i as f32 + 0.5) * 0.618_034 % 1.0, (i as f32 + 0.5) / 200.0);
+                    let place = shape.place(part, u);
+                    assert!((place.normal.length() - 1.0).abs() < 1e-9, "{shape:?}");
+                    let from = place.point + place.normal * 0.01;
+                    let ray = Ray::new(from.as_vec3(), -place.normal.as_vec3()).to_f64();
+                    let hit = shape.intersect(&ray).unwrap_or_else(|| panic!("{shape:?} {part} {u}"));
+                    assert!((hit.t - 0.01).abs() < 1e-5, "{shape:?} {part} {u}: {hit:?}");
+                    assert_eq!(hit.primitive, part, "{shape:?} {u}");
+                    let normal = shape.surface(&ray, &hit).normal.as_dvec3();
+                    assert!((normal - place.normal).length() < 1e-4, "{shape:?} {u}: {normal}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_shape_shows_is_the_integral_of_the_cosines() {
+        for shape in shapes().into_iter().filter(|shape| !shape.areas().is_empty()) {
+            let directions = [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, 0.5, 0.8).normalize()];
+            let shown = |direction: DVec3| integral(&shape, |place| place.normal.dot(direction).max(0.0));
+            let area: f64 = shape.areas().iter().sum();
+            for direction in directions {
+                match shape.concave_error(Vec3::ZERO) {
+                    None => {
+                        let off = shape.shown(direction) - shown(direction);
+                        assert!(off.abs() < 2e-3 * area, "{shape:?}: {off}");
+                    }
+                    // The mean over the directions of a closed surface (Cauchy).
+                    Some(_) => assert_eq!(shape.shown(direction), area / 4.0),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_middle_is_the_mean_of_the_points() {
+        for shape in shapes().into_iter().filter(|shape| !shape.areas().is_empty()) {
+            let area: f64 = shape.areas().iter().sum();
+            for axis in 0..3 {
+                let mean = integral(&shape, |place| place.point[axis]) / area;
+                assert!((mean - shape.middle()[axis]).abs() < 2e-3, "{shape:?}: {mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_goes_in_where_it_meets_a_front_and_out_where_it_meets_a_back() {
+        for shape in shapes() {
+            let mut seen = 0;
+            // A bare side has an inside as well, which it does not close.
+            let is_closed = match shape {
+                Shape::Sphere(_) | Shape::Box(_) | Shape::Torus(_) => true,
+                Shape::Cylinder(_) | Shape::Cone(_) => shape.areas().iter().all(|&area| area > 0.0),
+                Shape::Quad(_) | Shape::Plane(_) | Shape::Triangle(_) | Shape::Disk(_) => false,
+            };
+            for (ray, hit) in hits(&shape) {
+                let surface = shape.surface(&ray, &hit);
+                let behind = surface.point.as_dvec3() - surface.normal.as_dvec3() * 1e-3;
+                let before = surface.point.as_dvec3() + surface.normal.as_dvec3() * 1e-3;
+                assert!(!shape.contains(before) || !is_closed, "{shape:?}");
+                seen += u32::from(shape.contains(behind));
+            }
+            assert_eq!(
+                seen > 100,
+                is_closed || matches!(shape, Shape::Cylinder(_) | Shape::Cone(_)),
+                "{shape:?}"
+            );
+        }
+    }
+}

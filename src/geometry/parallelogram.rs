@@ -1,7 +1,7 @@
 //! Quads: squares and any other parallelograms, in double precision.
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
-use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
 /// Room given to a quad's border in units of its edges, so that two quads which share an edge leave no gap between
@@ -92,6 +92,32 @@ impl Parallelogram {
     /// Area.
     pub fn area(&self) -> f64 {
         self.normal.length()
+    }
+
+    /// Area of its one part.
+    pub fn areas(&self) -> [f64; 1] {
+        [self.normal.length()]
+    }
+
+    /// A point of the surface, uniform over the area.
+    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+        let point = self.corner + self.u * f64::from(u.x) + self.v * f64::from(u.y);
+        AreaPoint { point, normal: self.normal.normalize() }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.corner + (self.u + self.v) * 0.5
+    }
+
+    /// Whether a point is inside, where nothing is.
+    pub fn contains(&self, _: DVec3) -> bool {
+        false
+    }
+
+    /// The area that faces a unit direction, times the cosine.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        self.normal.dot(direction).max(0.0)
     }
 }
 

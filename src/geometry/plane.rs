@@ -2,7 +2,7 @@
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface::flat_axes;
-use super::{RayF64, ShapeHit, SurfacePoint};
+use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
 /// All points p with (p − point)·normal = 0.
@@ -57,6 +57,31 @@ impl Plane {
         let point = self.point + self.u * s + self.v * t;
         let reach = self.point.abs().max_element() + s.abs() + t.abs();
         SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v, reach)
+    }
+
+    /// It has no part with an area.
+    pub fn areas(&self) -> [f64; 0] {
+        []
+    }
+
+    /// The point that it was made from: none of it is as likely as any other.
+    pub fn place(&self, _: u32, _: Vec2) -> AreaPoint {
+        AreaPoint { point: self.point, normal: self.normal }
+    }
+
+    /// The point that it was made from.
+    pub fn middle(&self) -> DVec3 {
+        self.point
+    }
+
+    /// Whether a point is inside, where nothing is.
+    pub fn contains(&self, _: DVec3) -> bool {
+        false
+    }
+
+    /// The area that faces a unit direction, times the cosine.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }
 }
 

@@ -13,6 +13,17 @@ pub type Row = [f32; PACKET];
 /// Where each ray of a packet ends, in place of its own `t_max`; below 0 where there is none, or where it is not traced.
 pub type Ends = Row;
 
+/// Lanes whose bits are set.
+pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            lane
+        })
+    })
+}
+
 /// The rays of a packet; lanes without a ray are all 0, and have no end.
 #[derive(Clone, Debug)]
 pub struct RayRows {

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
-use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
 /// All points at one distance from a centre; the front is outside.
@@ -85,9 +85,34 @@ impl Sphere {
         Aabb::around_f64([self.center - DVec3::splat(self.radius), self.center + DVec3::splat(self.radius)])
     }
 
-    /// Area.
-    pub fn area(&self) -> f64 {
-        4.0 * PI * self.radius * self.radius
+    /// Area of its one part.
+    pub fn areas(&self) -> [f64; 1] {
+        [4.0 * PI * self.radius * self.radius]
+    }
+
+    /// A point of the surface, uniform over the area.
+    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+        let (x, y) = (f64::from(u.x), f64::from(u.y));
+        let height = 1.0 - 2.0 * x;
+        let across = (1.0 - height * height).max(0.0).sqrt();
+        let (sin, cos) = (2.0 * PI * y).sin_cos();
+        let normal = DVec3::new(across * cos, height, across * sin);
+        AreaPoint { point: self.center + normal * self.radius, normal }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Whether a point is inside.
+    pub fn contains(&self, point: DVec3) -> bool {
+        (point - self.center).length() < self.radius
+    }
+
+    /// The area that faces a unit direction, times the cosines: of every direction that of the great circle.
+    pub fn shown(&self, _: DVec3) -> f64 {
+        PI * self.radius * self.radius
     }
 }
 

@@ -45,6 +45,15 @@ pub struct SurfacePoint {
     pub barycentric: Vec3,
 }
 
+/// A point of a surface that light leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AreaPoint {
+    /// The point.
+    pub point: DVec3,
+    /// Unit normal of the front side.
+    pub normal: DVec3,
+}
+
 impl SurfacePoint {
     /// A point computed in double precision on a surface without shading normals. Its error is that of rounding to `f32`
     /// and, where the point is small beside the lengths that it and the next hit are computed from, theirs: `reach`

@@ -1,8 +1,9 @@
 //! Single triangles, in double precision.
 
 use super::rows::{Ends, HitRows, RayRows, accept};
-use super::{Aabb, RayF64, ShapeHit, SurfacePoint};
-use crate::math::{DVec3, Vec2, Vec3};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use crate::math::{DVec3, Vec2};
+use crate::sampling::warp;
 
 /// A triangle; the front is along (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +53,7 @@ impl Triangle {
     }
 
     /// The surface at a hit; its texture coordinates are (0, 0), (1, 0), (0, 1) at the corners.
-    pub fn surface(&self, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface(&self, _: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let (ab, ac) = (self.b - self.a, self.c - self.a);
         let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
@@ -64,15 +65,35 @@ impl Triangle {
         Aabb::around_f64([self.a, self.b, self.c])
     }
 
-    /// Area.
-    pub fn area(&self) -> f64 {
-        0.5 * (self.b - self.a).cross(self.c - self.a).length()
+    /// u × v of its first two edges.
+    fn normal(&self) -> DVec3 {
+        (self.b - self.a).cross(self.c - self.a)
     }
 
-    /// The point with barycentric weights `(1 − u − v, u, v)`.
-    pub fn point(&self, weights: Vec3) -> DVec3 {
-        let w = weights.as_dvec3();
-        self.a * w.x + self.b * w.y + self.c * w.z
+    /// Area of its one part.
+    pub fn areas(&self) -> [f64; 1] {
+        [0.5 * self.normal().length()]
+    }
+
+    /// A point of the surface, uniform over the area.
+    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+        let w = warp::triangle(u).as_dvec3();
+        AreaPoint { point: self.a * w.x + self.b * w.y + self.c * w.z, normal: self.normal().normalize() }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        (self.a + self.b + self.c) / 3.0
+    }
+
+    /// Whether a point is inside, where nothing is.
+    pub fn contains(&self, _: DVec3) -> bool {
+        false
+    }
+
+    /// The area that faces a unit direction, times the cosine.
+    pub fn shown(&self, direction: DVec3) -> f64 {
+        (0.5 * self.normal().dot(direction)).max(0.0)
     }
 }
 
@@ -80,6 +101,7 @@ impl Triangle {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
+    use crate::math::Vec3;
 
     #[test]
     fn barycentrics_of_an_aimed_ray_from_both_sides() {
@@ -88,7 +110,7 @@ mod tests {
             b: DVec3::new(2.0, 0.0, 1.0),
             c: DVec3::new(0.0, 3.0, -1.0),
         };
-        let target = triangle.point(Vec3::new(0.5, 0.2, 0.3)).as_vec3();
+        let target = (triangle.a * 0.5 + triangle.b * 0.2 + triangle.c * 0.3).as_vec3();
         for z in [-5.0_f32, 5.0] {
             let origin = Vec3::new(0.3, 0.4, z);
             let hit = triangle.intersect(&Ray::new(origin, target - origin).to_f64()).expect("aimed inside");

@@ -1,4 +1,8 @@
-//! Which glass a ray is in.
+//! Which glass a ray is in, and what that does to it.
+
+use crate::materials::Glass;
+use crate::math::Vec3;
+use crate::world::World;
 
 /// A glass that a ray is in: the parts of one object may be of several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,6 +48,25 @@ impl Medium {
         self.inside[usize::from(self.count)] = Inside::default();
         Some(self)
     }
+}
+
+/// What glass leaves of radiance along a ray to its hit at `distance`: the innermost glass that it is in, or, for a ray that
+/// started inside without knowing, the glass whose back it hits.
+pub fn absorption(world: &World, medium: Medium, back_of: Option<&Glass>, distance: f32) -> Vec3 {
+    let glass = match medium.innermost() {
+        Some(inside) => glass_of(world, inside),
+        None => back_of,
+    };
+    glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
+}
+
+/// Index of refraction of what a ray is in.
+pub fn ior(world: &World, medium: Medium) -> f32 {
+    medium.innermost().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
+}
+
+fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
+    world.materials[inside.material as usize].bsdf.glass()
 }
 
 #[cfg(test)]

@@ -1,65 +1,45 @@
 //! Pictures of numbers at the first hit. Their values are meant as display values in [0, 1], not as radiance.
 
-use super::batch::{Queues, Tracer};
-use super::whitted::closest_hits;
-use super::{RayCounters, View};
+use super::queues::Queues;
+use super::shot::Shot;
+use super::vertices::Vertex;
+use super::{FirstHit, RayCounters};
 use crate::control::Cancelled;
 use crate::geometry::SurfacePoint;
-use crate::materials::Material;
 use crate::math::{Vec2, Vec3};
 
 /// Show what each camera ray in the queue hits; black where nothing.
 pub fn shade(
-    tracer: &Tracer<'_>,
+    shot: &Shot<'_>,
+    number: FirstHit,
     queues: &mut Queues,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
-    closest_hits(tracer, queues)?;
+    shot.closest_hits(&queues.rays, &mut queues.hits)?;
     for (path, hit) in queues.rays.iter().zip(&queues.hits) {
         let Some(hit) = hit else { continue };
-        let surface = tracer.world.geometry.surface(&path.ray, hit);
-        let material = &tracer.world.materials[tracer.world.material_index(hit)];
-        let value = match tracer.settings.view {
-            View::Normal => (normal(&surface, material, counters) + Vec3::ONE) * 0.5,
-            View::Depth => Vec3::splat(nearness(tracer, &surface)),
-            View::Barycentric => surface.barycentric,
-            View::Uv => fraction(surface.uv).extend(0.0),
-            _ => albedo(material, surface.uv, counters),
+        let vertex = Vertex::new(shot, path, hit);
+        let surface = &vertex.surface;
+        let value = match number {
+            FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
+            FirstHit::Depth => Vec3::splat(nearness(shot, surface)),
+            FirstHit::Barycentric => surface.barycentric,
+            FirstHit::Uv => fraction(surface.uv).extend(0.0),
+            FirstHit::Albedo => vertex.material.bsdf.albedo(surface.uv, &mut counters.texture_lookups),
         };
         radiance[path.slot as usize] = value * path.throughput;
     }
     Ok(())
 }
 
-fn normal(surface: &SurfacePoint, material: &Material, counters: &mut RayCounters) -> Vec3 {
-    match material {
-        Material::Phong(phong) if phong.normal_map.is_some() => {
-            counters.texture_lookups += 1;
-            let bent = phong.normal_map.as_ref();
-            bent.map_or(surface.shading_normal, |map| {
-                map.bend(surface.uv, surface.shading_normal, surface.dpdu, surface.dpdv)
-            })
-        }
-        _ => surface.shading_normal,
-    }
-}
-
 /// 1 at the eye, ½ at the distance in focus, towards 0 far away.
-fn nearness(tracer: &Tracer<'_>, surface: &SurfacePoint) -> f32 {
-    let camera = &tracer.world.camera;
+fn nearness(shot: &Shot<'_>, surface: &SurfacePoint) -> f32 {
+    let camera = &shot.world.camera;
     let depth = camera.depth_of(surface.point.as_dvec3()).max(0.0);
     (camera.focus / (camera.focus + depth)) as f32
 }
 
 fn fraction(uv: Vec2) -> Vec2 {
     uv - uv.floor()
-}
-
-fn albedo(material: &Material, uv: Vec2, counters: &mut RayCounters) -> Vec3 {
-    match material {
-        Material::Phong(phong) => phong.diffuse.at(uv, &mut counters.texture_lookups),
-        Material::Mirror(mirror) => mirror.reflectance,
-        Material::Glass(glass) => glass.tint,
-    }
 }

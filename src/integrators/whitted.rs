@@ -1,182 +1,139 @@
 //! Direct light by Phong, mirror, glass and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*,
 //! 1980), over queues instead of recursion.
 
-use super::batch::{PathRay, Queues, ShadowQueue, Tracer};
-use super::direct::{self, PhongVertex};
-use super::medium::Inside;
-use super::{POLL_INTERVAL, RayCounters, View, glass};
+use super::RayCounters;
+use super::light::DirectLight;
+use super::medium::absorption;
+use super::queues::{PathRay, Queues};
+use super::shot::Shot;
+use super::sink::{Part, Sink};
+use super::specular::{Interface, interface, reflected};
+use super::vertices::{LitVertex, Vertex};
 use crate::control::Cancelled;
-use crate::geometry::ray::offset_origin;
-use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::LightSamples;
-use crate::materials::mirror::reflect;
-use crate::materials::{Material, Mirror, Phong};
+use crate::materials::{Bsdf, Glass, Mirror, Phong};
 use crate::math::Vec3;
-use crate::scene::description::Shadows;
-use crate::world::{Hit, PACKET};
+use crate::sampling::Decision;
+use crate::world::Hit;
 
-/// Follow the camera rays in the queue to the end and add what they see to their samples: to `radiance` what nothing can stop, to
-/// `arrived` what shadow rays bring. Each is added up in the order of the paths, whenever the shadow rays are traced.
+/// A ray is split in two while the weaker part counts at least this much of its sample; below, chance takes one of them.
+const LEAST_SPLIT: f32 = 0.01;
+
+/// Follow the camera rays in the queue to the end; the sink takes what they see.
 pub fn trace(
-    tracer: &Tracer<'_>,
+    shot: &Shot<'_>,
     queues: &mut Queues,
-    radiance: &mut [Vec3],
-    arrived: &mut [Vec3],
+    sink: Sink<'_>,
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {
-    let mut depth = 0;
-    while !queues.rays.is_empty() {
-        closest_hits(tracer, queues)?;
-        queues.next.clear();
-        let Queues { rays, next, shadows, hits, samples } = queues;
-        shadows.clear();
-        let mut wave = Wave { tracer, depth, next, shadows, samples, radiance, counters };
+    let Queues { rays, next, shadows, samples, hits } = queues;
+    shadows.clear();
+    next.clear();
+    let mut wave = Wave { depth: 0, light: DirectLight { shot, shadows, samples, sink }, next, counters };
+    while !rays.is_empty() {
+        shot.closest_hits(rays, hits)?;
         for (path, hit) in rays.iter().zip(hits.iter()) {
             match hit {
                 Some(hit) => wave.shade(*path, hit),
                 None => wave.leave(path),
             }
-            if wave.shadows.is_full() {
-                wave.trace_shadows(arrived)?;
+            if wave.light.shadows.is_full() {
+                wave.trace_shadows()?;
             }
         }
-        wave.trace_shadows(arrived)?;
-        std::mem::swap(rays, next);
-        depth += 1;
-    }
-    Ok(())
-}
-
-/// The nearest hit of every ray in the queue.
-pub fn closest_hits(tracer: &Tracer<'_>, queues: &mut Queues) -> Result<(), Cancelled> {
-    queues.hits.clear();
-    queues.hits.resize(queues.rays.len(), None);
-    for (paths, hits) in queues.rays.chunks(POLL_INTERVAL).zip(queues.hits.chunks_mut(POLL_INTERVAL)) {
-        tracer.token.check()?;
-        for (paths, hits) in paths.chunks(PACKET).zip(hits.chunks_mut(PACKET)) {
-            let rays: [Ray; PACKET] = std::array::from_fn(|lane| paths[lane.min(paths.len() - 1)].ray);
-            tracer.world.geometry.closest_packet(&rays[..paths.len()], hits);
-        }
+        wave.trace_shadows()?;
+        std::mem::swap(rays, wave.next);
+        wave.next.clear();
+        wave.depth += 1;
     }
     Ok(())
 }
 
 /// One round of all rays of a batch.
-pub(super) struct Wave<'a> {
-    pub(super) tracer: &'a Tracer<'a>,
+struct Wave<'a, 's> {
     /// Scatterings before the hits of this round.
-    pub(super) depth: u32,
-    pub(super) next: &'a mut Vec<PathRay>,
-    pub(super) shadows: &'a mut ShadowQueue,
-    pub(super) samples: &'a mut Vec<LightSamples>,
-    pub(super) radiance: &'a mut [Vec3],
-    pub(super) counters: &'a mut RayCounters,
+    depth: u32,
+    light: DirectLight<'a, 's>,
+    /// Rays of the next round.
+    next: &'a mut Vec<PathRay>,
+    counters: &'a mut RayCounters,
 }
 
-impl Wave<'_> {
-    fn add(&mut self, slot: u32, radiance: Vec3) {
-        self.radiance[slot as usize] += radiance;
-    }
-
-    /// Add what arrives by the shadow rays in the queue, in their order, and empty it.
-    fn trace_shadows(&mut self, arrived: &mut [Vec3]) -> Result<(), Cancelled> {
-        let is_traced = self.tracer.settings.shadows != Shadows::Off;
-        let ShadowQueue { rays, sources, arrivals } = &*self.shadows;
-        let packets = rays.chunks(PACKET).zip(sources.chunks(PACKET)).zip(arrivals.chunks(PACKET));
-        for (number, ((rays, sources), arrivals)) in packets.enumerate() {
-            if number.is_multiple_of(POLL_INTERVAL / PACKET) {
-                self.tracer.token.check()?;
-            }
-            let geometry = &self.tracer.world.geometry;
-            let occluded = if is_traced { geometry.occluded_packet(rays, sources) } else { 0 };
-            for (lane, arrival) in arrivals.iter().enumerate() {
-                if occluded & 1 << lane == 0 {
-                    arrived[arrival.slot as usize] += arrival.contribution;
-                }
-            }
-        }
-        self.counters.shadow_rays += self.shadows.len() as u64;
-        self.shadows.clear();
+impl Wave<'_, '_> {
+    fn trace_shadows(&mut self) -> Result<(), Cancelled> {
+        let DirectLight { shot, shadows, sink, .. } = &mut self.light;
+        self.counters.shadow_rays += shot.trace_shadows(shadows, sink)?;
         Ok(())
     }
 
-    /// Whether one more scattering is allowed.
-    pub(super) fn may_scatter(&self) -> bool {
-        self.depth < self.tracer.settings.max_depth
-    }
-
     fn leave(&mut self, path: &PathRay) {
-        if self.tracer.settings.view == View::Beauty {
-            self.add(path.slot, path.throughput * self.tracer.world.background);
-        }
+        let background = self.light.shot.settings.render.background;
+        self.light.sink.add(path.slot, Part::Emitted, path.throughput * background);
     }
 
     fn shade(&mut self, mut path: PathRay, hit: &Hit) {
-        let world = self.tracer.world;
-        let surface = world.geometry.surface(&path.ray, hit);
-        let index = world.material_index(hit);
-        let material = &world.materials[index];
-        path.throughput *= glass::absorption(world, &path, hit.shape.t, &surface, material);
-        let emission = material.emission();
-        let front = surface.normal.dot(path.ray.direction) < 0.0;
-        if emission != Vec3::ZERO && front && self.tracer.settings.view == View::Beauty {
-            self.add(path.slot, path.throughput * emission);
+        let shot = self.light.shot;
+        let vertex = Vertex::new(shot, &path, hit);
+        let is_back = vertex.surface.normal.dot(path.ray.direction) > 0.0;
+        let back_of = vertex.material.bsdf.glass().filter(|_| is_back);
+        path.throughput *= absorption(shot.world, path.medium, back_of, hit.shape.t);
+        let emission = vertex.material.emission;
+        if emission != Vec3::ZERO && vertex.is_front {
+            self.light.sink.add(path.slot, Part::Emitted, path.throughput * emission);
         }
-        if !self.may_scatter() {
+        if self.depth >= shot.settings.render.max_depth {
             return;
         }
-        match material {
-            Material::Phong(phong) => self.shade_phong(&path, &surface, phong),
-            Material::Mirror(mirror) => self.shade_mirror(&path, &surface, mirror),
-            Material::Glass(glass) => {
-                let part = Inside { object: hit.object, material: index as u32 };
-                self.shade_glass(&path, part, &surface, glass);
-            }
+        match &vertex.material.bsdf {
+            Bsdf::Phong(phong) => self.shade_phong(&path, &vertex, phong),
+            Bsdf::Mirror(mirror) => self.shade_mirror(&path, &vertex, mirror),
+            Bsdf::Glass(glass) => self.shade_glass(&path, &vertex, glass),
         }
     }
 
-    fn shade_phong(&mut self, path: &PathRay, surface: &SurfacePoint, phong: &Phong) {
-        let bsdf = phong.at(surface.uv, &mut self.counters.texture_lookups);
-        let view = self.tracer.settings.view;
-        let ambient = self.tracer.world.ambient;
-        if ambient != Vec3::ZERO && matches!(view, View::Beauty | View::Ambient) {
-            self.add(path.slot, path.throughput * ambient * bsdf.ambient);
+    fn shade_phong(&mut self, path: &PathRay, vertex: &Vertex<'_>, phong: &Phong) {
+        let bsdf = phong.at(vertex.surface.uv, &mut self.counters.texture_lookups);
+        let ambient = self.light.shot.settings.render.ambient;
+        if ambient != Vec3::ZERO {
+            self.light.sink.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);
         }
-        if view == View::Ambient || bsdf.is_black() {
+        if bsdf.is_black() || !self.light.sink.takes_reflected() {
             return;
         }
-        let mut shading_normal = surface.shading_normal;
-        if let Some(map) = &phong.normal_map {
-            self.counters.texture_lookups += 1;
-            shading_normal = map.bend(surface.uv, shading_normal, surface.dpdu, surface.dpdv);
-        }
-        let vertex = PhongVertex::new(path, surface, shading_normal, bsdf);
-        direct::light(self, &vertex);
+        let shading = vertex.shading(self.counters);
+        self.light.shade(&LitVertex { path, vertex, shading, bsdf });
     }
 
-    fn shade_mirror(&mut self, path: &PathRay, surface: &SurfacePoint, mirror: &Mirror) {
+    fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
+        let shading = vertex.shading(self.counters);
         self.counters.reflected_rays += 1;
-        self.next.push(reflected(path, surface, mirror.reflectance));
+        self.next.push(reflected(path, vertex, &shading, mirror.reflectance));
     }
-}
 
-/// The mirrored ray; a shading normal that sends it below the surface gives way to the geometric one.
-pub(super) fn reflected(path: &PathRay, surface: &SurfacePoint, reflectance: Vec3) -> PathRay {
-    let incident = path.ray.direction;
-    let side = -incident.dot(surface.normal);
-    let mut direction = reflect(incident, surface.shading_normal);
-    if !(direction.dot(surface.normal) * side > 0.0) {
-        direction = reflect(incident, surface.normal);
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, glass: &Glass) {
+        let shading = vertex.shading(self.counters);
+        let Interface { reflectance, refracted } =
+            interface(self.light.shot.world, path, vertex, &shading, glass);
+        let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
+        let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
+        let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
+        if weaker >= LEAST_SPLIT {
+            self.push_reflected(mirrored(reflectance));
+            self.push_refracted(refracted, 1.0 - reflectance);
+        } else if self.light.shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
+            self.push_reflected(mirrored(1.0));
+        } else {
+            self.push_refracted(refracted, 1.0);
+        }
     }
-    PathRay {
-        ray: leaving(surface, direction.normalize()),
-        throughput: path.throughput * reflectance,
-        path: path.next_path(1),
-        ..*path
-    }
-}
 
-/// A ray that starts at a surface.
-pub(super) fn leaving(surface: &SurfacePoint, direction: Vec3) -> Ray {
-    Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction)
+    fn push_reflected(&mut self, ray: PathRay) {
+        self.counters.reflected_rays += 1;
+        self.next.push(ray);
+    }
+
+    fn push_refracted(&mut self, mut ray: PathRay, weight: f32) {
+        self.counters.refracted_rays += 1;
+        ray.throughput *= weight;
+        self.next.push(ray);
+    }
 }

@@ -1,10 +1,12 @@
 //! Shapes that emit.
 
 use super::rectangle::{QuadEmitter, SeenQuad};
-use super::round::RoundEmitter;
 use super::sphere::{SeenSphere, SphereEmitter};
+use super::surface::SurfaceEmitter;
 use super::triangles::TriangleEmitter;
-use super::{LightSample, LightSamples, Source};
+use super::{LightSample, LightSamples, Met, Source};
+use crate::geometry::Shape;
+use crate::geometry::sphere::Sphere;
 use crate::math::Vec3;
 use crate::math::lanes::Lanes;
 
@@ -17,6 +19,19 @@ pub struct AreaLight {
     pub radiance: Vec3,
     /// The object that it is.
     pub object: u32,
+    /// Which part of it.
+    pub part: Part,
+}
+
+/// Which part of an object a light is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// One primitive.
+    Primitive(u32),
+    /// The triangles that the emitter lists.
+    Listed,
 }
 
 /// The shapes that can emit.
@@ -28,8 +43,35 @@ pub enum Emitter {
     Quad(QuadEmitter),
     /// Triangles.
     Triangles(TriangleEmitter),
-    /// A disk, cylinder, cone or torus.
-    Round(RoundEmitter),
+    /// A shape of any other kind.
+    Surface(SurfaceEmitter),
+}
+
+/// The lights that a shape is where all of it shines; none where it has no end.
+pub fn area_lights(shape: &Shape, radiance: Vec3, object: u32) -> Vec<AreaLight> {
+    let light = |part, shape| AreaLight { shape, radiance, object, part };
+    let whole = |shape: Option<Emitter>| shape.map(|shape| light(Part::Whole, shape)).into_iter().collect();
+    match shape {
+        Shape::Sphere(sphere) => {
+            let Sphere { center, radius } = *sphere;
+            whole(Some(Emitter::Sphere(SphereEmitter { center, radius })))
+        }
+        Shape::Quad(quad) => whole(Some(Emitter::Quad(QuadEmitter::new(quad.corner, quad.u, quad.v)))),
+        Shape::Box(cuboid) => {
+            let face = |number| {
+                let (corner, u, v) = cuboid.face(number);
+                light(Part::Primitive(number), Emitter::Quad(QuadEmitter::new(corner, u, v)))
+            };
+            (0..6).map(face).collect()
+        }
+        Shape::Triangle(triangle) => {
+            let corners = [triangle.a, triangle.b, triangle.c];
+            whole(TriangleEmitter::new(vec![(corners, 0)]).map(Emitter::Triangles))
+        }
+        Shape::Plane(_) | Shape::Disk(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => {
+            whole(SurfaceEmitter::new(*shape).map(Emitter::Surface))
+        }
+    }
 }
 
 impl AreaLight {
@@ -39,9 +81,22 @@ impl AreaLight {
             Emitter::Sphere(sphere) => SeenShape::Sphere(sphere.seen_from(point)?),
             Emitter::Quad(quad) => SeenShape::Quad(quad.seen_from(point)?),
             Emitter::Triangles(triangles) => SeenShape::Triangles(triangles, point),
-            Emitter::Round(round) => SeenShape::Round(round, point),
+            Emitter::Surface(surface) => SeenShape::Surface(surface, point),
         };
         Some(SeenLight::Area(self, shape))
+    }
+
+    /// [`Light::pdf`](super::Light::pdf).
+    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        if !(met.normal.dot(met.direction) < 0.0) {
+            return 0.0;
+        }
+        match &self.shape {
+            Emitter::Sphere(sphere) => sphere.pdf(from),
+            Emitter::Quad(quad) => quad.pdf(from, met),
+            Emitter::Triangles(triangles) => met.pdf_by_area(triangles.area()),
+            Emitter::Surface(surface) => met.pdf_by_area(surface.area()),
+        }
     }
 
     /// All of it as if it came from the middle.
@@ -51,7 +106,7 @@ impl AreaLight {
             Emitter::Sphere(sphere) => sphere.middle(point, self.radiance, source),
             Emitter::Quad(quad) => quad.middle(point, self.radiance, source),
             Emitter::Triangles(triangles) => triangles.middle(point, self.radiance, self.object),
-            Emitter::Round(round) => round.middle(point, self.radiance, self.object),
+            Emitter::Surface(surface) => surface.middle(point, self.radiance, self.object),
         }
     }
 }
@@ -74,8 +129,8 @@ pub enum SeenShape<'a> {
     Quad(SeenQuad<'a>),
     /// Triangles, and the point.
     Triangles(&'a TriangleEmitter, Vec3),
-    /// A disk, cylinder, cone or torus, and the point.
-    Round(&'a RoundEmitter, Vec3),
+    /// A shape of any other kind, and the point.
+    Surface(&'a SurfaceEmitter, Vec3),
 }
 
 impl SeenLight<'_> {
@@ -105,7 +160,7 @@ impl AreaLight {
     fn sample(&self, shape: &SeenShape<'_>, u: [f32; 2]) -> Option<LightSamples> {
         let sample = match shape {
             SeenShape::Triangles(triangles, point) => triangles.sample(*point, u, self.radiance, self.object),
-            SeenShape::Round(round, point) => round.sample(*point, u, self.radiance, self.object),
+            SeenShape::Surface(surface, point) => surface.sample(*point, u, self.radiance, self.object),
             SeenShape::Quad(_) | SeenShape::Sphere(_) => None,
         };
         sample.map(LightSamples::from)

@@ -3,15 +3,18 @@
 pub mod emitter;
 pub mod point;
 pub mod rectangle;
-pub mod round;
+mod set;
 pub mod sphere;
+pub mod surface;
 pub mod triangles;
 
-pub use emitter::{AreaLight, SeenLight};
+pub use emitter::{AreaLight, Part, SeenLight, area_lights};
 pub use point::PointLight;
+pub use set::Lights;
 
+use crate::geometry::Ray;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3};
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
 
 /// A light of any kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +28,8 @@ pub enum Light {
 /// One way for light to arrive at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
-    /// Where it comes from, in world coordinates.
-    pub target: Vec3,
+    /// Where it comes from.
+    pub end: End,
     /// Unit direction to there.
     pub direction: Vec3,
     /// Radiance over the density of the direction in sr⁻¹: times f and the cosine it is a contribution. For lights
@@ -36,11 +39,29 @@ pub struct LightSample {
     pub source: Source,
 }
 
+/// Where light comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End {
+    /// A point, in world coordinates.
+    At(Vec3),
+    /// From beyond everything in the scene.
+    Beyond,
+}
+
+/// [`End`]s with a lane for each; all of one light.
+#[derive(Clone, Copy, Debug)]
+pub enum Ends {
+    /// Points, in world coordinates.
+    At(Lanes3),
+    /// From beyond everything in the scene.
+    Beyond,
+}
+
 /// Ways for light to arrive at a point, some at a time: [`LightSample`] with a lane for each.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSamples {
-    /// Where it comes from, in world coordinates.
-    pub targets: Lanes3,
+    /// Where it comes from.
+    pub ends: Ends,
     /// Unit directions to there.
     pub directions: Lanes3,
     /// Radiance, or of lights without extent irradiance at normal incidence.
@@ -53,11 +74,27 @@ pub struct LightSamples {
     pub count: usize,
 }
 
+impl LightSamples {
+    /// The ray from a point on which the light of a lane arrives.
+    #[inline(always)]
+    pub fn ray(&self, from: Vec3, i: usize) -> Ray {
+        match &self.ends {
+            Ends::At(targets) => Ray::segment(from, lane(targets, i)),
+            Ends::Beyond => Ray::new(from, lane(&self.directions, i)),
+        }
+    }
+}
+
 impl From<LightSample> for LightSamples {
     fn from(sample: LightSample) -> Self {
+        let alike = |v: Vec3| v.to_array().map(|x| [x; LANES]);
+        let ends = match sample.end {
+            End::At(target) => Ends::At(alike(target)),
+            End::Beyond => Ends::Beyond,
+        };
         Self {
-            targets: sample.target.to_array().map(|x| [x; LANES]),
-            directions: sample.direction.to_array().map(|x| [x; LANES]),
+            ends,
+            directions: alike(sample.direction),
             radiance: sample.weight,
             factors: [1.0; LANES],
             source: sample.source,
@@ -77,7 +114,35 @@ pub enum Source {
     Primitive(u32, u32),
 }
 
+/// A point of a light, as a ray from elsewhere meets it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    /// Unit direction of the ray.
+    pub direction: Vec3,
+    /// Distance to the point.
+    pub distance: f32,
+    /// Unit normal of the light's front there.
+    pub normal: Vec3,
+}
+
+impl Met {
+    /// Density in sr⁻¹ of directions to points that are uniform over an area; 0 from behind.
+    fn pdf_by_area(&self, area: f64) -> f32 {
+        let cosine = -self.normal.dot(self.direction);
+        if cosine > 0.0 { self.distance * self.distance / (area as f32 * cosine) } else { 0.0 }
+    }
+}
+
 impl Light {
+    /// Density in sr⁻¹ with which its samples for the point `from` come from what a ray from there met; 0 where none does, and
+    /// of a light without extent, which no ray meets.
+    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        match self {
+            Self::Point(_) => 0.0,
+            Self::Area(light) => light.pdf(from, met),
+        }
+    }
+
     /// The light as seen from a point; none where it certainly sends nothing there.
     pub fn seen_from(&self, point: Vec3) -> Option<SeenLight<'_>> {
         match self {
@@ -94,3 +159,6 @@ impl Light {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! Point lights.
 
-use super::{LightSample, Source};
+use super::{End, LightSample, Source};
+use crate::choice;
 use crate::math::{DVec3, Vec3};
 
 /// A light without extent that shines everywhere alike.
@@ -10,8 +11,18 @@ pub struct PointLight {
     pub position: DVec3,
     /// W·sr⁻¹; without fall-off irradiance at normal incidence.
     pub intensity: Vec3,
-    /// Whether it weakens with the square of the distance.
-    pub falls_off: bool,
+    /// How it weakens with distance.
+    pub falloff: Falloff,
+}
+
+choice! {
+    /// How a point light weakens with distance.
+    pub enum Falloff {
+        /// With the square of the distance.
+        Square = "square",
+        /// Not at all.
+        None = "none",
+    }
 }
 
 impl PointLight {
@@ -22,9 +33,12 @@ impl PointLight {
         if distance_squared == 0.0 {
             return None;
         }
-        let weight = if self.falls_off { self.intensity / distance_squared as f32 } else { self.intensity };
+        let weight = match self.falloff {
+            Falloff::Square => self.intensity / distance_squared as f32,
+            Falloff::None => self.intensity,
+        };
         Some(LightSample {
-            target: self.position.as_vec3(),
+            end: End::At(self.position.as_vec3()),
             direction: (to_light / distance_squared.sqrt()).as_vec3(),
             weight,
             source: Source::Nothing,

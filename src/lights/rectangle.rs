@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::{LightSample, LightSamples, Source};
+use super::{End, Ends, LightSample, LightSamples, Met, Source};
 use crate::math::lanes::{LANES, Lanes, Lanes3, dot, lane, map, sin_cos, zip};
 use crate::math::{DVec3, Vec3};
 
@@ -71,11 +71,20 @@ impl QuadEmitter {
         (offset.dot(self.normal) < 0.0).then(|| self.by_area(point, offset, radiance, source))
     }
 
+    /// [`Light::pdf`](super::Light::pdf).
+    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        let Some(seen) = self.seen_from(from) else { return 0.0 };
+        match &seen.spherical {
+            Some(spherical) => 1.0 / spherical.solid_angle,
+            None => met.pdf_by_area(f64::from(self.area)),
+        }
+    }
+
     fn by_area(&self, point: Vec3, offset: Vec3, radiance: Vec3, source: Source) -> LightSample {
         let distance_squared = offset.length_squared();
         let direction = offset / distance_squared.sqrt();
         let solid_angle = self.area * -direction.dot(self.normal) / distance_squared;
-        LightSample { target: point + offset, direction, weight: radiance * solid_angle, source }
+        LightSample { end: End::At(point + offset), direction, weight: radiance * solid_angle, source }
     }
 }
 
@@ -105,7 +114,8 @@ impl SeenQuad<'_> {
         };
         let [x, y, z] = [axis(0), axis(1), axis(2)];
         let (targets, directions) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
-        LightSamples { targets, directions, radiance, factors, source, count: LANES }
+        let ends = Ends::At(targets);
+        LightSamples { ends, directions, radiance, factors, source, count: LANES }
     }
 
     /// Points uniform over the area, from the point that sees them; one over their distances, and the area as solid angle.

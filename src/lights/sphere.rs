@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::{LightSample, LightSamples, Source};
+use super::{End, Ends, LightSample, LightSamples, Source};
 use crate::math::frame::Frame;
 use crate::math::lanes::{LANES, Lanes, map, zip};
 use crate::math::{DVec3, Vec3};
@@ -28,11 +28,16 @@ impl SphereEmitter {
     pub fn middle(&self, point: Vec3, radiance: Vec3, source: Source) -> Option<LightSample> {
         let (direction, _, sin2_max) = self.cone(point)?;
         Some(LightSample {
-            target: self.center.as_vec3(),
+            end: End::At(self.center.as_vec3()),
             direction,
             weight: radiance * (PI * sin2_max),
             source,
         })
+    }
+
+    /// [`Light::pdf`](super::Light::pdf): the same in all directions that meet it.
+    pub fn pdf(&self, from: Vec3) -> f32 {
+        self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos(sin2_max)))
     }
 
     /// Unit direction to the centre, distance, and sin² of the half angle; none from inside.
@@ -60,7 +65,7 @@ impl SeenSphere {
     /// for each lane.
     #[inline(always)]
     pub fn samples(&self, u: [Lanes; 2], radiance: Vec3, source: Source) -> LightSamples {
-        let one_minus_cos_max = self.sin2_max / (1.0 + (1.0 - self.sin2_max).sqrt());
+        let one_minus_cos_max = one_minus_cos(self.sin2_max);
         let [x, y, z] = warp::cone(u, one_minus_cos_max);
         // The near root along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
         let sin2 = zip(x, y, |x, y| x * x + y * y);
@@ -76,6 +81,12 @@ impl SeenSphere {
             }
         }
         let factors = [2.0 * PI * one_minus_cos_max; LANES];
-        LightSamples { targets, directions, radiance, factors, source, count: LANES }
+        LightSamples { ends: Ends::At(targets), directions, radiance, factors, source, count: LANES }
     }
+}
+
+/// 1 − cos of the angle whose sin² this is, up to 90°.
+#[inline(always)]
+fn one_minus_cos(sin2: f32) -> f32 {
+    sin2 / (1.0 + (1.0 - sin2).sqrt())
 }

@@ -1,6 +1,6 @@
 //! Emissive triangles: single ones and those of a mesh, by area.
 
-use super::{LightSample, Source};
+use super::{End, LightSample, Source};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
@@ -31,6 +31,16 @@ impl TriangleEmitter {
         Some(Self { triangles, by_area, center, vector_area })
     }
 
+    /// The numbers that its triangles have in their object.
+    pub fn primitives(&self) -> impl Iterator<Item = u32> {
+        self.triangles.iter().map(|(_, primitive)| *primitive)
+    }
+
+    /// Of all triangles.
+    pub fn area(&self) -> f64 {
+        self.by_area.total()
+    }
+
     /// Uniform over the area of all.
     pub fn sample(&self, point: Vec3, u: [f32; 2], radiance: Vec3, object: u32) -> Option<LightSample> {
         let (index, rest) = self.by_area.sample(u[0]);
@@ -42,7 +52,7 @@ impl TriangleEmitter {
         let direction = offset / distance_squared.sqrt();
         let cosine = -(*b - *a).cross(*c - *a).normalize().dot(direction);
         (cosine > 0.0).then(|| LightSample {
-            target: target.as_vec3(),
+            end: End::At(target.as_vec3()),
             direction: direction.as_vec3(),
             weight: radiance * (self.by_area.total() * cosine / distance_squared) as f32,
             source: Source::Primitive(object, *primitive),
@@ -59,7 +69,7 @@ impl TriangleEmitter {
         let round = (self.by_area.total() - self.vector_area.length()).max(0.0) / 4.0;
         let seen = flat + if round > 1e-9 * self.by_area.total() { round } else { 0.0 };
         (seen > 0.0).then(|| LightSample {
-            target: self.center.as_vec3(),
+            end: End::At(self.center.as_vec3()),
             direction: direction.as_vec3(),
             weight: radiance * (seen / distance_squared) as f32,
             source: Source::Object(object),

@@ -10,13 +10,25 @@ pub mod texture;
 
 pub use glass::Glass;
 pub use mirror::Mirror;
+pub use normal_map::NormalMap;
 pub use phong::Phong;
 
-use crate::math::Vec3;
+use crate::math::{Vec2, Vec3};
 
 /// A material, ready to be looked up.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Material {
+pub struct Material {
+    /// What it does with light that arrives.
+    pub bsdf: Bsdf,
+    /// Radiance that its front side sends out, in every direction alike.
+    pub emission: Vec3,
+    /// Bends the shading normals.
+    pub normal_map: Option<NormalMap>,
+}
+
+/// What a material does with light that arrives (a bidirectional scattering distribution function).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Bsdf {
     /// Diffuse and glossy.
     Phong(Phong),
     /// A perfect mirror.
@@ -25,12 +37,21 @@ pub enum Material {
     Glass(Glass),
 }
 
-impl Material {
-    /// Radiance that its front side sends out, in every direction alike.
-    pub fn emission(&self) -> Vec3 {
+impl Bsdf {
+    /// What it is filled with, if it is a glass.
+    pub fn glass(&self) -> Option<&Glass> {
         match self {
-            Self::Phong(phong) => phong.emission,
-            Self::Mirror(_) | Self::Glass(_) => Vec3::ZERO,
+            Self::Glass(glass) => Some(glass),
+            Self::Phong(_) | Self::Mirror(_) => None,
+        }
+    }
+
+    /// Its main colour, and how many texture look-ups that took.
+    pub fn albedo(&self, uv: Vec2, lookups: &mut u64) -> Vec3 {
+        match self {
+            Self::Phong(phong) => phong.diffuse.at(uv, lookups),
+            Self::Mirror(mirror) => mirror.reflectance,
+            Self::Glass(glass) => glass.tint,
         }
     }
 }

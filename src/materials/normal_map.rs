@@ -42,12 +42,13 @@ fn tangents(normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> (Vec3, Vec3) {
 mod tests {
     use super::*;
     use crate::materials::texels::{TexelData, Texels};
-    use crate::materials::texture::{Filter, Wrap};
+    use crate::materials::texture::{TextureFilter, Wrap};
 
     fn map(normal: Vec3) -> NormalMap {
         let data = TexelData::Float(vec![(normal + Vec3::ONE) * 0.5]);
         let texels = Arc::new(Texels { width: 1, height: 1, data });
-        let texture = Texture { texels, filter: Filter::Nearest, wrap: Wrap::Repeat, repeat: Vec2::ONE };
+        let texture =
+            Texture { texels, filter: TextureFilter::Nearest, wrap: Wrap::Repeat, repeat: Vec2::ONE };
         NormalMap { texture: Arc::new(texture), strength: 1.0 }
     }
 

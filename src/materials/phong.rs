@@ -3,11 +3,10 @@
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
-use super::normal_map::NormalMap;
 use super::texture::Color;
 use crate::math::{Vec2, Vec3};
 
-/// Diffuse and glossy reflection on both sides, emission on the front.
+/// Diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phong {
     /// kd.
@@ -18,10 +17,6 @@ pub struct Phong {
     pub shininess: f32,
     /// ka; none: kd.
     pub ambient: Option<Color>,
-    /// Radiance of the front side.
-    pub emission: Vec3,
-    /// Bends the shading normal.
-    pub normal_map: Option<NormalMap>,
 }
 
 /// [`Phong`] at one point: its textures looked up.

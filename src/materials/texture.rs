@@ -3,26 +3,30 @@
 use std::sync::Arc;
 
 use super::texels::Texels;
+use crate::choice;
 use crate::math::{Vec2, Vec3};
 
-/// Interpolation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Filter {
-    /// The texel that holds the point.
-    Nearest,
-    /// Between the four nearest texel centres.
-    Bilinear,
+choice! {
+    /// Texture interpolation.
+    pub enum TextureFilter {
+        /// The texel that holds the point.
+        Nearest = "nearest",
+        /// Between the four nearest texel centres.
+        Bilinear = "bilinear",
+    }
+    unavailable "mipmap"
 }
 
-/// What an image is outside [0, 1].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wrap {
-    /// Periodic.
-    Repeat,
-    /// The border's texels.
-    Clamp,
-    /// Periodic, every second tile mirrored.
-    Mirror,
+choice! {
+    /// What a texture is outside [0, 1].
+    pub enum Wrap {
+        /// Periodic.
+        Repeat = "repeat",
+        /// The border's texels.
+        Clamp = "clamp",
+        /// Periodic, every second tile mirrored.
+        Mirror = "mirror",
+    }
 }
 
 /// An image with how it is looked up.
@@ -31,7 +35,7 @@ pub struct Texture {
     /// The image.
     pub texels: Arc<Texels>,
     /// Interpolation.
-    pub filter: Filter,
+    pub filter: TextureFilter,
     /// Outside [0, 1].
     pub wrap: Wrap,
     /// How often it fits into u and v.
@@ -69,8 +73,8 @@ impl Texture {
         let x = place(uv.x * self.repeat.x, size.x);
         let y = place(uv.y * self.repeat.y, size.y);
         match self.filter {
-            Filter::Nearest => self.texel(x.floor(), y.floor()),
-            Filter::Bilinear => self.bilinear(x - 0.5, y - 0.5),
+            TextureFilter::Nearest => self.texel(x.floor(), y.floor()),
+            TextureFilter::Bilinear => self.bilinear(x - 0.5, y - 0.5),
         }
     }
 
@@ -120,14 +124,14 @@ mod tests {
     use crate::materials::texels::TexelData;
 
     /// [[0, 1], [2, 3]], bottom row first.
-    fn numbered(filter: Filter, wrap: Wrap) -> Texture {
+    fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data) });
         Texture { texels, filter, wrap, repeat: Vec2::ONE }
     }
 
     fn bilinear(wrap: Wrap, u: f32, v: f32) -> f32 {
-        numbered(Filter::Bilinear, wrap).lookup(Vec2::new(u, v)).x
+        numbered(TextureFilter::Bilinear, wrap).lookup(Vec2::new(u, v)).x
     }
 
     #[test]
@@ -148,7 +152,7 @@ mod tests {
         assert!((bilinear(Wrap::Mirror, 1.25, 0.25) - bilinear(Wrap::Mirror, 0.75, 0.25)).abs() < 1e-5);
         assert!((bilinear(Wrap::Mirror, -0.25, -0.25) - bilinear(Wrap::Mirror, 0.25, 0.25)).abs() < 1e-5);
         assert!((bilinear(Wrap::Clamp, 9.0, 9.0) - 3.0).abs() < 1e-6);
-        let mut repeated = numbered(Filter::Nearest, Wrap::Repeat);
+        let mut repeated = numbered(TextureFilter::Nearest, Wrap::Repeat);
         repeated.repeat = Vec2::new(2.0, 1.0);
         assert_eq!(repeated.lookup(Vec2::new(0.6, 0.1)).x, 0.0);
         assert_eq!(repeated.lookup(Vec2::new(0.4, 0.1)).x, 1.0);
@@ -156,7 +160,7 @@ mod tests {
 
     #[test]
     fn borders_and_non_finite_coordinates_stay_inside() {
-        for filter in [Filter::Nearest, Filter::Bilinear] {
+        for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
             for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
                 let texture = numbered(filter, wrap);
                 for bad in [f32::NAN, f32::INFINITY, -1e30, 1e30, 1.0, 0.0, -0.0, 1.0_f32.next_down(), -1e-9]

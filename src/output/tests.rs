@@ -1,7 +1,7 @@
 use std::io::Cursor;
 
 use super::*;
-use crate::film::tone::{Curve, develop, develop16};
+use crate::film::tone::{Tonemap, develop, develop16};
 use crate::math::Vec3;
 
 fn encode(image: &RadianceImage, options: &EncodeOptions, format: Format) -> Result<Vec<u8>, OutputError> {
@@ -23,7 +23,7 @@ fn options(bit_depth: BitDepth) -> EncodeOptions {
         ("Scene".to_owned(), "scenes/cornell.toml".to_owned()),
         ("Source".to_owned(), "Grüße, 日本\nsecond line".to_owned()),
     ];
-    let tone = ToneMapping { exposure_stops: -0.5, curve: Curve::Reinhard, ..Default::default() };
+    let tone = ToneMapping { exposure_stops: -0.5, curve: Tonemap::Reinhard, ..Default::default() };
     EncodeOptions { tone, bit_depth, metadata }
 }
 

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::hash::Hash;
 use std::sync::Arc;
 
-use super::fingerprint::Key;
+use crate::scene::fingerprint::Key;
 
 /// The last value of a stage that makes one value.
 #[derive(Debug)]
@@ -25,6 +25,7 @@ impl<T> Memo<T> {
     }
 
     /// The last value, whatever it was made of.
+    #[cfg(test)]
     pub(super) fn latest(&self) -> Option<&T> {
         self.last.as_ref().map(|(_, value)| value)
     }
@@ -89,7 +90,7 @@ impl<N: Hash + Eq, T> Pool<N, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::fingerprint::Fingerprint;
+    use crate::scene::fingerprint::Fingerprint;
 
     fn key(name: &str) -> Key {
         Fingerprint::new(name).finish()

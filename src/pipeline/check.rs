@@ -8,8 +8,9 @@ use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
 use crate::math::Vec3;
-use crate::scene::description::{MaterialKind, Object, Shape};
+use crate::scene::description::{Lowered, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
+use crate::world::file_emission;
 
 /// What a scene that is right consists of.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,19 +37,17 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
     let (parsed, meshes, textures, warnings) =
         Engine::new(Means::default(), Arc::default()).read_all(path, &sink)?;
     let scene = &parsed.loaded.scene;
-    let triangles = |shape: &Shape| match shape {
-        Shape::Mesh { file, .. } => meshes[*file].mesh.mesh.triangles.len() as u64,
-        Shape::Triangle { .. } => 1,
-        _ => 0,
+    let triangles = |shape: &Shape| match shape.lowered() {
+        Lowered::Shape(shape) => shape.triangle_count(),
+        Lowered::Mesh(mesh) => meshes[mesh.file].mesh.mesh.triangles.len() as u64,
     };
-    let emits =
-        |object: &&Object| match (object.material.map(|index| &scene.materials[index].kind), &object.shape) {
-            (Some(MaterialKind::Phong { emission, .. }), _) => *emission != Vec3::ZERO,
-            (None, Shape::Mesh { file, .. }) => {
-                meshes[*file].mesh.materials.iter().any(|own| own.emission != Vec3::ZERO)
-            }
-            _ => false,
-        };
+    let emits = |object: &&Object| match (object.material, object.shape.mesh()) {
+        (Some(index), _) => scene.materials[index].emits(),
+        (None, Some(mesh)) => {
+            meshes[mesh.file].mesh.materials.iter().any(|own| file_emission(own) != Vec3::ZERO)
+        }
+        (None, None) => false,
+    };
     Ok(Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),

@@ -12,26 +12,30 @@ use super::cache::{Memo, Pool};
 use super::inputs::Inputs;
 use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
-use super::report::{Outcome, report, write_report};
+use super::report::{Finished, report, write_report};
 use super::settings::Overrides;
 use super::sink::Sink;
-use super::stages::accel::{AccelCache, Ingredients, Keyed, accel, needed};
+use super::stages::accel::{AccelCache, accel, needed};
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
 use super::stages::preview::Screen;
-use super::stages::render::{Order, render};
+use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
+use super::stages::world::{Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand, write_if_wanted};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
-use super::table::Table;
+use super::table::StageTable;
 use super::targets::{NamedBy, conflicts};
 use super::trace::{Kernel, Tracer};
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
+use crate::lights::Lights;
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::fingerprint::Key;
+use crate::world::World;
 
 /// What an engine works with; tests work with other means.
 #[derive(Clone, Copy)]
@@ -55,7 +59,8 @@ pub(super) struct Engine {
     meshes: Pool<PathBuf, KeptMesh>,
     textures: TextureCache,
     accel: AccelCache,
-    lights: Memo<()>,
+    lights: Memo<Arc<Lights>>,
+    world: Memo<Arc<World>>,
     films: Films,
     written: Written,
     /// What the current film is rendered by.
@@ -101,6 +106,7 @@ impl Engine {
             textures: TextureCache::default(),
             accel: AccelCache::default(),
             lights: Memo::default(),
+            world: Memo::default(),
             films: Films::default(),
             written: Written::default(),
             plan: None,
@@ -174,7 +180,7 @@ impl Engine {
         findings: &mut Findings,
     ) -> Result<Report, Stop> {
         let begin = Instant::now();
-        let mut table = Table { sink, stages: Vec::new() };
+        let mut table = StageTable { sink, stages: Vec::new() };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
         let ready = self.prepare(request, &mut table, reading, findings)?;
@@ -189,7 +195,7 @@ impl Engine {
         let is_written =
             table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, token))?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let outcome = Outcome {
+        let finished = Finished {
             scene: &ready.parsed.loaded.path,
             plan: &ready.plan,
             world: &ready.world.1,
@@ -199,14 +205,14 @@ impl Engine {
             texels_loaded: ready.texels_loaded,
             is_written,
         };
-        Ok(report(&outcome, table.stages, begin.elapsed().as_secs_f64()))
+        Ok(report(&finished, table.stages, begin.elapsed().as_secs_f64()))
     }
 
     /// All stages before photons and light.
     fn prepare(
         &mut self,
         request: &Request,
-        table: &mut Table<'_>,
+        table: &mut StageTable<'_>,
         (contents, token): (&Snapshot, &CancelToken),
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
@@ -230,9 +236,14 @@ impl Engine {
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let scene = &plan.scene;
-        let from = Ingredients { scene, parsed: &parsed, meshes: &meshes, textures: &textures };
-        let world = table.run(Stage::Accel, || accel(&from, &mut self.accel, &reading))?;
-        table.run(Stage::Lights, || Ok(lights(&from, &world.1, &mut self.lights)))?;
+        let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
+        // The orbiter's numbers are few: their text stands for them.
+        let orbiter = parsed.orbiter.map(|camera| format!("{camera:?}"));
+        let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
+        let built = table.run(Stage::Accel, || accel(scene, &of, &meshes, &mut self.accel, &reading))?;
+        let lights =
+            table.run(Stage::Lights, || Ok(lights(scene, &of, &built.geometry, &mut self.lights)))?;
+        let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
         let texels_loaded = textures.texels_loaded;
         Ok(Ready { parsed, plan, world, texels_loaded })
     }
@@ -277,7 +288,7 @@ impl Engine {
         &mut self,
         parsed: &Parsed,
         findings: &mut Findings,
-        table: &mut Table<'_>,
+        table: &mut StageTable<'_>,
         reading: &Reading<'_>,
     ) -> Result<(Meshes, Textures), Stop> {
         let loaded = &parsed.loaded;
@@ -318,7 +329,7 @@ impl Engine {
                 write_by_hand(canvas, to, &mut written.borrow_mut());
             }
         };
-        let order = Order {
+        let rendering = Rendering {
             tracer: Tracer {
                 kernel: self.means.kernel,
                 pool: &pool,
@@ -335,7 +346,7 @@ impl Engine {
             take_preview: &|| orders.take_preview(),
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
-        render(key, &mut self.films, &order)
+        render(key, &mut self.films, &rendering)
     }
 
     /// Whether the picture is on disk then.
@@ -428,4 +439,133 @@ fn inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
     inputs.add_meshes(&parsed.loaded, meshes);
     inputs.add_read(&findings.files);
     inputs
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::sync::mpsc;
+
+    use super::*;
+    use crate::pipeline::protocol::{PreviewSlot, Writing};
+    use crate::pipeline::tests::{OBJ, SCENE};
+    use crate::world::{Geometry, MeshTree};
+
+    /// Nobody orders anything.
+    struct Silence;
+
+    impl Orders for Silence {
+        fn wants_write(&self) -> bool {
+            false
+        }
+
+        fn take_write(&self) -> bool {
+            false
+        }
+
+        fn take_preview(&self) -> Option<Option<PreviewSize>> {
+            None
+        }
+    }
+
+    /// What was made for a request.
+    struct Made {
+        geometry: Arc<Geometry>,
+        mesh: Arc<MeshTree>,
+        lights: Arc<Lights>,
+        world: Arc<World>,
+    }
+
+    /// The same scene again and again with edits.
+    struct Desk {
+        folder: tempfile::TempDir,
+        engine: Engine,
+        text: String,
+    }
+
+    impl Desk {
+        fn new(text: &str) -> Self {
+            let folder = tempfile::tempdir().expect("a scratch folder");
+            fs::write(folder.path().join("one.obj"), OBJ).expect("written");
+            fs::write(folder.path().join("skin.ppm"), "P6\n1 1\n255\nabc").expect("written");
+            Self { folder, engine: Engine::new(Means::default(), Arc::default()), text: text.to_owned() }
+        }
+
+        fn request(&mut self) -> Made {
+            let scene = self.folder.path().join("scene.toml");
+            fs::write(&scene, &self.text).expect("written");
+            let (events, received) = mpsc::channel();
+            let sink = Sink { generation: 1, events, previews: PreviewSlot::default() };
+            let request = Request {
+                generation: 1,
+                scene,
+                overrides: Default::default(),
+                preview: None,
+                write: Writing::No,
+                force: false,
+            };
+            let token = CancelToken::new();
+            self.engine.request(&request, &sink, &Meanwhile { token: &token, orders: &Silence });
+            let events: Vec<_> = received.try_iter().collect();
+            assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
+            let geometry = self.engine.accel.latest().expect("it was built").clone();
+            let mesh = geometry.objects()[1].mesh().expect("the mesh comes second").tree.clone();
+            let lights = self.engine.lights.latest().expect("they were gathered").clone();
+            Made { geometry, mesh, lights, world: self.engine.world.latest().expect("it was made").clone() }
+        }
+
+        /// Which of geometry, mesh, lights and world an edit leaves as they are, not equal but the same.
+        fn kept(&mut self, from: &str, to: &str) -> [bool; 4] {
+            let before = self.request();
+            assert!(self.text.contains(from), "{from}");
+            self.text = self.text.replace(from, to);
+            let after = self.request();
+            assert!(Arc::ptr_eq(&after.world.geometry, &after.geometry), "the world has what was made");
+            assert!(Arc::ptr_eq(&after.world.lights, &after.lights), "the world has what was gathered");
+            [
+                Arc::ptr_eq(&before.geometry, &after.geometry),
+                Arc::ptr_eq(&before.mesh, &after.mesh),
+                Arc::ptr_eq(&before.lights, &after.lights),
+                Arc::ptr_eq(&before.world, &after.world),
+            ]
+        }
+    }
+
+    #[test]
+    fn each_edit_keeps_what_does_not_depend_on_it() {
+        let mut desk = Desk::new(&format!("{SCENE}[materials.lamp]\nemission = [0, 0, 0]\n"));
+        let mut kept = |from: &str, to: &str| desk.kept(from, to);
+        assert_eq!(kept("[camera]", "# a comment\n[camera]"), [true, true, true, true]);
+        let settings = "exposure = 0.0\nbackground = [1, 0, 0]\nambient = [1, 1, 1]\nseed = 3\nmax_depth = 2";
+        assert_eq!(kept("exposure = 0.0", settings), [true, true, true, true]);
+        assert_eq!(kept("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]"), [true, true, true, false], "a colour");
+        assert_eq!(
+            kept("position = [0, 1, 4]", "position = [0, 1, 5]"),
+            [true, true, true, false],
+            "the eye"
+        );
+        assert_eq!(kept("[10, 10, 10]", "[9, 10, 10]"), [true, true, false, false], "a light");
+        assert_eq!(
+            kept("translate = [0, 0, 0]", "translate = [1, 0, 0]"),
+            [false, true, true, false],
+            "a mesh moved"
+        );
+        assert_eq!(kept("radius = 0.5", "radius = 0.6"), [false, true, true, false], "a shape");
+        assert_eq!(kept("seed = 3", "accel = \"kdtree\""), [false, false, true, false], "another tree");
+        assert_eq!(
+            kept("material = \"wall\"", "material = \"lamp\""),
+            [true, true, true, false],
+            "it is dark"
+        );
+        assert_eq!(
+            kept("emission = [0, 0, 0]", "emission = [1, 0, 0]"),
+            [true, true, false, false],
+            "it shines"
+        );
+        assert_eq!(
+            kept("translate = [1, 0, 0]", "translate = [2, 0, 0]"),
+            [false, true, false, false],
+            "a lamp moved"
+        );
+    }
 }

@@ -1,14 +1,13 @@
 //! Stages as functions of their inputs, the caches between them, the worker that owns both, and the watcher of files.
 //!
 //! [`start`] gives a [`Handle`]: commands in, events out, previews in a slot. One request is run by `engine`
-//! stage by stage; each stage compares a `fingerprint` of what it reads with that of its last value in
+//! stage by stage; each stage compares a [fingerprint](crate::scene::fingerprint) of what it reads with that of its last value in
 //! `cache` and says whether it was done, reused or skipped. [`watch`] says when a file that a request read has
 //! another content.
 
 mod cache;
 mod check;
 mod engine;
-mod fingerprint;
 mod inputs;
 mod pace;
 mod plan;

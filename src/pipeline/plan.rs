@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::protocol::Effective;
-use super::settings::{Overrides, View};
+use super::settings::{Effective, Overrides, View};
 use super::targets::NamedBy;
 use crate::film::Rect;
-use crate::film::tone::{Curve, ToneMapping};
-use crate::integrators::RenderSettings;
+use crate::film::tone::ToneMapping;
+use crate::integrators::{Measure, RenderSettings, Shown};
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Camera, Integrator, Render, Scene, Shadows, Tonemap};
+use crate::scene::description::{Accel, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -22,7 +21,6 @@ pub(super) struct Plan {
     /// settings.
     pub(super) scene: Arc<Scene>,
     pub(super) settings: RenderSettings,
-    pub(super) samples: u32,
     pub(super) threads: usize,
     pub(super) crop: Option<Rect>,
     pub(super) time_seconds: Option<f64>,
@@ -39,36 +37,27 @@ pub(super) struct Plan {
 /// # Errors
 /// A crop outside the picture, or a file that cannot hold it.
 pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
-    let render = &overridden(&scene.render, overrides);
+    let render = overrides.applied(&scene.render);
     check_crop(overrides.crop, render.width, render.height)?;
-    let aperture = match &scene.camera {
-        Camera::LookAt { aperture, .. } | Camera::Orbiter { aperture, .. } => *aperture,
-    };
+    let aperture = scene.camera.aperture();
     let settings = RenderSettings {
-        width: render.width,
-        height: render.height,
-        max_depth: render.max_depth,
-        shadows: render.shadows,
-        shadow_samples: render.shadow_samples,
-        filter: render.filter,
+        render,
         dof: overrides.dof != Some(false) && aperture > 0.0,
-        seed: render.seed,
-        view: overrides.view.unwrap_or_default(),
+        view: overrides.view.unwrap_or(View::Beauty),
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
-    let (outputs, named_by) = outputs(render.output.as_ref(), path, overrides);
+    let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     outputs.iter().try_for_each(|path| check_format(path, (render.width, render.height), bit_depth))?;
     Ok(Plan {
         name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         settings,
-        samples: render.samples,
         threads,
         crop: overrides.crop,
         time_seconds: overrides.time_seconds,
         tone: tone(render.exposure, render.tonemap, settings.view),
         bit_depth,
-        effective: effective(render, &settings, threads, &outputs),
+        effective: Effective::new(&settings, threads, &outputs),
         outputs,
         named_by,
         report: overrides.report.clone(),
@@ -83,19 +72,6 @@ fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
         Arc::make_mut(&mut scene).render.accel = accel;
     }
     scene
-}
-
-fn overridden(of_scene: &Render, overrides: &Overrides) -> Render {
-    let mut render = of_scene.clone();
-    render.width = overrides.width.unwrap_or(render.width);
-    render.height = overrides.height.unwrap_or(render.height);
-    render.samples = overrides.samples.unwrap_or(render.samples);
-    render.max_depth = overrides.max_depth.unwrap_or(render.max_depth);
-    render.integrator = overrides.integrator.unwrap_or(render.integrator);
-    render.shadows = overrides.shadows.unwrap_or(render.shadows);
-    render.accel = overrides.accel.unwrap_or(render.accel);
-    render.seed = overrides.seed.unwrap_or(render.seed);
-    render
 }
 
 /// The command line's files, else the scene's, else the scene's name with `.png` in the working directory.
@@ -142,47 +118,14 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 }
 
 /// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
-fn tone(exposure: f32, tonemap: Tonemap, view: View) -> ToneMapping {
-    let is_light = matches!(view, View::Beauty | View::Ambient | View::Diffuse | View::Specular);
-    let curve = match tonemap {
-        Tonemap::None => Curve::None,
-        Tonemap::Reinhard => Curve::Reinhard,
-        Tonemap::Aces => Curve::Aces,
-        Tonemap::Agx => Curve::Agx,
-    };
-    match (is_light, view.is_data()) {
-        (true, _) => ToneMapping { exposure_stops: exposure, curve, ..Default::default() },
-        (false, true) => ToneMapping::DATA,
-        // A share of light that arrives is linear, but no exposure makes it more than it is.
-        (false, false) => ToneMapping::default(),
-    }
-}
-
-fn effective(render: &Render, settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Effective {
-    Effective {
-        width: settings.width,
-        height: settings.height,
-        samples: render.samples,
-        integrator: match render.integrator {
-            Integrator::Whitted => "whitted",
-        },
-        shadows: match settings.shadows {
-            Shadows::Off => "off",
-            Shadows::Hard => "hard",
-            Shadows::Soft => "soft",
-        },
-        // The integrators of this version gather no photons, whatever is asked for.
-        photons: false,
-        dof: settings.dof,
-        accel: match render.accel {
-            Accel::Bvh => "bvh",
-            Accel::BvhHigh => "bvh-high",
-            Accel::KdTree => "kdtree",
-        },
-        view: settings.view.name(),
-        seed: settings.seed,
-        threads,
-        outputs: outputs.to_vec(),
+fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
+    match view.shown() {
+        Shown::Light(Measure::Radiance(_)) => {
+            ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
+        }
+        Shown::FirstHit(_) => ToneMapping::DATA,
+        // It is linear, but no exposure makes it more than it is.
+        Shown::Light(Measure::ArrivingShare) => ToneMapping::default(),
     }
 }
 
@@ -194,8 +137,10 @@ pub(super) fn cores() -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::choice::Choice;
     use crate::output::Format;
     use crate::pipeline::tests::loaded_of;
+    use crate::scene::description::Shadows;
 
     fn planned(text: &str, overrides: &Overrides) -> Plan {
         plan(&loaded_of(text).scene, Path::new("scenes/my.scene.toml"), overrides).expect("a plan")
@@ -204,8 +149,12 @@ mod tests {
     #[test]
     fn the_command_line_wins_over_the_scene_and_the_scene_over_defaults() {
         let text = "[render]\nwidth = 32\nheight = 24\nsamples = 4\n";
+        let size = |plan: &Plan| {
+            let render = &plan.settings.render;
+            (render.width, render.height, render.samples)
+        };
         let given = planned(text, &Overrides::default());
-        assert_eq!((given.settings.width, given.settings.height, given.samples), (32, 24, 4));
+        assert_eq!(size(&given), (32, 24, 4));
         let overrides = Overrides {
             width: Some(8),
             samples: Some(2),
@@ -214,8 +163,8 @@ mod tests {
             ..Default::default()
         };
         let changed = planned(text, &overrides);
-        assert_eq!((changed.settings.width, changed.settings.height, changed.samples), (8, 24, 2));
-        assert_eq!((changed.threads, changed.settings.seed, changed.effective.width), (3, 9, 8));
+        assert_eq!(size(&changed), (8, 24, 2));
+        assert_eq!((changed.threads, changed.settings.render.seed, changed.effective.width), (3, 9, 8));
     }
 
     #[test]
@@ -296,10 +245,11 @@ mod tests {
     #[test]
     fn only_display_values_skip_the_srgb_curve() {
         use crate::film::tone::Transfer;
-        for view in View::ALL {
+        for &view in View::ALL {
             let overrides = Overrides { view: Some(view), ..Default::default() };
             let transfer = planned("", &overrides).tone.transfer;
-            assert_eq!(transfer == Transfer::Identity, view.is_data(), "{}", view.name());
+            let is_display_value = matches!(view.shown(), Shown::FirstHit(_));
+            assert_eq!(transfer == Transfer::Identity, is_display_value, "{}", view.name());
         }
     }
 }

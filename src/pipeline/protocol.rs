@@ -8,7 +8,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::settings::Overrides;
+use super::settings::{Effective, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Picture;
 use crate::scene::diagnostic::Diagnostic;
@@ -290,41 +290,6 @@ pub struct RenderProgress {
     pub samples: u32,
     /// Samples per pixel asked for.
     pub total_samples: u32,
-}
-
-/// The settings a request renders with, for status lines.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Effective {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// Samples per pixel.
-    pub samples: u32,
-    /// `whitted`.
-    pub integrator: &'static str,
-    /// `off`, `hard` or `soft`.
-    pub shadows: &'static str,
-    /// Whether photons are on.
-    pub photons: bool,
-    /// Whether depth of field is on.
-    pub dof: bool,
-    /// `bvh`.
-    pub accel: &'static str,
-    /// The view's name.
-    pub view: &'static str,
-    /// The seed.
-    pub seed: u32,
-    /// Threads that render.
-    pub threads: usize,
-    /// The files the picture is written to.
-    #[serde(serialize_with = "lossy_paths")]
-    pub outputs: Vec<PathBuf>,
-}
-
-/// Names that are not UTF-8 must not keep a report from being written.
-fn lossy_paths<S: serde::Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }
 
 /// The report of one finished request: the JSON of `--report`.

@@ -14,7 +14,7 @@ use crate::output::{OutputError, write::atomic_until};
 use crate::world::World;
 
 /// What a request came to.
-pub(super) struct Outcome<'a> {
+pub(super) struct Finished<'a> {
     pub(super) scene: &'a Path,
     pub(super) plan: &'a Plan,
     pub(super) world: &'a World,
@@ -25,14 +25,14 @@ pub(super) struct Outcome<'a> {
     pub(super) is_written: bool,
 }
 
-pub(super) fn report(outcome: &Outcome<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
+pub(super) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
     Report {
         glimt: env!("CARGO_PKG_VERSION"),
-        scene: outcome.scene.to_string_lossy().into_owned(),
-        image: image(outcome),
-        settings: outcome.plan.effective.clone(),
+        scene: finished.scene.to_string_lossy().into_owned(),
+        image: image(finished),
+        settings: finished.plan.effective.clone(),
         stages,
-        counters: counters(outcome),
+        counters: counters(finished),
         seconds,
         peak_memory_bytes: peak_memory_bytes(),
     }
@@ -51,24 +51,24 @@ pub(super) fn write_report(plan: &Plan, inputs: &Inputs, report: &Report) -> Res
     guarded(plan, inputs, path, |guard| atomic_until(path, &text, guard, &CancelToken::new()))
 }
 
-fn image(outcome: &Outcome<'_>) -> ImageReport {
-    let plan = outcome.plan;
-    let samples = outcome.canvas.film.samples();
-    let outputs: &[PathBuf] = if outcome.is_written { &plan.outputs } else { &[] };
+fn image(finished: &Finished<'_>) -> ImageReport {
+    let plan = finished.plan;
+    let samples = finished.canvas.film.samples();
+    let outputs: &[PathBuf] = if finished.is_written { &plan.outputs } else { &[] };
     let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
     ImageReport {
         path: paths.first().cloned(),
         paths,
-        width: plan.settings.width,
-        height: plan.settings.height,
+        width: plan.settings.render.width,
+        height: plan.settings.render.height,
         samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
-        error: outcome.canvas.film.relative_error(),
-        complete: outcome.canvas.is_complete(plan.samples),
+        error: finished.canvas.film.relative_error(),
+        complete: finished.canvas.is_complete(plan.settings.render.samples),
     }
 }
 
-fn counters(outcome: &Outcome<'_>) -> Counters {
-    let (world, rays) = (outcome.world, outcome.rays);
+fn counters(finished: &Finished<'_>) -> Counters {
+    let (world, rays) = (finished.world, finished.rays);
     Counters {
         triangles: world.triangle_count(),
         objects: world.object_count(),
@@ -78,12 +78,12 @@ fn counters(outcome: &Outcome<'_>) -> Counters {
         refracted_rays: rays.refracted_rays,
         photons_emitted: 0,
         photons_stored: 0,
-        texels_loaded: outcome.texels_loaded,
+        texels_loaded: finished.texels_loaded,
         texture_lookups: rays.texture_lookups,
-        non_finite_samples: outcome.canvas.film.non_finite_samples(),
+        non_finite_samples: finished.canvas.film.non_finite_samples(),
         accel_memory_bytes: world.accel_memory_bytes() as u64,
-        films: outcome.films.count() as u64,
-        film_memory_bytes: outcome.films.memory_bytes(),
+        films: finished.films.count() as u64,
+        film_memory_bytes: finished.films.memory_bytes(),
     }
 }
 

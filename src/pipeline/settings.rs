@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
+use crate::choice;
 use crate::film::Rect;
+use crate::integrators::RenderSettings;
 pub use crate::integrators::View;
-use crate::scene::description::{Accel, Integrator, Shadows};
+use crate::scene::description::{Accel, Integrator, Render, Shadows};
 
 /// Changes to a scene's settings for this run; `None` leaves the scene's own.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,4 +45,81 @@ pub struct Overrides {
     pub threads: Option<usize>,
     /// Bits per channel of PNG files: 8 or 16.
     pub bit_depth: Option<u8>,
+}
+
+impl Overrides {
+    /// The settings of a scene with these changes.
+    pub(super) fn applied(&self, to: &Render) -> Render {
+        Render {
+            width: self.width.unwrap_or(to.width),
+            height: self.height.unwrap_or(to.height),
+            samples: self.samples.unwrap_or(to.samples),
+            max_depth: self.max_depth.unwrap_or(to.max_depth),
+            integrator: self.integrator.unwrap_or(to.integrator),
+            shadows: self.shadows.unwrap_or(to.shadows),
+            accel: self.accel.unwrap_or(to.accel),
+            seed: self.seed.unwrap_or(to.seed),
+            ..*to
+        }
+    }
+}
+
+/// The settings a request renders with, for status lines.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Effective {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Method.
+    #[serde(serialize_with = "choice::serialize")]
+    pub integrator: Integrator,
+    /// Shadows.
+    #[serde(serialize_with = "choice::serialize")]
+    pub shadows: Shadows,
+    /// Whether photons are on.
+    pub photons: bool,
+    /// Whether depth of field is on.
+    pub dof: bool,
+    /// Acceleration structure.
+    #[serde(serialize_with = "choice::serialize")]
+    pub accel: Accel,
+    /// What is shown.
+    #[serde(serialize_with = "choice::serialize")]
+    pub view: View,
+    /// The seed.
+    pub seed: u32,
+    /// Threads that render.
+    pub threads: usize,
+    /// The files the picture is written to.
+    #[serde(serialize_with = "lossy_paths")]
+    pub outputs: Vec<PathBuf>,
+}
+
+impl Effective {
+    pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
+        let RenderSettings { render, dof, view } = *settings;
+        Self {
+            width: render.width,
+            height: render.height,
+            samples: render.samples,
+            integrator: render.integrator,
+            shadows: render.shadows,
+            // The integrators of this version gather no photons, whatever is asked for.
+            photons: false,
+            dof,
+            accel: render.accel,
+            view,
+            seed: render.seed,
+            threads,
+            outputs: outputs.to_vec(),
+        }
+    }
+}
+
+/// Names that are not UTF-8 must not keep a report from being written.
+fn lossy_paths<S: serde::Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }

@@ -7,12 +7,12 @@ use super::sink::Sink;
 use super::stages::{Staged, Stop};
 
 /// The stages of one request.
-pub(super) struct Table<'a> {
+pub(super) struct StageTable<'a> {
     pub(super) sink: &'a Sink,
     pub(super) stages: Vec<StageReport>,
 }
 
-impl Table<'_> {
+impl StageTable<'_> {
     /// Do one stage.
     ///
     /// # Errors

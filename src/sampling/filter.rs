@@ -3,19 +3,21 @@
 
 use std::sync::LazyLock;
 
+use crate::choice;
 use crate::math::Vec2;
 
-/// A reconstruction filter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Filter {
-    /// One pixel wide.
-    Box,
-    /// Two pixels wide.
-    Tent,
-    /// Standard deviation ½ pixel, three pixels wide.
-    Gaussian,
-    /// Mitchell and Netravali 1988, B = C = 1/3, four pixels wide.
-    Mitchell,
+choice! {
+    /// Reconstruction filters.
+    pub enum PixelFilter {
+        /// One pixel wide.
+        Box = "box",
+        /// Two pixels wide, falling linearly.
+        Tent = "tent",
+        /// A truncated Gaussian of standard deviation half a pixel, three pixels wide.
+        Gaussian = "gaussian",
+        /// Mitchell and Netravali, B = C = 1/3, four pixels wide.
+        Mitchell = "mitchell",
+    }
 }
 
 /// A place relative to the pixel's centre, in pixels, and what a sample there counts: ∫|f|/∫f with f's sign.
@@ -27,7 +29,7 @@ pub struct FilterSample {
     pub weight: f32,
 }
 
-impl Filter {
+impl PixelFilter {
     /// Warp a point of the unit square.
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
@@ -44,13 +46,13 @@ fn tent(u: f32) -> f32 {
     if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
 }
 
-static GAUSSIAN: LazyLock<Table> = LazyLock::new(|| {
+static GAUSSIAN: LazyLock<Tabulated> = LazyLock::new(|| {
     let at = |x: f64| (-2.0 * x * x).exp();
-    Table::new(1.5, |x| at(x) - at(1.5))
+    Tabulated::new(1.5, |x| at(x) - at(1.5))
 });
 
-static MITCHELL: LazyLock<Table> = LazyLock::new(|| {
-    Table::new(2.0, |x| {
+static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
+    Tabulated::new(2.0, |x| {
         let x = x.abs();
         // B = C = 1/3 in the general cubic.
         if x < 1.0 {
@@ -62,7 +64,7 @@ static MITCHELL: LazyLock<Table> = LazyLock::new(|| {
 });
 
 /// A tabulated even function in one dimension, sampled by its absolute value.
-struct Table {
+struct Tabulated {
     radius: f64,
     sums: Vec<f64>,
     signs: Vec<f64>,
@@ -70,7 +72,7 @@ struct Table {
     excess: f64,
 }
 
-impl Table {
+impl Tabulated {
     const CELLS: usize = 1024;
 
     fn new(radius: f64, f: impl Fn(f64) -> f64) -> Self {
@@ -110,10 +112,10 @@ mod tests {
     fn every_filter_has_its_weight_and_width() {
         let n = 2048;
         for (filter, moment) in [
-            (Filter::Box, 1.0 / 12.0),
-            (Filter::Tent, 1.0 / 6.0),
-            (Filter::Gaussian, gaussian_moment()),
-            (Filter::Mitchell, mitchell_moment()),
+            (PixelFilter::Box, 1.0 / 12.0),
+            (PixelFilter::Tent, 1.0 / 6.0),
+            (PixelFilter::Gaussian, gaussian_moment()),
+            (PixelFilter::Mitchell, mitchell_moment()),
         ] {
             let (mut weight, mut second, mut mean) = (0.0, 0.0, 0.0);
             for i in 0..n * n {

@@ -7,21 +7,29 @@ use crate::math::lanes::{LANES, Lanes};
 /// Length of the library's sequences.
 const SEQUENCE_LENGTH: u32 = 1 << 16;
 
-/// What random numbers are for: numbers of different purposes are independent, those of one purpose well
-/// distributed over the samples of a pixel.
+/// A random decision at a vertex of a path. Numbers of different decisions are independent, those of one decision well
+/// distributed over the samples of a pixel. There is no other way to a dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Purpose(u32);
+pub enum Decision {
+    /// Where on the light of this number.
+    Light(u32),
+    /// Which of two ways to go on.
+    Choice,
+}
 
-impl Purpose {
-    /// Position in the pixel and on the lens.
-    pub const CAMERA: Self = Self(0);
-
-    /// Something that happens at a vertex of a path: `path` tells the paths of one sample apart, `what` the
-    /// decisions at one vertex.
-    pub fn at_vertex(path: u32, what: u32) -> Self {
-        Self(mix(mix(path.wrapping_add(1)) ^ what.wrapping_mul(0x9e37_79b9)))
+impl Decision {
+    /// Its dimension at a vertex; `path` tells the paths of one sample apart.
+    fn dimension(self, path: u32) -> u32 {
+        let number = match self {
+            Self::Light(number) => number,
+            Self::Choice => u32::MAX,
+        };
+        mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }
 }
+
+/// The dimension of the position in the pixel and on the lens.
+const CAMERA: u32 = 0;
 
 /// The random numbers of one sample of a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -36,22 +44,27 @@ impl PixelSampler {
         Self { seed: mix(mix(mix(seed) ^ x) ^ y.rotate_left(16)), sample }
     }
 
-    /// Four numbers in [0, 1).
-    pub fn get4(&self, purpose: Purpose) -> [f32; 4] {
+    /// Four numbers in [0, 1): the position in the pixel and on the lens.
+    pub fn camera(&self) -> [f32; 4] {
+        self.numbers(CAMERA)
+    }
+
+    fn numbers(&self, dimension: u32) -> [f32; 4] {
         let (round, place) = (self.sample / SEQUENCE_LENGTH, self.sample % SEQUENCE_LENGTH);
-        sobol_burley::sample_4d(place, 0, mix(self.seed ^ purpose.0) ^ mix(round))
+        sobol_burley::sample_4d(place, 0, mix(self.seed ^ dimension) ^ mix(round))
     }
 
     /// Two numbers in [0, 1) for each of `n` repetitions of one decision, well distributed over repetitions and samples
     /// together.
-    pub fn get2_all(&self, purpose: Purpose, n: u32) -> Repetitions {
-        let (seed, first) = (mix(self.seed ^ purpose.0), u64::from(self.sample) * u64::from(n));
+    pub fn pairs(&self, path: u32, decision: Decision, n: u32) -> Repetitions {
+        let (seed, first) =
+            (mix(self.seed ^ decision.dimension(path)), u64::from(self.sample) * u64::from(n));
         Repetitions { seed, next: first, end: first + u64::from(n) }
     }
 
-    /// Two numbers in [0, 1).
-    pub fn get2(&self, purpose: Purpose) -> Vec2 {
-        let [x, y, ..] = self.get4(purpose);
+    /// Two numbers in [0, 1) for one decision.
+    pub fn pair(&self, path: u32, decision: Decision) -> Vec2 {
+        let [x, y, ..] = self.numbers(decision.dimension(path));
         Vec2::new(x, y)
     }
 }
@@ -159,9 +172,9 @@ fn mix(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    fn points(sampler: PixelSampler, purpose: Purpose, n: u32) -> impl Iterator<Item = [f32; 2]> {
+    fn points(sampler: PixelSampler, decision: Decision, n: u32) -> impl Iterator<Item = [f32; 2]> {
         let some = |([x, y], used): ([Lanes; 2], usize)| (0..used).map(move |i| [x[i], y[i]]);
-        sampler.get2_all(purpose, n).flat_map(some)
+        sampler.pairs(1, decision, n).flat_map(some)
     }
 
     #[test]
@@ -169,12 +182,12 @@ mod tests {
         // Of three, five and one number, and over the end of 32 bits: the same points as one by one.
         for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
             let sampler = PixelSampler::new(2, 3, 4, sample);
-            let all: Vec<_> = points(sampler, Purpose::CAMERA, n).collect();
+            let all: Vec<_> = points(sampler, Decision::Choice, n).collect();
             assert_eq!(all.len(), n as usize);
             let first = u64::from(sample) * u64::from(n);
             for (i, point) in all.iter().enumerate() {
                 let index = first + i as u64;
-                let seed = mix(sampler.seed ^ Purpose::CAMERA.0) ^ mix((index >> 32) as u32);
+                let seed = mix(sampler.seed ^ Decision::Choice.dimension(1)) ^ mix((index >> 32) as u32);
                 let [x, y] = scrambled([index as u32; LANES], seed);
                 assert_eq!([x[0], y[0]], *point, "number {i} of sample {sample}");
             }
@@ -186,7 +199,7 @@ mod tests {
         // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
             let sampler = |sample| PixelSampler::new(3, 10, 20, sample);
-            let all = (0..64 / n).flat_map(|sample| points(sampler(sample), Purpose::at_vertex(1, 2), n));
+            let all = (0..64 / n).flat_map(|sample| points(sampler(sample), Decision::Light(2), n));
             let points: Vec<[f32; 2]> = all.collect();
             for columns in [1_usize, 2, 4, 8, 16, 32, 64] {
                 let mut cells = [0_u32; 64];
@@ -197,7 +210,7 @@ mod tests {
                 assert_eq!(cells, [1; 64], "{columns} columns");
             }
         }
-        let first = |x| PixelSampler::new(3, x, 20, 0).get2(Purpose::CAMERA);
+        let first = |x| PixelSampler::new(3, x, 20, 0).camera();
         assert_ne!(first(10), first(11));
     }
 
@@ -219,7 +232,7 @@ mod tests {
         let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
         for pixel in 0..n {
             let sampler = PixelSampler::new(1, pixel % 200, pixel / 200, 7);
-            for [x, y] in points(sampler, Purpose::at_vertex(1, 0), 1).map(|point| point.map(f64::from)) {
+            for [x, y] in points(sampler, Decision::Light(0), 1).map(|point| point.map(f64::from)) {
                 sums = [sums[0] + x, sums[1] + y];
                 product += (x - 0.5) * (y - 0.5) * 12.0;
             }
@@ -232,20 +245,26 @@ mod tests {
 
     #[test]
     fn the_sequence_goes_on_after_its_library_s_end() {
-        let numbers = |sample| PixelSampler::new(0, 0, 0, sample).get4(Purpose::CAMERA);
+        let numbers = |sample| PixelSampler::new(0, 0, 0, sample).camera();
         assert_ne!(numbers(0), numbers(SEQUENCE_LENGTH));
         assert!(numbers(u32::MAX).iter().all(|x| (0.0..1.0).contains(x)));
     }
 
     #[test]
-    fn purposes_are_independent() {
+    fn decisions_are_independent() {
         // Correlation of first coordinates over one pixel's samples: a shared scramble would give 1.
-        let (mut product, n) = (0.0, 4096);
+        let (mut products, n) = ([0.0; 3], 4096);
         for sample in 0..n {
             let sampler = PixelSampler::new(1, 5, 5, sample);
-            let (a, b) = (sampler.get2(Purpose::at_vertex(0, 0)).x, sampler.get2(Purpose::at_vertex(0, 1)).x);
-            product += (f64::from(a) - 0.5) * (f64::from(b) - 0.5) * 12.0;
+            let first = |path, decision| f64::from(sampler.pair(path, decision).x) - 0.5;
+            for (sum, other) in products.iter_mut().zip([
+                (0, Decision::Light(1)),
+                (0, Decision::Choice),
+                (1, Decision::Light(0)),
+            ]) {
+                *sum += first(0, Decision::Light(0)) * first(other.0, other.1) * 12.0;
+            }
         }
-        assert!((product / f64::from(n)).abs() < 0.05);
+        assert!(products.iter().all(|product: &f64| (product / f64::from(n)).abs() < 0.05), "{products:?}");
     }
 }

@@ -6,6 +6,7 @@
 pub mod description;
 pub mod diagnostic;
 mod document;
+pub mod fingerprint;
 mod nearest;
 mod read;
 pub mod report;

@@ -36,7 +36,7 @@ fn a_scene_that_says_nothing_has_the_documented_defaults() {
     assert_eq!((width, height, samples, shadow_samples, max_depth, seed), (640, 480, 64, 1, 8, 0));
     assert_eq!(scene.render.shadows, Shadows::Soft);
     assert_eq!((scene.render.filter, scene.render.tonemap), (PixelFilter::Box, Tonemap::None));
-    assert_eq!((scene.render.exposure, &scene.render.output), (0.0, &None));
+    assert_eq!((scene.render.exposure, &scene.output), (0.0, &None));
     assert_eq!(scene.photons, Photons { enabled: false, count: 200_000, radius: 0.0, bounces: 16 });
     let camera = Camera::LookAt {
         position: DVec3::new(0.0, 1.0, 4.0),
@@ -57,9 +57,8 @@ fn materials_have_the_documented_defaults() {
         specular: ColorSource::Constant(Vec3::ZERO),
         shininess: 32.0,
         ambient: None,
-        emission: Vec3::ZERO,
-        normal_map: None,
     };
+    assert!(scene.materials.iter().all(|material| !material.emits() && material.normal_map.is_none()));
     let kinds: Vec<_> = scene.materials.into_iter().map(|material| material.kind).collect();
     let mirror = MaterialKind::Mirror { reflectance: Vec3::splat(0.9) };
     assert_eq!(kinds, [phong, mirror, MaterialKind::Glass { ior: 1.5, tint: Vec3::ONE }]);
@@ -146,7 +145,7 @@ fn a_mesh_file_is_listed_once_however_it_is_written() {
         .objects
         .iter()
         .map(|object| match object.shape {
-            Shape::Mesh { file, scale, smooth, .. } => (file, scale, smooth, object.material),
+            Shape::Mesh(Mesh { file, scale, smooth, .. }) => (file, scale, smooth, object.material),
             _ => panic!("not a mesh"),
         })
         .collect();
@@ -159,10 +158,9 @@ fn a_mesh_file_is_listed_once_however_it_is_written() {
         (texture.repeat, texture.wrap, texture.filter),
         (Vec2::new(2.0, -1.0), Wrap::Mirror, TextureFilter::Nearest)
     );
-    let MaterialKind::Phong { diffuse, normal_map, .. } = &scene.materials[0].kind else {
-        panic!("not phong")
-    };
-    assert_eq!((diffuse, normal_map), (&ColorSource::Texture(0), &Some((0, 0.5))));
+    let MaterialKind::Phong { diffuse, .. } = &scene.materials[0].kind else { panic!("not phong") };
+    let map = NormalMap { texture: 0, strength: 0.5 };
+    assert_eq!((diffuse, scene.materials[0].normal_map), (&ColorSource::Texture(0), Some(map)));
 
     let late =
         loaded.diagnostic_at(scene.mesh_files[1].span.clone(), Severity::Error, "no usable face", None);

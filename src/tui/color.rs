@@ -4,23 +4,24 @@ use std::sync::LazyLock;
 
 use ratatui::style::Color;
 
+use crate::choice;
 use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
 
-/// What was asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ColorChoice {
-    /// By the environment.
-    #[default]
-    Auto,
-    /// 24 bits.
-    TrueColor,
-    /// The 6×6×6 cube and the greys of xterm.
-    Indexed256,
-    /// The 16 colours of xterm.
-    Ansi16,
-    /// None at all.
-    None,
+choice! {
+    /// Which colours are used.
+    pub enum ColorChoice {
+        /// What the terminal can show.
+        Auto = "auto",
+        /// 24 bits.
+        TrueColor = "truecolor",
+        /// The palette of 256: the 6×6×6 cube and the greys of xterm.
+        Indexed256 = "256",
+        /// The palette of 16 of xterm.
+        Ansi16 = "16",
+        /// None.
+        None = "none",
+    }
 }
 
 /// What the terminal gets.

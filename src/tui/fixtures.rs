@@ -14,10 +14,11 @@ use super::update::{start, update};
 use super::view;
 use crate::film::Picture;
 use crate::pipeline::protocol::{
-    self, AssetProgress, Command, Counters, Effective, Failure, ImageReport, RenderProgress, Report, Request,
+    self, AssetProgress, Command, Counters, Failure, ImageReport, RenderProgress, Report, Request,
     SampleCounts, Stage, StageReport, Status,
 };
-use crate::pipeline::settings::Overrides;
+use crate::pipeline::settings::{Effective, Overrides, View};
+use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::scene::diagnostic::{Diagnostic, Place, Severity};
 
 pub(super) fn window(columns: u16, rows: u16) -> Window {
@@ -133,12 +134,12 @@ pub(super) fn settings() -> Effective {
         width: 640,
         height: 480,
         samples: 64,
-        integrator: "whitted",
-        shadows: "soft",
+        integrator: Integrator::Whitted,
+        shadows: Shadows::Soft,
         photons: false,
         dof: true,
-        accel: "bvh",
-        view: "beauty",
+        accel: Accel::Bvh,
+        view: View::Beauty,
         seed: 0,
         threads: 2,
         outputs: vec![PathBuf::from("cornell.png")],

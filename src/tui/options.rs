@@ -4,22 +4,23 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
 use super::color::ColorChoice;
+use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
 pub use crate::pipeline::watch::{Changed, News};
 
-/// How the preview is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PreviewChoice {
-    /// Half blocks where there is colour, else a ramp of characters.
-    #[default]
-    Auto,
-    /// Two pixels a cell.
-    HalfBlock,
-    /// A ramp of characters by luminance.
-    Ascii,
-    /// No preview; the stages get the room.
-    None,
+choice! {
+    /// How the preview is drawn.
+    pub enum PreviewChoice {
+        /// Half blocks where there is colour, characters elsewhere.
+        Auto = "auto",
+        /// Two pixels a cell.
+        HalfBlock = "halfblock",
+        /// Characters by brightness.
+        Ascii = "ascii",
+        /// None; the stages get the room.
+        None = "none",
+    }
 }
 
 /// Everything that the front end needs.

@@ -7,10 +7,8 @@ use std::time::{Duration, Instant};
 use super::color::ColorDepth;
 use super::event::{Window, Written};
 use crate::film::Picture;
-use crate::pipeline::protocol::{
-    AssetProgress, Effective, PreviewSize, RenderProgress, Report, Stage, StageReport,
-};
-use crate::pipeline::settings::{Overrides, View};
+use crate::pipeline::protocol::{AssetProgress, PreviewSize, RenderProgress, Report, Stage, StageReport};
+use crate::pipeline::settings::{Effective, Overrides, View};
 use crate::scene::description::Shadows;
 use crate::scene::diagnostic::Diagnostic;
 
@@ -225,21 +223,17 @@ impl State {
 
     /// The view that the run was started with: the only one that is written without being asked.
     pub(super) fn base_view(&self) -> View {
-        self.base.view.unwrap_or_default()
+        self.base.view.unwrap_or(View::Beauty)
     }
 
     pub(super) fn view(&self) -> View {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 
-    /// The shadows that hold now, by name.
-    pub(super) fn shadows(&self) -> &'static str {
-        match self.overrides().shadows {
-            Some(Shadows::Off) => "off",
-            Some(Shadows::Hard) => "hard",
-            Some(Shadows::Soft) => "soft",
-            None => self.effective.as_ref().map_or("soft", |effective| effective.shadows),
-        }
+    /// The shadows that hold now.
+    pub(super) fn shadows(&self) -> Shadows {
+        let of_scene = self.effective.as_ref().map_or(Shadows::Soft, |effective| effective.shadows);
+        self.overrides().shadows.unwrap_or(of_scene)
     }
 
     pub(super) fn is_running(&self) -> bool {

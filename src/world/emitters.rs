@@ -1,91 +1,56 @@
-//! Which objects are lights.
+//! The lights of a scene: those without extent, and the objects that emit.
 
-use super::{MeshTree, ObjectMaterial, Shape};
-use crate::geometry::cuboid::Cuboid;
-use crate::lights::emitter::Emitter;
-use crate::lights::rectangle::QuadEmitter;
-use crate::lights::round::{Round, RoundEmitter};
-use crate::lights::sphere::SphereEmitter;
+use std::sync::Arc;
+
+use super::lower::file_emission;
+use super::{Geometry, MeshInstance, Object};
+use crate::lights::emitter::{Emitter, Part};
 use crate::lights::triangles::TriangleEmitter;
-use crate::lights::{AreaLight, Light};
-use crate::materials::Material;
+use crate::lights::{AreaLight, Light, Lights, PointLight, area_lights};
 use crate::math::Vec3;
+use crate::scene::description::{self, Scene};
 
-/// The lights that an object is; a box is one for each face, a mesh one for each of its emitting materials.
-pub fn area_lights(
-    object: u32,
-    shape: &Shape,
-    material: ObjectMaterial,
-    materials: &[Material],
-) -> Vec<Light> {
-    let light = |shape, radiance| Light::Area(AreaLight { shape, radiance, object });
-    let of_one =
-        |index: u32| Some(materials[index as usize].emission()).filter(|&radiance| radiance != Vec3::ZERO);
-    let radiance = match material {
-        ObjectMaterial::One(index) => of_one(index),
-        ObjectMaterial::OfFile { .. } => None,
+/// The lights of a scene with these objects: those without extent first, then the objects that emit. A box is a light for each
+/// face, a mesh one for each of its emitting materials.
+pub fn lights(scene: &Scene, geometry: &Geometry) -> Arc<Lights> {
+    let points = scene.lights.iter().map(|light| {
+        let description::PointLight { position, intensity, falloff } = *light;
+        Light::Point(PointLight { position, intensity, falloff })
+    });
+    let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
+    let areas = objects.flat_map(|((id, object), described)| {
+        let emission = described.material.map(|index| scene.materials[index].emission);
+        match object {
+            Object::Shape(shape) => match emission {
+                Some(radiance) if radiance != Vec3::ZERO => area_lights(shape, radiance, id),
+                Some(_) | None => Vec::new(),
+            },
+            Object::Mesh(mesh) => mesh_lights(id, mesh, emission),
+        }
+    });
+    Arc::new(Lights::new(points.chain(areas.map(Light::Area)).collect()))
+}
+
+/// Of a mesh whose triangles all emit this; none: what their own materials emit.
+fn mesh_lights(object: u32, mesh: &MeshInstance, emission: Option<Vec3>) -> Vec<AreaLight> {
+    let loaded = mesh.tree.loaded();
+    let emissions: Vec<(Option<u32>, Vec3)> = match emission {
+        Some(radiance) => vec![(None, radiance)],
+        None => {
+            (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), file_emission(material))).collect()
+        }
     };
-    let round = |shape, radiance| {
-        let emitter = RoundEmitter::new(shape);
-        emitter.map(|emitter| light(Emitter::Round(emitter), radiance)).into_iter().collect()
+    let light = |(own, radiance): (Option<u32>, Vec3)| {
+        let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
+        let shape = Emitter::Triangles(TriangleEmitter::new(triangles)?);
+        Some(AreaLight { shape, radiance, object, part: Part::Listed })
     };
-    match (shape, radiance) {
-        (Shape::Disk(disk), Some(radiance)) => round(Round::Disk(*disk), radiance),
-        (Shape::Cylinder(cylinder), Some(radiance)) => round(Round::Cylinder(*cylinder), radiance),
-        (Shape::Cone(cone), Some(radiance)) => round(Round::Cone(*cone), radiance),
-        (Shape::Torus(torus), Some(radiance)) => round(Round::Torus(*torus), radiance),
-        (Shape::Sphere(sphere), Some(radiance)) => {
-            vec![light(
-                Emitter::Sphere(SphereEmitter { center: sphere.center, radius: sphere.radius }),
-                radiance,
-            )]
-        }
-        (Shape::Quad(quad), Some(radiance)) => {
-            vec![light(Emitter::Quad(QuadEmitter::new(quad.corner, quad.u, quad.v)), radiance)]
-        }
-        (Shape::Box(cuboid), Some(radiance)) => {
-            box_faces(cuboid).map(|face| light(Emitter::Quad(face), radiance)).collect()
-        }
-        (Shape::Triangle(triangle), Some(radiance)) => {
-            let corners = [triangle.a, triangle.b, triangle.c];
-            let emitter = TriangleEmitter::new(vec![(corners, 0)]);
-            emitter.map(|emitter| light(Emitter::Triangles(emitter), radiance)).into_iter().collect()
-        }
-        (Shape::Mesh(mesh), _) => mesh_materials(&mesh.tree, material)
-            .into_iter()
-            .filter_map(|(index, wanted)| {
-                let radiance = of_one(index)?;
-                let triangles = triangles_of(&mesh.tree, wanted);
-                let corners = triangles.into_iter().map(|id| (mesh.world_corners(id), id)).collect();
-                Some(light(Emitter::Triangles(TriangleEmitter::new(corners)?), radiance))
-            })
-            .collect(),
-        _ => Vec::new(),
-    }
+    emissions.into_iter().filter(|(_, radiance)| *radiance != Vec3::ZERO).filter_map(light).collect()
 }
 
-fn box_faces(cuboid: &Cuboid) -> impl Iterator<Item = QuadEmitter> {
-    (0..6).map(|face| {
-        let (corner, u, v) = cuboid.face(face);
-        QuadEmitter::new(corner, u, v)
-    })
-}
-
-/// The materials of a mesh instance, each with the number by which its triangles name it; none: all triangles.
-fn mesh_materials(tree: &MeshTree, material: ObjectMaterial) -> Vec<(u32, Option<u32>)> {
-    match material {
-        ObjectMaterial::One(index) => vec![(index, None)],
-        ObjectMaterial::OfFile { first, .. } => {
-            (0..tree.loaded().materials.len() as u32).map(|own| (first + own, Some(own))).collect()
-        }
-    }
-}
-
-fn triangles_of(tree: &MeshTree, wanted: Option<u32>) -> Vec<u32> {
-    let mesh = &tree.loaded().mesh;
-    let all = 0..mesh.triangles.len() as u32;
-    match wanted {
-        None => all.collect(),
-        Some(own) => all.filter(|&id| mesh.materials.get(id as usize) == Some(&own)).collect(),
-    }
+/// The triangles of one of the mesh file's own materials; none: all.
+fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
+    let mesh = &mesh.tree.loaded().mesh;
+    let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
+    (0..mesh.triangles.len() as u32).filter(is_meant)
 }

@@ -1,12 +1,15 @@
-//! All shapes under one tree; those without an end beside it.
+//! All objects under one tree; those without an end beside it.
+
+use std::sync::Arc;
 
 use crate::accel::{Bvh, Instructions};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint};
 use crate::lights::Source;
-use crate::scene::description;
+use crate::math::transform::Transform;
+use crate::scene::description::{self, Lowered, Scene};
 
-use super::shape::Shape;
+use super::{MeshInstance, MeshTree, Object};
 
 /// The nearest hit in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,47 +20,50 @@ pub struct Hit {
     pub object: u32,
 }
 
-/// Shapes and the tree over them.
+/// Objects and the tree over them.
 #[derive(Debug)]
 pub struct Geometry {
-    shapes: Vec<Shape>,
+    objects: Vec<Object>,
     tree: Bvh,
-    /// Shapes that are not in the tree.
+    /// Objects that are not in the tree.
     unbounded: Vec<u32>,
-    /// What it was built from, to know when it can serve again.
-    described: Vec<description::Shape>,
     instructions: Instructions,
 }
 
 impl Geometry {
-    /// Build the tree over shapes that were lowered from `described`.
+    /// The objects of a scene, whose mesh files have these trees.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn build(
-        shapes: Vec<Shape>,
-        described: Vec<description::Shape>,
-        token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
-        let bounds: Vec<Option<Aabb>> = shapes.iter().map(Shape::bounds).collect();
+    pub fn of_scene(scene: &Scene, meshes: &[Arc<MeshTree>], token: &CancelToken) -> Result<Self, Cancelled> {
+        let objects = scene.objects.iter().map(|object| lowered(&object.shape, meshes, token));
+        Self::build(objects.collect::<Result<_, _>>()?, token)
+    }
+
+    /// Build the tree over objects.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build(objects: Vec<Object>, token: &CancelToken) -> Result<Self, Cancelled> {
+        let bounds: Vec<Option<Aabb>> = objects.iter().map(Object::bounds).collect();
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
         let (tree, instructions) = (Bvh::build(&boxes, token)?, Instructions::best());
-        Ok(Self { shapes, tree, unbounded, described, instructions })
+        Ok(Self { objects, tree, unbounded, instructions })
     }
 
-    /// The shapes; objects are known by their index.
-    pub fn shapes(&self) -> &[Shape] {
-        &self.shapes
+    /// The objects, known by their index.
+    pub fn objects(&self) -> &[Object] {
+        &self.objects
     }
 
-    /// The tree over the shapes that have an end.
+    /// The tree over the objects that have an end.
     pub(super) fn tree(&self) -> &Bvh {
         &self.tree
     }
 
-    /// The shapes that have none.
+    /// The objects that have none.
     pub(super) fn unbounded(&self) -> &[u32] {
         &self.unbounded
     }
@@ -74,21 +80,6 @@ impl Geometry {
         self.instructions
     }
 
-    /// Whether building from these would give the same.
-    pub fn serves(
-        &self,
-        described: &[description::Shape],
-        meshes: &[std::sync::Arc<super::MeshTree>],
-    ) -> bool {
-        let same_mesh = |(shape, described): (&Shape, &description::Shape)| match (shape, described) {
-            (Shape::Mesh(mesh), description::Shape::Mesh { file, .. }) => {
-                std::sync::Arc::ptr_eq(&mesh.tree, &meshes[*file])
-            }
-            _ => true,
-        };
-        self.described == described && self.shapes.iter().zip(described).all(same_mesh)
-    }
-
     /// The nearest hit; of hits at one distance the object of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut best: Option<Hit> = None;
@@ -97,7 +88,7 @@ impl Geometry {
         let mut test = |id: u32, t_max: f32| {
             segment.t_max = t_max;
             ray_f64.t_max = f64::from(t_max);
-            let shape = self.shapes[id as usize].closest(&segment, &ray_f64)?;
+            let shape = self.objects[id as usize].closest(&segment, &ray_f64)?;
             let nearer = best.is_none_or(|best| (shape.t, id) < (best.shape.t, best.object));
             nearer.then(|| {
                 best = Some(Hit { shape, object: id });
@@ -115,24 +106,23 @@ impl Geometry {
     /// Whether anything but the light itself lies on the segment.
     pub fn occluded(&self, ray: &Ray, source: Source) -> bool {
         let ray_f64 = ray.to_f64();
+        let any = |id: u32, except: Option<u32>| self.objects[id as usize].any(ray, &ray_f64, except);
         let test = |id: u32| match source {
-            Source::Object(own) if own == id => false,
-            Source::Primitive(own, part) if own == id => {
-                self.shapes[id as usize].any(ray, &ray_f64, Some(part))
-            }
-            _ => self.shapes[id as usize].any(ray, &ray_f64, None),
+            Source::Nothing => any(id, None),
+            Source::Object(own) => own != id && any(id, None),
+            Source::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
         self.unbounded.iter().any(|&id| test(id)) || self.tree.any(ray, test)
     }
 
     /// The surface at a hit of this ray.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        self.shapes[hit.object as usize].surface(ray, &hit.shape)
+        self.objects[hit.object as usize].surface(ray, &hit.shape)
     }
 
     /// The material that a mesh file gives the triangle that was hit, by the file's own count.
     pub fn file_material(&self, hit: &Hit) -> Option<u32> {
-        let Shape::Mesh(mesh) = &self.shapes[hit.object as usize] else { return None };
+        let mesh = self.objects[hit.object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
         materials.get(hit.shape.primitive as usize).copied().filter(|&own| own != u32::MAX)
     }
@@ -141,14 +131,32 @@ impl Geometry {
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
         let mut bytes = self.tree.memory_bytes();
-        for shape in &self.shapes {
-            if let Shape::Mesh(mesh) = shape
-                && !seen.contains(&std::sync::Arc::as_ptr(&mesh.tree))
-            {
-                seen.push(std::sync::Arc::as_ptr(&mesh.tree));
+        for mesh in self.objects.iter().filter_map(Object::mesh) {
+            if !seen.contains(&Arc::as_ptr(&mesh.tree)) {
+                seen.push(Arc::as_ptr(&mesh.tree));
                 bytes += mesh.tree.memory_bytes();
             }
         }
         bytes
     }
+}
+
+fn lowered(
+    shape: &description::Shape,
+    meshes: &[Arc<MeshTree>],
+    token: &CancelToken,
+) -> Result<Object, Cancelled> {
+    let mesh = match shape.lowered() {
+        Lowered::Shape(shape) => return Ok(Object::Shape(shape)),
+        Lowered::Mesh(mesh) => mesh,
+    };
+    let instance = MeshInstance {
+        tree: Arc::clone(&meshes[mesh.file]),
+        transform: Transform::scale_rotate_translate(mesh.scale, mesh.rotate, mesh.translate),
+        smooth: mesh.smooth,
+    };
+    if instance.smooth {
+        instance.tree.prepare_normals(token)?;
+    }
+    Ok(Object::Mesh(Box::new(instance)))
 }

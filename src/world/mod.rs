@@ -5,10 +5,10 @@ pub mod camera;
 mod emitters;
 pub mod geometry;
 mod lower;
+mod mesh_instance;
 pub mod mesh_tree;
+mod object;
 mod packet;
-pub mod shape;
-mod side_by_side;
 pub mod textures;
 
 use std::collections::HashMap;
@@ -16,16 +16,18 @@ use std::sync::Arc;
 
 pub use crate::accel::{Loops, PACKET};
 pub use camera::Camera;
+pub use emitters::lights;
 pub use geometry::{Geometry, Hit};
+pub use lower::file_emission;
+pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
-pub use shape::Shape;
+pub use object::Object;
 pub use textures::{NeededTexture, TextureSource, textures_needed};
 
 use crate::assets::OrbiterCamera;
-use crate::lights::Light;
+use crate::lights::Lights;
 use crate::materials::Material;
 use crate::materials::texels::Texels;
-use crate::math::Vec3;
 
 /// What a world is made of.
 #[derive(Clone, Debug, Default)]
@@ -43,18 +45,14 @@ pub struct Parts {
 pub struct World {
     /// The eye.
     pub camera: Camera,
-    /// Shapes under their tree.
+    /// Objects under their tree.
     pub geometry: Arc<Geometry>,
     /// Materials; objects refer to them by index.
     pub materials: Vec<Material>,
     /// Material of each object, or where a mesh file's own materials start.
     object_materials: Vec<ObjectMaterial>,
     /// Lights of every kind.
-    pub lights: Vec<Light>,
-    /// Radiance seen by rays that leave.
-    pub background: Vec3,
-    /// Ambient radiance of the Phong model.
-    pub ambient: Vec3,
+    pub lights: Arc<Lights>,
 }
 
 /// How an object finds its material.
@@ -83,19 +81,14 @@ impl World {
         }
     }
 
-    /// Lights of any kind.
-    pub fn light_count(&self) -> usize {
-        self.lights.len()
-    }
-
     /// Triangles over all mesh instances and single triangles.
     pub fn triangle_count(&self) -> u64 {
-        self.geometry.shapes().iter().map(Shape::triangle_count).sum()
+        self.geometry.objects().iter().map(Object::triangle_count).sum()
     }
 
     /// Shapes of any kind; a mesh instance counts as one.
     pub fn object_count(&self) -> u64 {
-        self.geometry.shapes().len() as u64
+        self.geometry.objects().len() as u64
     }
 
     /// Bytes held by all trees, shared ones once.

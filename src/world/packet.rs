@@ -1,6 +1,5 @@
 //! Up to sixteen rays at once through a scene: what they hit is what each hits alone.
 
-use super::side_by_side;
 use super::{Geometry, Hit};
 use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
@@ -64,9 +63,9 @@ struct Nearest<'a> {
 impl ClosestTest for Nearest<'_> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut Ends) {
-        let shape = &self.geometry.shapes()[id as usize];
+        let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
-        side_by_side::closest(shape, self.rays, self.rows, met, &of_these(met, ends), &mut found);
+        object.closest_rows(self.rays, self.rows, met, &of_these(met, ends), &mut found);
         for (lane, end) in ends.iter_mut().enumerate() {
             let t = found.t[lane];
             let is_nearer = (t < *end) | ((t == *end) & (id < self.object[lane]));
@@ -120,9 +119,9 @@ impl AnyTest for Blockers<'_> {
         if met == 0 {
             return 0;
         }
-        let shape = &self.geometry.shapes()[id as usize];
+        let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        side_by_side::any(shape, self.rays, self.rows, met, &of_these(met, ends), except)
+        object.any_rows(self.rays, self.rows, met, &of_these(met, ends), except)
     }
 }
 
@@ -181,6 +180,7 @@ mod tests {
     use crate::accel::Instructions;
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
+    use crate::geometry::Shape;
     use crate::geometry::cuboid::Cuboid;
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::parallelogram::Parallelogram;
@@ -190,7 +190,7 @@ mod tests {
     use crate::math::{DVec3, Vec3};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
-    use crate::world::shape::{MeshInstance, Shape};
+    use crate::world::{MeshInstance, Object};
 
     /// Random numbers in [−1, 1).
     fn random(seed: u64) -> impl FnMut() -> f32 {
@@ -211,28 +211,29 @@ mod tests {
         }
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
         let tree = Arc::new(MeshTree::build(loaded, accel, &CancelToken::new()).expect("nobody cancels"));
-        let mut shapes = vec![Shape::Plane(Plane::new(DVec3::new(0.0, -2.0, 0.0), DVec3::Y))];
+        let floor = Plane::new(DVec3::new(0.0, -2.0, 0.0), DVec3::Y);
+        let mut objects = vec![Object::Shape(Shape::Plane(floor))];
         for i in 0..30 {
             let center = DVec3::new(f64::from(i % 5), f64::from(i / 5 % 3), f64::from(i / 15)) * 1.5
                 - DVec3::splat(2.0);
-            shapes.push(match i % 3 {
+            objects.push(Object::Shape(match i % 3 {
                 0 => Shape::Box(Cuboid::new(center, DVec3::splat(0.9), DVec3::splat(f64::from(i)))),
                 1 => Shape::Quad(Parallelogram::new(center, DVec3::X, DVec3::new(0.0, 0.8, 0.4))),
                 _ => Shape::Sphere(Sphere { center, radius: 0.6 }),
-            });
+            }));
         }
         let placed = |i: i32| {
             let at = DVec3::new(f64::from(i) - 1.0, f64::from(i) * 0.7, 0.3);
             Transform::scale_rotate_translate(DVec3::splat(1.3), DVec3::splat(20.0 * f64::from(i)), at)
         };
         for transform in [Transform::IDENTITY, placed(0), placed(1), placed(2)] {
-            shapes.push(Shape::Mesh(Box::new(MeshInstance {
+            objects.push(Object::Mesh(Box::new(MeshInstance {
                 tree: Arc::clone(&tree),
                 transform,
                 smooth: false,
             })));
         }
-        Geometry::build(shapes, Vec::new(), &CancelToken::new()).expect("nobody cancels")
+        Geometry::build(objects, &CancelToken::new()).expect("nobody cancels")
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::accel::{Instructions, Loops};
-use crate::geometry::ShapeHit;
 use crate::geometry::cuboid::Cuboid;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
@@ -58,14 +57,14 @@ impl Random {
 }
 
 /// One of each kind on the axes and one askew, of a size.
-fn shapes(scale: f64) -> Vec<Shape> {
+fn shapes(scale: f64) -> Vec<Object> {
     let (center, askew) = (DVec3::new(0.3, -0.2, 0.1) * scale, DVec3::new(0.3, -0.7, 0.5));
     let quad = |corner: DVec3, u: DVec3, v: DVec3| {
         Shape::Quad(Parallelogram::new(corner * scale, u * scale, v * scale))
     };
     let triangle =
         |a: DVec3, b: DVec3, c: DVec3| Shape::Triangle(Triangle { a: a * scale, b: b * scale, c: c * scale });
-    vec![
+    let shapes = [
         Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)),
         Shape::Plane(Plane::new(center, askew)),
         quad(DVec3::new(-1.0, 0.0, -1.0), DVec3::X * 2.0, DVec3::Z * 2.0),
@@ -79,12 +78,13 @@ fn shapes(scale: f64) -> Vec<Shape> {
         Shape::Disk(Disk::new(DVec3::ZERO, DVec3::Z, scale)),
         Shape::Disk(Disk::new(center, askew, 0.8 * scale)),
         Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Y * scale, 0.5 * scale, true)),
-    ]
+    ];
+    shapes.map(Object::Shape).to_vec()
 }
 
 /// What a packet hits, and which rays hit any part but one.
 struct Both<'a> {
-    shape: &'a Shape,
+    object: &'a Object,
     rays: &'a [Ray],
     met: u32,
     except: (u32, &'a [u32; PACKET]),
@@ -95,15 +95,15 @@ impl Loops for Both<'_> {
 
     #[inline(always)]
     fn run(self) -> Self::Done {
-        let Self { shape, rays, met, except } = self;
+        let Self { object, rays, met, except } = self;
         let (rows, mut ends) = RayRows::new(rays);
         for (lane, end) in ends.iter_mut().enumerate() {
             *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
         let mut found = HitRows::none();
-        closest(shape, rays, &rows, met, &ends, &mut found);
-        let any_part = any(shape, rays, &rows, met, &ends, None);
-        (found, any_part, any(shape, rays, &rows, met, &ends, Some(except)))
+        object.closest_rows(rays, &rows, met, &ends, &mut found);
+        let any_part = object.any_rows(rays, &rows, met, &ends, None);
+        (found, any_part, object.any_rows(rays, &rows, met, &ends, Some(except)))
     }
 }
 
@@ -113,19 +113,19 @@ fn bits(hit: ShapeHit) -> [u32; 4] {
 }
 
 /// Compare a packet with its rays alone; how many hit.
-fn assert_packet(shape: &Shape, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET])) -> usize {
+fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET])) -> usize {
     let met = met & ((1 << rays.len()) - 1);
     let alone = |lane: usize| {
         let is_traced = rays.get(lane).is_some() && met & 1 << lane != 0;
-        is_traced.then(|| shape.closest(&rays[lane], &rays[lane].to_f64())).flatten()
+        is_traced.then(|| object.closest(&rays[lane], &rays[lane].to_f64())).flatten()
     };
     let mut hits = 0;
     for instructions in Instructions::ALL {
-        let (found, any_part, other_part) = instructions.run(Both { shape, rays, met, except });
+        let (found, any_part, other_part) = instructions.run(Both { object, rays, met, except });
         hits = 0;
         for lane in 0..PACKET {
             let alone = alone(lane);
-            let what = || format!("{instructions:?}, {lane} of {rays:?} at {shape:?}");
+            let what = || format!("{instructions:?}, {lane} of {rays:?} at {object:?}");
             assert_eq!(found.get(lane).map(bits), alone.map(bits), "{}", what());
             assert_eq!(any_part & 1 << lane != 0, alone.is_some(), "{}", what());
             let own = if except.0 & 1 << lane == 0 { None } else { Some(except.1[lane]) };
@@ -141,7 +141,7 @@ fn assert_packet(shape: &Shape, rays: &[Ray], met: u32, except: (u32, &[u32; PAC
 fn rays_side_by_side_get_the_bits_that_they_get_alone() {
     let mut random = Random(11);
     for scale in [1.0_f32, 1e-18, 1e15] {
-        for shape in shapes(f64::from(scale)) {
+        for object in shapes(f64::from(scale)) {
             let (mut hits, mut rays_in_all) = (0, 0);
             for i in 0..2000 {
                 let kind = random.below(6);
@@ -150,19 +150,19 @@ fn rays_side_by_side_get_the_bits_that_they_get_alone() {
                 let met = [0xffff, random.below(1 << 16) as u32][random.below(2)];
                 let parts = std::array::from_fn(|_| random.below(6) as u32);
                 let except = (random.below(1 << 16) as u32, &parts);
-                hits += assert_packet(&shape, &rays, met, except);
+                hits += assert_packet(&object, &rays, met, except);
                 // Ends at exactly the hit, next to it and near it.
                 let [before, at] = [f32::next_down as fn(f32) -> f32, |end| end];
                 let nudge = [before, at, f32::next_up, |end| end * 0.999_999, |end| end * 0.5][i % 5];
                 for ray in &mut rays {
-                    if let Some(hit) = shape.closest(ray, &ray.to_f64()) {
+                    if let Some(hit) = object.closest(ray, &ray.to_f64()) {
                         ray.t_max = nudge(hit.t);
                     }
                 }
-                assert_packet(&shape, &rays, met, except);
+                assert_packet(&object, &rays, met, except);
                 rays_in_all += rays.len();
             }
-            assert!(hits > rays_in_all / 100 && hits < rays_in_all, "{hits} of {rays_in_all}: {shape:?}");
+            assert!(hits > rays_in_all / 100 && hits < rays_in_all, "{hits} of {rays_in_all}: {object:?}");
         }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
-use crate::scene::description::{ColorSource, Encoding, Material, MaterialKind, Scene, Shape};
+use crate::scene::description::{Encoding, Scene, TextureUse};
 
 /// An image file, and how its numbers are read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -15,15 +15,6 @@ pub struct TextureSource {
     pub path: PathBuf,
     /// How its numbers are read.
     pub encoding: ImageEncoding,
-}
-
-/// What a texture is used for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Use {
-    /// Colours.
-    Color,
-    /// Normals.
-    Normal,
 }
 
 /// An image file that is needed.
@@ -51,7 +42,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
     };
     let (used_materials, own_materials) = in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
-        for (texture, used) in material_textures(material) {
+        for (texture, used) in material.textures() {
             add(NeededTexture {
                 source: declared_source(scene, texture, used),
                 name: scene.textures[texture].name.clone(),
@@ -79,53 +70,39 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
     for object in &scene.objects {
-        match (object.material, &object.shape) {
+        match (object.material, object.shape.mesh().map(|mesh| mesh.file)) {
             (Some(material), _) => materials[material] = true,
-            (None, Shape::Mesh { file, .. }) => files[*file] = true,
-            (None, _) => {}
+            (None, Some(file)) => files[file] = true,
+            (None, None) => {}
         }
     }
     (materials, files)
 }
 
 /// Where a texture of the scene file comes from when it is used for something.
-pub fn declared_source(scene: &Scene, texture: usize, used: Use) -> TextureSource {
+pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
-        (Encoding::Srgb, _) => ImageEncoding::Srgb,
-        (Encoding::Linear, _) | (Encoding::Auto, Use::Normal) => ImageEncoding::Linear,
-        (Encoding::Auto, Use::Color) => ImageEncoding::Color,
+        (Encoding::Srgb, TextureUse::Color | TextureUse::Normal) => ImageEncoding::Srgb,
+        (Encoding::Linear, TextureUse::Color | TextureUse::Normal) | (Encoding::Auto, TextureUse::Normal) => {
+            ImageEncoding::Linear
+        }
+        (Encoding::Auto, TextureUse::Color) => ImageEncoding::Color,
     };
     TextureSource { path: texture.file.value.clone(), encoding }
 }
 
 /// Where a texture of a mesh file comes from.
-pub fn file_source(path: &Path, used: Use) -> TextureSource {
+pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
     let encoding = match used {
-        Use::Color => ImageEncoding::Color,
-        Use::Normal => ImageEncoding::Linear,
+        TextureUse::Color => ImageEncoding::Color,
+        TextureUse::Normal => ImageEncoding::Linear,
     };
     TextureSource { path: path.to_owned(), encoding }
 }
 
-/// Indices of the textures that a material names.
-fn material_textures(material: &Material) -> Vec<(usize, Use)> {
-    let MaterialKind::Phong { diffuse, specular, ambient, normal_map, .. } = &material.kind else {
-        return Vec::new();
-    };
-    let color = |source: &ColorSource| match source {
-        ColorSource::Texture(index) => Some((*index, Use::Color)),
-        ColorSource::Constant(_) => None,
-    };
-    let normal = normal_map.map(|(index, _)| (index, Use::Normal));
-    [color(diffuse), color(specular), ambient.as_ref().and_then(color), normal]
-        .into_iter()
-        .flatten()
-        .collect()
-}
-
-fn file_textures(material: &FileMaterial) -> impl Iterator<Item = (&Path, Use)> {
+fn file_textures(material: &FileMaterial) -> impl Iterator<Item = (&Path, TextureUse)> {
     let color = [&material.diffuse_texture, &material.specular_texture];
-    let colors = color.into_iter().flatten().map(|path| (path.as_path(), Use::Color));
-    colors.chain(material.normal_texture.iter().map(|path| (path.as_path(), Use::Normal)))
+    let colors = color.into_iter().flatten().map(|path| (path.as_path(), TextureUse::Color));
+    colors.chain(material.normal_texture.iter().map(|path| (path.as_path(), TextureUse::Normal)))
 }

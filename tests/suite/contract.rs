@@ -279,7 +279,7 @@ fn a_table_of_required_keys_alone_is_enough() {
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
     let scene = outcome.scene.expect("a scene");
     assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 1, 3));
-    assert_eq!(scene.render.output, None);
+    assert_eq!(scene.output, None);
 }
 
 #[test]
@@ -357,7 +357,7 @@ fn paths_in_a_scene_are_seen_from_its_folder() {
     let (folder, path) = folder();
     let outcome = parse(example(|_, _| false).into(), &path);
     let scene = outcome.scene.expect("a scene");
-    assert_eq!(scene.render.output, Some(folder.path().join("scenes/cornell.png")));
+    assert_eq!(scene.output, Some(folder.path().join("scenes/cornell.png")));
     assert_eq!(scene.mesh_files[0].value, folder.path().join("scenes/../assets/knot.obj"));
     assert_eq!(scene.textures[1].file.value, folder.path().join("scenes/textures/bricks.png"));
 }

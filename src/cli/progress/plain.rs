@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn no_line_is_said_twice() {
-        let mut plain = Plain::new(Console::new(crate::cli::args::Color::None));
+        let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
         let progress = |fraction, samples| RenderProgress {
             fraction,
             elapsed_seconds: 1.0,

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::axial::{self, AxialFrame, at_turn, exact_t, radial, turn};
 use super::surface::{self, SurfacePoint};
-use super::{Aabb, RayF64, ShapeHit};
+use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 use crossing::UnitLine;
 
@@ -76,7 +76,7 @@ impl Torus {
     }
 
     /// Point and unit normal at texture coordinates.
-    pub fn place(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+    pub fn at(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, from_circle) = (at_turn(u), at_turn(v));
         let normal = (out * from_circle.x).extend(from_circle.y);
         (self.frame.point((out * self.radius).extend(0.0) + normal * self.tube), self.frame.vector(normal))
@@ -91,25 +91,42 @@ impl Torus {
         self.frame.origin.abs().max_element() + self.radius + self.tube
     }
 
+    /// A point of the surface, uniform over the area: the angle ψ of the tube has density 1 + (tube/radius)·cos ψ, so that of the
+    /// uniform ψ and its mirror image π − ψ, whose densities sum to a constant, one is taken by its share.
+    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+        let (x, y) = (f64::from(u.x), f64::from(u.y));
+        // cos ψ at v = y, since ψ = 0 is v = ½.
+        let share = 0.5 - 0.5 * (self.tube / self.radius) * (2.0 * PI * y).cos();
+        let (point, normal) =
+            if x < share { self.at(x / share, y) } else { self.at((x - share) / (1.0 - share), 1.5 - y) };
+        AreaPoint { point, normal }
+    }
+
     /// Distance from the surface, negative inside.
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         let p = self.frame.local(point);
         DVec2::new(p.truncate().length() - self.radius, p.z).length() - self.tube
     }
 
-    /// Centre.
-    pub fn center(&self) -> DVec3 {
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
         self.frame.origin
     }
 
-    /// Radius of the tube over that of the circle.
-    pub fn slimness(&self) -> f64 {
-        self.tube / self.radius
+    /// Whether a point is inside.
+    pub fn contains(&self, point: DVec3) -> bool {
+        self.signed_distance(point) < 0.0
     }
 
-    /// Area.
-    pub fn area(&self) -> f64 {
-        4.0 * PI * PI * self.radius * self.tube
+    /// A quarter of the area: what faces a direction, times the cosines, on average over all of them.
+    pub fn shown(&self, _: DVec3) -> f64 {
+        let [area] = self.areas();
+        area / 4.0
+    }
+
+    /// Area of its one part.
+    pub fn areas(&self) -> [f64; 1] {
+        [4.0 * PI * PI * self.radius * self.tube]
     }
 
     /// The box around it.
@@ -172,7 +189,7 @@ mod tests {
         assert_eq!(surface.uv, Vec2::splat(0.5));
         assert!((surface.dpdu - Vec3::NEG_Z * (5.0 * pi)).length() < 1e-5);
         assert!((surface.dpdv - Vec3::Y * pi).length() < 1e-5);
-        let (point, normal) = ring().place(0.5, 0.75);
+        let (point, normal) = ring().at(0.5, 0.75);
         assert!((point - DVec3::new(2.0, 0.5, 0.0)).length() < 1e-14 && (normal - DVec3::Y).length() < 1e-14);
     }
 

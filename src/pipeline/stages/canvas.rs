@@ -1,9 +1,9 @@
 //! A film with what it is of, and how far it is.
 
-use super::super::fingerprint::Key;
 use super::super::plan::Plan;
 use super::super::trace::Job;
 use crate::film::{Film, FilmError, Previewer, RadianceImage};
+use crate::scene::fingerprint::Key;
 
 /// A film that is being rendered, or that was.
 #[derive(Debug)]
@@ -26,7 +26,8 @@ impl Canvas {
     /// # Errors
     /// There is no memory for the film.
     pub(super) fn new(key: Key, plan: &Plan, most_bytes: u64) -> Result<Self, FilmError> {
-        let film = Film::within(most_bytes, plan.settings.width, plan.settings.height, plan.crop)?;
+        let film =
+            Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?;
         let done = vec![0; film.tile_count()];
         Ok(Self { key, film, done, base: None, previewer: None, ended_by: None })
     }

@@ -1,7 +1,7 @@
 //! The films of the last settings: a toggle that is switched back finds its film again.
 
-use super::super::fingerprint::Key;
 use super::canvas::Canvas;
+use crate::scene::fingerprint::Key;
 
 /// Memory for films that are not the current one.
 const MOST_KEPT_BYTES: u64 = 256 << 20;
@@ -87,9 +87,9 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::pipeline::fingerprint::Fingerprint;
     use crate::pipeline::plan::plan;
     use crate::pipeline::tests::loaded_of;
+    use crate::scene::fingerprint::Fingerprint;
 
     fn key(name: &str) -> Key {
         Fingerprint::new(name).finish()

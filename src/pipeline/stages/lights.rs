@@ -1,19 +1,30 @@
-//! The lights of a world. They are gathered while it is put together; this stage says whether they changed.
+//! The lights of a scene, gathered anew when one of them changed.
+
+use std::sync::Arc;
 
 use super::super::cache::Memo;
-use super::accel::Ingredients;
 use super::{Staged, keys};
-use crate::world::World;
+use crate::lights::Lights;
+use crate::scene::description::Scene;
+use crate::scene::fingerprint::Referents;
+use crate::world::{self, Geometry};
 
-/// How the lights stand.
-pub(in crate::pipeline) fn lights(from: &Ingredients<'_>, world: &World, memo: &mut Memo<()>) -> Staged<()> {
-    let key = keys::lights(from.scene, &from.mesh_keys());
-    let same = memo.get(key).is_some();
-    memo.set(key, ());
-    match world.light_count() {
-        0 => Staged::skipped((), "the scene has no light"),
-        _ if same => Staged::reused((), "no light changed"),
-        1 => Staged::done((), "1 light"),
-        count => Staged::done((), format!("{count} lights")),
+/// Gather them.
+pub(in crate::pipeline) fn lights(
+    scene: &Scene,
+    of: &Referents<'_>,
+    geometry: &Geometry,
+    memo: &mut Memo<Arc<Lights>>,
+) -> Staged<Arc<Lights>> {
+    let key = keys::lights(scene, of);
+    if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
+        return Staged::reused(lights.clone(), "no light changed");
+    }
+    let lights = world::lights(scene, geometry);
+    memo.set(key, lights.clone());
+    match lights.len() {
+        0 => Staged::skipped(lights, "the scene has no light"),
+        1 => Staged::done(lights, "1 light"),
+        count => Staged::done(lights, format!("{count} lights")),
     }
 }

@@ -7,14 +7,13 @@ use std::time::SystemTime;
 use rayon::prelude::*;
 
 use super::super::cache::Pool;
-use super::super::fingerprint::{Fingerprint, Key};
 use super::super::watch::content::{Content, FileRead, may_have_changed};
 use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::Loaded;
-use crate::scene::description::Shape;
+use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// A mesh file with the files that it names.
 #[derive(Debug)]
@@ -85,10 +84,10 @@ pub(in crate::pipeline) fn meshes(
         meshes.push(mesh);
     }
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
-        if let Shape::Mesh { file, .. } = object.shape
-            && meshes[file].mesh.lacks_materials()
+        if let Some(mesh) = object.shape.mesh()
+            && meshes[mesh.file].mesh.lacks_materials()
         {
-            let name = files[file].value.display();
+            let name = files[mesh.file].value.display();
             let message = format!("[[mesh]] needs `material`: {name} has no materials of its own");
             let help = "add a line such as `material = \"name\"`";
             findings.error(loaded, object.span.clone(), message, help);
@@ -130,7 +129,7 @@ fn one(
             let mut key = Fingerprint::new("mesh");
             key.key(&file_key(path, content));
             for file in &companions {
-                key.path(&file.path).content(file.content);
+                file.content.add_to(key.path(&file.path));
             }
             Ok((Arc::new(KeptMesh { mesh: Arc::new(mesh), key: key.finish(), companions }), false))
         }
@@ -162,7 +161,9 @@ fn contents_of<'a>(
 }
 
 fn file_key(path: &Path, content: Content) -> Key {
-    Fingerprint::new("file").path(path).content(content).finish()
+    let mut key = Fingerprint::new("file");
+    content.add_to(key.path(path));
+    key.finish()
 }
 
 /// One file by whatever name; a name that leads nowhere stands for itself.

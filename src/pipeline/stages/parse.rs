@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::cache::Memo;
-use super::super::fingerprint::Fingerprint;
 use super::super::protocol::Failure;
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::{Findings, Staged, Stop};
@@ -13,6 +12,7 @@ use crate::assets::orbiter::load as load_orbiter;
 use crate::control::CancelToken;
 use crate::scene;
 use crate::scene::description::Camera;
+use crate::scene::fingerprint::Fingerprint;
 
 /// A scene that was understood.
 #[derive(Debug)]
@@ -36,7 +36,8 @@ pub(in crate::pipeline) fn parse(
     let content = contents.read(path, token)?;
     findings.read(FileRead { path: path.to_owned(), content });
     let mut key = Fingerprint::new("parse");
-    let key = key.path(path).content(content).finish();
+    content.add_to(key.path(path));
+    let key = key.finish();
     let known = memo.get(key).cloned();
     let loaded = match &known {
         Some(parsed) => parsed.loaded.clone(),

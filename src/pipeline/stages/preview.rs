@@ -26,8 +26,8 @@ pub(in crate::pipeline) struct Screen<'a> {
 impl Screen<'_> {
     /// Columns and rows of the pictures.
     pub(super) fn size(&self) -> Option<(u32, u32)> {
-        let settings = &self.plan.settings;
-        self.bounds.and_then(|bounds| fit(settings.width, settings.height, bounds))
+        let render = &self.plan.settings.render;
+        self.bounds.and_then(|bounds| fit(render.width, render.height, bounds))
     }
 
     /// The whole film, unless that is cancelled. For when no tile is being rendered, as the pool helps.

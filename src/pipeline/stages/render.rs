@@ -6,7 +6,6 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::fingerprint::Key;
 use super::super::pace::{Clock, Pace};
 use super::super::plan::Plan;
 use super::super::protocol::{PreviewSize, RenderProgress};
@@ -18,6 +17,8 @@ use super::preview::Screen;
 use super::{Staged, Stop};
 use crate::film::{Film, Rect};
 use crate::integrators::{RayCounters, RenderSettings};
+use crate::scene::description::Render;
+use crate::scene::fingerprint::Key;
 
 /// At most this often.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
@@ -27,7 +28,7 @@ const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
 const PREVIEW_SHARE: u32 = 10;
 
 /// What the stage is given.
-pub(in crate::pipeline) struct Order<'a> {
+pub(in crate::pipeline) struct Rendering<'a> {
     pub(in crate::pipeline) tracer: Tracer<'a>,
     pub(in crate::pipeline) plan: &'a Plan,
     pub(in crate::pipeline) preview: Option<PreviewSize>,
@@ -49,19 +50,19 @@ pub(in crate::pipeline) struct Order<'a> {
 pub(in crate::pipeline) fn render(
     key: Key,
     films: &mut Films,
-    order: &Order<'_>,
+    rendering: &Rendering<'_>,
 ) -> Result<Staged<RayCounters>, Stop> {
-    let wanted = order.plan.samples;
+    let wanted = rendering.plan.settings.render.samples;
     let is_other = films.current().is_some_and(|current| current.key != key);
-    films.select(key, |kept| !order.force && kept.done.iter().all(|done| *done <= wanted));
+    films.select(key, |kept| !rendering.force && kept.done.iter().all(|done| *done <= wanted));
     if films.current().is_none() {
-        films.put(|| Canvas::new(key, order.plan, order.most_film_bytes)).map_err(Stop::work)?;
+        films.put(|| Canvas::new(key, rendering.plan, rendering.most_film_bytes)).map_err(Stop::work)?;
     }
     let Some(canvas) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
-    let budget = order.plan.time_seconds;
+    let budget = rendering.plan.time_seconds;
     let finished = canvas.is_complete(wanted) || (budget.is_some() && canvas.ended_by == budget);
     let had = canvas.samples();
-    let mut painter = Painter::new(canvas, order);
+    let mut painter = Painter::new(canvas, rendering);
     if finished {
         painter.show();
         let why = if is_other { "its film was kept" } else { "nothing that it shows changed" };
@@ -83,7 +84,7 @@ pub(in crate::pipeline) fn render(
 /// One run of the stage.
 struct Painter<'a> {
     canvas: &'a mut Canvas,
-    order: &'a Order<'a>,
+    rendering: &'a Rendering<'a>,
     screen: Screen<'a>,
     clock: Clock,
     pace: Pace,
@@ -99,15 +100,15 @@ struct Painter<'a> {
 }
 
 impl<'a> Painter<'a> {
-    fn new(canvas: &'a mut Canvas, order: &'a Order<'a>) -> Self {
+    fn new(canvas: &'a mut Canvas, rendering: &'a Rendering<'a>) -> Self {
         let units = canvas.units(|tile| canvas.done[tile]);
-        let total_units = canvas.units(|_| order.plan.samples);
-        let bounds = (order.take_preview)().unwrap_or(order.preview);
+        let total_units = canvas.units(|_| rendering.plan.settings.render.samples);
+        let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
         Self {
             is_first: !canvas.is_covered(),
             canvas,
-            order,
-            screen: Screen { bounds, plan: order.plan, sink: order.sink },
+            rendering,
+            screen: Screen { bounds, plan: rendering.plan, sink: rendering.sink },
             clock: Clock::start(),
             pace: Pace::new(units, total_units),
             fraction: 0.0,
@@ -132,8 +133,8 @@ impl<'a> Painter<'a> {
             self.show();
             self.tick();
         }
-        while !self.canvas.is_complete(self.order.plan.samples) && !self.is_over_time {
-            self.pass(next_pass(self.canvas.samples(), self.order.plan.samples))?;
+        while !self.canvas.is_complete(self.rendering.plan.settings.render.samples) && !self.is_over_time {
+            self.pass(next_pass(self.canvas.samples(), self.rendering.plan.settings.render.samples))?;
         }
         self.show();
         self.say_progress(true);
@@ -143,7 +144,7 @@ impl<'a> Painter<'a> {
     /// All tiles that have fewer samples than `target`.
     fn pass(&mut self, target: u32) -> Result<(), Stop> {
         let jobs = self.canvas.jobs(target);
-        let tracer = self.order.tracer;
+        let tracer = self.rendering.tracer;
         tracer.run(&jobs, |result| {
             if let Some((job, samples, rays)) = result {
                 self.canvas.film.add(job.tile, &samples);
@@ -164,22 +165,22 @@ impl<'a> Painter<'a> {
             self.next_progress = now + PROGRESS_INTERVAL;
             self.say_progress(false);
         }
-        if let Some(bounds) = (self.order.take_preview)() {
+        if let Some(bounds) = (self.rendering.take_preview)() {
             (self.screen.bounds, self.next_preview) = (bounds, now);
         }
         if now >= self.next_preview && self.screen.show_some(self.canvas) {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
-        (self.order.pulse)(self.canvas, !self.is_first);
-        let seconds = self.clock.seconds(self.order.tracer.token.is_paused());
-        let budget = self.order.plan.time_seconds;
+        (self.rendering.pulse)(self.canvas, !self.is_first);
+        let seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
+        let budget = self.rendering.plan.time_seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
     }
 
     fn say_progress(&mut self, is_last: bool) {
-        let elapsed_seconds = self.clock.seconds(self.order.tracer.token.is_paused());
+        let elapsed_seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
         let (mut fraction, mut eta_seconds) = self.pace.at(elapsed_seconds, self.units);
-        if let Some(budget) = self.order.plan.time_seconds {
+        if let Some(budget) = self.rendering.plan.time_seconds {
             // The first pass is finished whatever the budget is.
             let of_first = eta_seconds.map_or(0.0, |eta| eta * self.share_of_first());
             let left = (budget - elapsed_seconds).max(of_first);
@@ -188,12 +189,12 @@ impl<'a> Painter<'a> {
             fraction = fraction.max(elapsed_seconds / (elapsed_seconds + left)).min(1.0);
         }
         self.fraction = if is_last { 1.0 } else { self.fraction.max(fraction) };
-        self.order.sink.progress(RenderProgress {
+        self.rendering.sink.progress(RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
             eta_seconds: if is_last { Some(0.0) } else { eta_seconds },
             samples: (self.units / self.canvas.film.crop().area() as u64) as u32,
-            total_samples: self.order.plan.samples,
+            total_samples: self.rendering.plan.settings.render.samples,
         });
     }
 
@@ -207,25 +208,26 @@ impl<'a> Painter<'a> {
     }
 
     fn show(&mut self) {
-        let Tracer { pool, token, .. } = self.order.tracer;
+        let Tracer { pool, token, .. } = self.rendering.tracer;
         self.screen.show(self.canvas, pool, token);
         self.next_preview = Instant::now() + PREVIEW_INTERVAL;
     }
 
     /// A first picture with one sample at the preview's own resolution, where that is much less work than one pass.
     fn coarse(&mut self) -> Result<(), Stop> {
-        let plan = self.order.plan;
-        let (full_width, full_height) = (plan.settings.width, plan.settings.height);
+        let plan = self.rendering.plan;
+        let (full_width, full_height) = (plan.settings.render.width, plan.settings.render.height);
         let Some((width, height)) = self.screen.size() else { return Ok(()) };
         let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
         if pixels(width, height) * 2 > pixels(full_width, full_height) {
             return Ok(());
         }
-        let settings = RenderSettings { width, height, ..plan.settings };
+        let render = Render { width, height, ..plan.settings.render };
+        let settings = RenderSettings { render, ..plan.settings };
         let crop = plan.crop.map(|rect| scale(rect, (full_width, full_height), (width, height)));
         let film = Film::new(width, height, crop).map_err(Stop::work)?;
         let jobs = jobs(&film, |_| 0..1);
-        let tracer = Tracer { settings: &settings, ..self.order.tracer };
+        let tracer = Tracer { settings: &settings, ..self.rendering.tracer };
         tracer.run(&jobs, |result| {
             if let Some((job, samples, _)) = result {
                 film.add(job.tile, &samples);

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::super::cache::Pool;
-use super::super::fingerprint::{Fingerprint, Key};
 use super::super::watch::content::{Content, FileRead};
 use super::meshes::canonical;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
@@ -18,6 +17,7 @@ use crate::control::{Cancelled, Progress};
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
 use crate::scene::description::Encoding;
+use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::world::{NeededTexture, TextureSource};
 
 /// Most bytes that the texels of a scene's images may take together.
@@ -100,7 +100,9 @@ impl Image<'_> {
 
     fn key(&self) -> Key {
         let (path, encoding) = &self.name;
-        Fingerprint::new("texture").path(path).index(*encoding as usize).content(self.content).finish()
+        let mut key = Fingerprint::new("texture");
+        self.content.add_to(key.path(path).index(*encoding as usize));
+        key.finish()
     }
 }
 

@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::super::fingerprint::{Fingerprint, Key};
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
 use super::super::protocol::{Failure, Writing};
@@ -12,10 +11,12 @@ use super::super::targets::{conflicts, guarded};
 use super::super::watch::content::{Content, Contents};
 use super::canvas::Canvas;
 use super::{Staged, Stop};
+use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::SampleStats;
 use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
+use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// What was written where, and what the file held then.
 #[derive(Debug, Default)]
@@ -57,7 +58,11 @@ pub(in crate::pipeline) fn check_targets(writing: Writing, plan: &Plan, sink: &S
 fn find_targets(plan: &Plan) -> Result<(), OutputError> {
     let check = |path: &PathBuf| {
         let format = output::check_target(path)?;
-        format.check_picture(plan.settings.width, plan.settings.height, BitDepth::try_from(plan.bit_depth)?)
+        format.check_picture(
+            plan.settings.render.width,
+            plan.settings.render.height,
+            BitDepth::try_from(plan.bit_depth)?,
+        )
     };
     plan.outputs.iter().try_for_each(check)?;
     plan.report.iter().try_for_each(|path| output::check_place(path))
@@ -169,11 +174,11 @@ fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
     let pairs = [
         ("glimt:scene", plan.name.clone()),
         ("glimt:samples", samples),
-        ("glimt:integrator", settings.integrator.to_owned()),
-        ("glimt:shadows", settings.shadows.to_owned()),
-        ("glimt:max_depth", plan.settings.max_depth.to_string()),
+        ("glimt:integrator", settings.integrator.name().to_owned()),
+        ("glimt:shadows", settings.shadows.name().to_owned()),
+        ("glimt:max_depth", plan.settings.render.max_depth.to_string()),
         ("glimt:dof", settings.dof.to_string()),
-        ("glimt:view", settings.view.to_owned()),
+        ("glimt:view", settings.view.name().to_owned()),
         ("glimt:seed", settings.seed.to_string()),
         ("glimt:exposure", plan.tone.exposure_stops.to_string()),
     ];

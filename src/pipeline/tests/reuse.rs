@@ -1,7 +1,7 @@
 //! What each edit redoes, and what is said of files.
 
 use super::*;
-use crate::scene::description::Shadows;
+use crate::scene::description::{Accel, Shadows};
 
 #[test]
 fn each_edit_redoes_only_what_reads_it() {
@@ -44,7 +44,7 @@ fn each_edit_redoes_only_what_reads_it() {
     assert!(unchanged, "every kind of tree gives the same picture");
     assert_eq!(report.counters.camera_rays, 0);
     assert!(!report.stages[Stage::Accel as usize].why.contains("kept"), "a tree of another kind");
-    assert_eq!(report.settings.accel, "kdtree");
+    assert_eq!(report.settings.accel, Accel::KdTree);
 
     bench.write("skin.ppm", "P6\n1 1\n255\nxyz");
     let report = bench.done().0;

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use crate::control::{CancelToken, Cancelled};
+use crate::scene::fingerprint::Fingerprint;
 use crate::system::file::{self, Kind};
 
 /// A file that a request read or tried to read.
@@ -29,6 +30,17 @@ pub enum Content {
     Unusable,
     /// A regular file with this hash, of its bytes or, if it is a very long one, of its time stamps.
     Hash([u8; 32]),
+}
+
+impl Content {
+    /// Add it to what a stage read.
+    pub(in crate::pipeline) fn add_to(self, key: &mut Fingerprint) {
+        match self {
+            Self::Missing => key.u64(0),
+            Self::Unusable => key.u64(1),
+            Self::Hash(hash) => key.u64(2).bytes(&hash),
+        };
+    }
 }
 
 /// Younger changes than this are not told apart by every file system's time stamps.

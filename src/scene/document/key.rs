@@ -13,6 +13,7 @@ use super::limits::Limits;
 use super::names::Names;
 use super::table::{Table, Title};
 use super::value::{Item, Value, found, limited, whole, wrong_type};
+use crate::choice::Choice;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 use crate::math::{DVec3, Vec2};
 
@@ -106,28 +107,24 @@ impl<'a> Key<'a> {
         self.value.is_some_and(|value| matches!(value.item(), Item::Table(_)))
     }
 
-    /// One of some words. `unavailable` are words that other versions know.
-    pub(super) fn choice<T: Copy>(
-        &self,
-        words: &[(&'static str, T)],
-        unavailable: &[&'static str],
-    ) -> Option<T> {
+    /// A value by its name.
+    pub(super) fn choice<C: Choice>(&self) -> Option<C> {
         let list = || {
-            let list = words.iter().map(|(word, _)| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
-            if words.len() == 1 { list } else { format!("one of {list}") }
+            let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
+            if C::ALL.len() == 1 { list } else { format!("one of {list}") }
         };
         let text = self.text_or(list)?;
-        if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == text) {
-            return Some(*meaning);
+        if let Some(meant) = C::named(text) {
+            return Some(meant);
         }
         let (span, name, shown, list) = (self.span()?, self.name, shortened(text, 32), list());
-        let mut issue = if unavailable.contains(&text) {
+        let mut issue = if C::UNAVAILABLE.contains(&text) {
             let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
             Issue::error(span, message)
         } else {
             Issue::error(span, format!("`{name}` cannot be \"{shown}\"")).help(format!("expected {list}"))
         };
-        if let Some(near) = nearest(text, words.iter().map(|(word, _)| *word)) {
+        if let Some(near) = nearest(text, C::ALL.iter().map(|one| one.name())) {
             issue = issue.label(format!("did you mean \"{near}\"?"));
         }
         self.context.report(issue);

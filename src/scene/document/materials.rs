@@ -1,11 +1,12 @@
 //! `[materials.*]`.
 
-use super::super::description::{ColorSource, Material, MaterialKind};
+use super::super::description::{ColorSource, Material, MaterialKind, NormalMap};
 use super::context::Issue;
 use super::key::Key;
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
+use crate::choice;
 use crate::math::Vec3;
 
 /// The materials of a file.
@@ -30,11 +31,6 @@ impl Materials {
     pub(super) fn is_emissive(&self, index: usize) -> bool {
         self.emissive.get(index).copied().unwrap_or(false)
     }
-
-    /// Whether a material emits light.
-    pub(super) fn emits(material: &Material) -> bool {
-        matches!(material.kind, MaterialKind::Phong { emission, .. } if emission != Vec3::ZERO)
-    }
 }
 
 pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
@@ -42,32 +38,45 @@ pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
     let names = Names::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read: Vec<Option<Material>> =
         tables.into_iter().map(|(name, _, table)| material(name, &table?, textures)).collect();
-    let emissive = read.iter().map(|material| material.as_ref().is_some_and(Materials::emits)).collect();
+    let emits = |material: &Material| material.emits();
+    let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
     let is_glass = |material: &Material| matches!(material.kind, MaterialKind::Glass { .. });
     let glass = read.iter().map(|material| material.as_ref().is_some_and(is_glass)).collect();
     Materials { names, list: read.into_iter().collect(), emissive, glass }
 }
 
-#[derive(Clone, Copy)]
-enum Kind {
-    Phong,
-    Mirror,
-    Glass,
+choice! {
+    /// What a material does.
+    enum Kind {
+        /// Diffuse and glossy.
+        Phong = "phong",
+        /// A perfect mirror.
+        Mirror = "mirror",
+        /// A smooth dielectric.
+        Glass = "glass",
+    }
 }
-
-const KINDS: [(&str, Kind); 3] = [("phong", Kind::Phong), ("mirror", Kind::Mirror), ("glass", Kind::Glass)];
 
 fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Material> {
     let key = table.optional("type");
     // Without knowing the type, no key can be called unknown.
-    let kind = if key.is_given() { key.choice(&KINDS, &[])? } else { Kind::Phong };
-    let kind = match kind {
-        Kind::Phong => phong(table, textures),
-        Kind::Mirror => mirror(table),
-        Kind::Glass => glass(table),
+    let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
+    let plain = |kind| (kind, Vec3::ZERO, None);
+    let (kind, emission, normal_map) = match kind {
+        Kind::Phong => {
+            (phong(table, textures), emission(&table.optional("emission")), normal_map(table, textures))
+        }
+        Kind::Mirror => plain(mirror(table)),
+        Kind::Glass => plain(glass(table)),
     };
     table.finish();
-    Some(Material { name, kind })
+    Some(Material { name, kind, emission, normal_map })
+}
+
+fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
+    let texture = table.optional("normal_map").name_in(textures);
+    let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
+    texture.map(|texture| NormalMap { texture, strength })
 }
 
 fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
@@ -81,26 +90,22 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
     if !untold {
         warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
     }
-    let normal_map = table.optional("normal_map").name_in(textures);
-    let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
     MaterialKind::Phong {
         diffuse,
         specular,
         shininess: table.optional("shininess").number32(Limits::Between(0.0, 1e6)).unwrap_or(32.0),
         ambient: table.optional("ambient").color_or_texture(textures),
-        emission: emission(&table.optional("emission")).unwrap_or(Vec3::ZERO),
-        normal_map: normal_map.map(|index| (index, strength)),
     }
 }
 
-fn emission(key: &Key<'_>) -> Option<Vec3> {
-    if key.is_table() {
-        let issue = Issue::error(key.span()?, "a texture in `emission` is not supported yet")
+fn emission(key: &Key<'_>) -> Vec3 {
+    if let Some(span) = key.span().filter(|_| key.is_table()) {
+        let issue = Issue::error(span, "a texture in `emission` is not supported yet")
             .help("give it a colour, [r, g, b] or \"#rrggbb\"");
         key.context.report(issue);
-        return None;
+        return Vec3::ZERO;
     }
-    key.color()
+    key.color().unwrap_or(Vec3::ZERO)
 }
 
 /// Warns about a material that reflects more light than falls on it.

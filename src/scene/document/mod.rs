@@ -23,7 +23,6 @@ use super::description::Scene;
 use super::{MAX_FILE_BYTES, Outcome, toml};
 use crate::math::Vec3;
 use context::{Context, Issue};
-use materials::Materials;
 use table::Table;
 
 pub(super) use shapes::is_mesh;
@@ -50,7 +49,7 @@ pub(super) fn lower(source: &Arc<str>, path: &Path) -> Outcome {
 
 /// The whole file. Names are gathered before what refers to them.
 fn scene(root: &Table<'_>) -> Option<Scene> {
-    let render = render::read(root);
+    let (render, output) = render::read(root);
     let camera = camera::read(root);
     let photons = photons::read(root);
     let textures = textures::read(root);
@@ -62,6 +61,7 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
 
     let scene = Scene {
         render: render?,
+        output,
         camera: camera?,
         photons: photons?,
         textures: textures.list?,
@@ -99,7 +99,7 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
         return;
     }
     let own_materials = scene.objects.iter().any(|object| object.material.is_none());
-    let emits = |index: usize| Materials::emits(&scene.materials[index]);
+    let emits = |index: usize| scene.materials[index].emits();
     let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
     if scene.lights.is_empty() && !own_materials && !lamps && scene.render.ambient == Vec3::ZERO {
         let help = "add a [[light]], give a material in use `emission`, or set `ambient` in [render]";

@@ -16,70 +16,49 @@ const MAX_U32: i128 = u32::MAX as i128;
 pub(super) const PICTURES: [&str; 6] = ["png", "exr", "ppm", "hdr", "jpg", "jpeg"];
 
 /// The values of a scene that says nothing.
-fn defaults() -> Render {
-    Render {
-        width: 640,
-        height: 480,
-        samples: 64,
-        shadow_samples: 1,
-        max_depth: 8,
-        integrator: Integrator::Whitted,
-        shadows: Shadows::Soft,
-        ambient: Vec3::ZERO,
-        background: Vec3::ZERO,
-        filter: PixelFilter::Box,
-        exposure: 0.0,
-        tonemap: Tonemap::None,
-        accel: Accel::Bvh,
-        seed: 0,
-        output: None,
-    }
-}
+const DEFAULT: Render = Render {
+    width: 640,
+    height: 480,
+    samples: 64,
+    shadow_samples: 1,
+    max_depth: 8,
+    integrator: Integrator::Whitted,
+    shadows: Shadows::Soft,
+    ambient: Vec3::ZERO,
+    background: Vec3::ZERO,
+    filter: PixelFilter::Box,
+    exposure: 0.0,
+    tonemap: Tonemap::None,
+    accel: Accel::Bvh,
+    seed: 0,
+};
 
-pub(super) fn read(root: &Table<'_>) -> Option<Render> {
-    let default = defaults();
-    let Some(table) = root.table("render") else { return Some(default) };
+/// The settings, and where the picture goes if the scene says so.
+pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
+    let Some(table) = root.table("render") else { return (Some(DEFAULT), None) };
     let key = |name| table.optional(name);
     let render = Render {
-        width: key("width").whole(1..=MAX_SIDE).unwrap_or(default.width),
-        height: key("height").whole(1..=MAX_SIDE).unwrap_or(default.height),
-        samples: key("samples").whole(1..=MAX_U32).unwrap_or(default.samples),
-        shadow_samples: key("shadow_samples").whole(1..=4096).unwrap_or(default.shadow_samples),
-        max_depth: key("max_depth").whole(0..=i128::from(MOST_SCATTERINGS)).unwrap_or(default.max_depth),
-        integrator: key("integrator").choice(&INTEGRATORS, &["path"]).unwrap_or(default.integrator),
-        shadows: key("shadows").choice(&SHADOWS, &[]).unwrap_or(default.shadows),
-        ambient: key("ambient").color().unwrap_or(default.ambient),
-        background: key("background").color().unwrap_or(default.background),
-        filter: key("filter").choice(&FILTERS, &[]).unwrap_or(default.filter),
-        exposure: key("exposure").number32(Limits::Between(-100.0, 100.0)).unwrap_or(default.exposure),
-        tonemap: key("tonemap").choice(&TONEMAPS, &[]).unwrap_or(default.tonemap),
-        accel: key("accel").choice(&ACCELS, &[]).unwrap_or(default.accel),
-        seed: key("seed").whole(0..=MAX_U32).unwrap_or(default.seed),
-        output: output(&table),
+        width: key("width").whole(1..=MAX_SIDE).unwrap_or(DEFAULT.width),
+        height: key("height").whole(1..=MAX_SIDE).unwrap_or(DEFAULT.height),
+        samples: key("samples").whole(1..=MAX_U32).unwrap_or(DEFAULT.samples),
+        shadow_samples: key("shadow_samples").whole(1..=4096).unwrap_or(DEFAULT.shadow_samples),
+        max_depth: key("max_depth").whole(0..=i128::from(MOST_SCATTERINGS)).unwrap_or(DEFAULT.max_depth),
+        integrator: key("integrator").choice().unwrap_or(DEFAULT.integrator),
+        shadows: key("shadows").choice().unwrap_or(DEFAULT.shadows),
+        ambient: key("ambient").color().unwrap_or(DEFAULT.ambient),
+        background: key("background").color().unwrap_or(DEFAULT.background),
+        filter: key("filter").choice().unwrap_or(DEFAULT.filter),
+        exposure: key("exposure").number32(Limits::Between(-100.0, 100.0)).unwrap_or(DEFAULT.exposure),
+        tonemap: key("tonemap").choice().unwrap_or(DEFAULT.tonemap),
+        accel: key("accel").choice().unwrap_or(DEFAULT.accel),
+        seed: key("seed").whole(0..=MAX_U32).unwrap_or(DEFAULT.seed),
     };
+    let output = output(&table);
     refuse_error(&table);
     check_size(&table, &render);
     table.finish();
-    Some(render)
+    (Some(render), output)
 }
-
-const INTEGRATORS: [(&str, Integrator); 1] = [("whitted", Integrator::Whitted)];
-const ACCELS: [(&str, Accel); 3] =
-    [("bvh", Accel::Bvh), ("bvh-high", Accel::BvhHigh), ("kdtree", Accel::KdTree)];
-const SHADOWS: [(&str, Shadows); 3] =
-    [("off", Shadows::Off), ("hard", Shadows::Hard), ("soft", Shadows::Soft)];
-const FILTERS: [(&str, PixelFilter); 4] = [
-    ("box", PixelFilter::Box),
-    ("tent", PixelFilter::Tent),
-    ("gaussian", PixelFilter::Gaussian),
-    ("mitchell", PixelFilter::Mitchell),
-];
-const TONEMAPS: [(&str, Tonemap); 4] = [
-    ("none", Tonemap::None),
-    ("reinhard", Tonemap::Reinhard),
-    ("aces", Tonemap::Aces),
-    ("agx", Tonemap::Agx),
-];
 
 fn output(table: &Table<'_>) -> Option<PathBuf> {
     let key = table.optional("output");

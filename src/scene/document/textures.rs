@@ -10,12 +10,6 @@ use crate::math::Vec2;
 const PICTURES: [&str; 12] =
     ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pnm", "tga", "bmp", "hdr", "exr", "webp"];
 
-const FILTERS: [(&str, TextureFilter); 2] =
-    [("nearest", TextureFilter::Nearest), ("bilinear", TextureFilter::Bilinear)];
-const WRAPS: [(&str, Wrap); 3] = [("repeat", Wrap::Repeat), ("clamp", Wrap::Clamp), ("mirror", Wrap::Mirror)];
-const ENCODINGS: [(&str, Encoding); 3] =
-    [("auto", Encoding::Auto), ("srgb", Encoding::Srgb), ("linear", Encoding::Linear)];
-
 /// The textures of a file.
 pub(super) struct Textures {
     /// What they are called.
@@ -34,10 +28,10 @@ pub(super) fn read(root: &Table<'_>) -> Textures {
 
 fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
     let file = table.required("file", "\"picture.png\"").file(&PICTURES, &[]);
-    let filter = table.optional("filter").choice(&FILTERS, &["mipmap"]).unwrap_or(TextureFilter::Bilinear);
-    let wrap = table.optional("wrap").choice(&WRAPS, &[]).unwrap_or(Wrap::Repeat);
+    let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
+    let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
     let repeat = table.optional("repeat").pair(Limits::NotZero).unwrap_or(Vec2::ONE);
-    let encoding = table.optional("encoding").choice(&ENCODINGS, &[]).unwrap_or(Encoding::Auto);
+    let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
     table.finish();
     Some(Texture { name, file: file?, filter, wrap, repeat, encoding })
 }

@@ -1,8 +1,9 @@
 //! What each key does, and that the help says so.
 
 use super::RED;
+use crate::choice::Choice;
 use crate::pipeline::protocol::{self, Command, Writing};
-use crate::pipeline::settings::{Overrides, View};
+use crate::pipeline::settings::{Effective, Overrides, View};
 use crate::scene::description::Shadows;
 use crate::scene::diagnostic::Severity;
 use crate::tui::action::Action;
@@ -146,7 +147,7 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
 #[test]
 fn depth_of_field_of_a_pinhole_is_explained() {
     let mut desk = Desk::new();
-    let pinhole = || Box::new(protocol::Effective { dof: false, ..settings() });
+    let pinhole = || Box::new(Effective { dof: false, ..settings() });
     desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole() });
     assert!(desk.press('d').is_empty());
     assert!(desk.text().contains("no `aperture`"));

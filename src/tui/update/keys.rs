@@ -1,6 +1,7 @@
 //! What a key does to the state.
 
 use super::{render, say};
+use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
 use crate::scene::description::Shadows;
@@ -54,9 +55,9 @@ fn told(state: &mut State, message: &str) -> Vec<Effect> {
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     let next = match state.shadows() {
-        "soft" => Shadows::Hard,
-        "hard" => Shadows::Off,
-        _ => Shadows::Soft,
+        Shadows::Soft => Shadows::Hard,
+        Shadows::Hard => Shadows::Off,
+        Shadows::Off => Shadows::Soft,
     };
     state.toggles.shadows = Some(next);
     render(state, false)

@@ -5,10 +5,10 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::materials::fresnel::{dielectric, refract};
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{MaterialKind, Shape};
+use glimt::scene::description::{Material, MaterialKind, Mesh, Shape};
 use glimt::world::Geometry;
 
-use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, scene};
+use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, plain, scene};
 use super::{assert_close, assert_mean, v};
 
 /// Horizontal and downward step of a ray at an angle to the vertical.
@@ -17,7 +17,7 @@ fn tilted(degrees: f64) -> DVec3 {
 }
 
 /// A slab of thickness 1 between y = −1 and 0, entered at the origin.
-fn slab(degrees: f64, material: MaterialKind) -> Build {
+fn slab(degrees: f64, material: Material) -> Build {
     scene()
         .cuboid(v(0.0, -0.5, 0.0), v(1000.0, 1.0, 1000.0), DVec3::ZERO, material)
         .seen(-tilted(degrees) * 2.0, DVec3::ZERO)
@@ -176,7 +176,7 @@ fn lossless_glass_under_a_uniform_sky_is_invisible() {
 fn absorption_along_a_slab_and_a_ball() {
     // Straight through d of tint a: (1 − R)²·aᵈ, R = .04; with all reflections (1 − R)²aᵈ/(1 − R²a²ᵈ).
     let tint = Vec3::new(0.5, 0.9, 0.25);
-    let tinted = MaterialKind::Glass { ior: 1.5, tint };
+    let tinted = plain(MaterialKind::Glass { ior: 1.5, tint });
     let ball = scene().sphere(v(0.0, -0.75, 0.0), 0.75, tinted.clone()).seen(v(0.0, 2.0, 0.0), DVec3::ZERO);
     for (build, d) in [(slab(0.0, tinted), 1.0), (ball, 1.5)] {
         let lit = lit_from_below(build);
@@ -192,7 +192,7 @@ fn absorption_along_a_slab_and_a_ball() {
     // Through a ball at the angle θ: the chord is 2R·cos θ', T = (1 − R(θ))²·a^chord.
     let h = 0.7_f64;
     let ball = scene()
-        .sphere(DVec3::ZERO, 1.0, MaterialKind::Glass { ior: 1.5, tint })
+        .sphere(DVec3::ZERO, 1.0, plain(MaterialKind::Glass { ior: 1.5, tint }))
         .background(1.0)
         .depth(2)
         .seen(v(h, 3.0, 0.0), v(h, 0.0, 0.0));
@@ -305,7 +305,7 @@ fn bent_normals_make_no_light() {
     let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
     let seen = scene().mesh(ball, AS_IT_IS, glass(1.5)).background(1.0).depth(50).with(|scene| {
-        if let Shape::Mesh { smooth, .. } = &mut scene.objects[0].shape {
+        if let Shape::Mesh(Mesh { smooth, .. }) = &mut scene.objects[0].shape {
             *smooth = true;
         }
     });

@@ -284,7 +284,7 @@ fn no_split_of_the_work_changes_a_bit() {
         }
     }
     let mut other = settings;
-    other.seed = 5;
+    other.render.seed = 5;
     let rect = Rect { x: 0, y: 0, width: 24, height: 20 };
     let reseeded = render_tile(&world, &other, rect, 0..6, &token).expect("nobody cancels").0.radiance;
     assert_ne!(whole, reseeded);
@@ -334,7 +334,7 @@ fn the_tree_finds_what_a_look_at_every_shape_finds() {
         let direction = if i % 2 == 0 { DVec3::NEG_Z } else { v(random.signed(), random.signed(), -1.0) };
         let ray = Ray::new(origin.as_vec3(), direction.normalize().as_vec3());
         let one_by_one = (0_u32..)
-            .zip(world.geometry.shapes())
+            .zip(world.geometry.objects())
             .filter_map(|(object, shape)| Some(Hit { shape: shape.closest(&ray, &ray.to_f64())?, object }));
         let nearest = one_by_one.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         found += u32::from(nearest.is_some());

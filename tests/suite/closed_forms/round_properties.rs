@@ -105,7 +105,7 @@ fn bounds_hold_every_hit() {
         let center = random_in(&mut random, DVec3::ZERO, 10.0_f64.powi(i % 5));
         for shape in each(&mut random, center) {
             let geometry = geometry(&shape);
-            let bounds = geometry.shapes()[0].bounds().expect("it has an end");
+            let bounds = geometry.objects()[0].bounds().expect("it has an end");
             let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             for _ in 0..2000 {
                 let from = (center + random.direction() * 9.0).as_vec3();

@@ -11,10 +11,10 @@ use glimt::integrators::{RenderSettings, View, render_tile};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Located, Material, MaterialKind, Object,
+    Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Located, Material, MaterialKind, Mesh, Object,
     Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
 };
-use glimt::world::{MeshTree, Parts, World, textures_needed};
+use glimt::world::{Geometry, MeshTree, Parts, World, lights, textures_needed};
 
 use super::v;
 
@@ -44,10 +44,10 @@ pub fn scene() -> Build {
         tonemap: Tonemap::None,
         accel: Accel::Bvh,
         seed: 0,
-        output: None,
     };
     let scene = Scene {
         render,
+        output: None,
         camera: look_at(DVec3::ZERO, DVec3::NEG_Z, NARROW),
         photons: Photons { enabled: false, count: 1, radius: 0.0, bounces: 1 },
         textures: Vec::new(),
@@ -111,31 +111,31 @@ impl Build {
         self.with(|scene| scene.lights.push(light))
     }
 
-    pub fn shape(mut self, shape: Shape, kind: MaterialKind) -> Self {
-        self.scene.materials.push(Material { name: String::new(), kind });
+    pub fn shape(mut self, shape: Shape, material: Material) -> Self {
+        self.scene.materials.push(material);
         let material = Some(self.scene.materials.len() - 1);
         self.scene.objects.push(Object { shape, material, span: 0..0 });
         self
     }
 
-    pub fn sphere(self, center: DVec3, radius: f64, kind: MaterialKind) -> Self {
-        self.shape(Shape::Sphere { center, radius }, kind)
+    pub fn sphere(self, center: DVec3, radius: f64, material: Material) -> Self {
+        self.shape(Shape::Sphere { center, radius }, material)
     }
 
-    pub fn quad(self, corner: DVec3, u: DVec3, v: DVec3, kind: MaterialKind) -> Self {
-        self.shape(Shape::Quad { corner, u, v }, kind)
+    pub fn quad(self, corner: DVec3, u: DVec3, v: DVec3, material: Material) -> Self {
+        self.shape(Shape::Quad { corner, u, v }, material)
     }
 
-    pub fn cuboid(self, center: DVec3, size: DVec3, rotate: DVec3, kind: MaterialKind) -> Self {
-        self.shape(Shape::Box { center, size, rotate }, kind)
+    pub fn cuboid(self, center: DVec3, size: DVec3, rotate: DVec3, material: Material) -> Self {
+        self.shape(Shape::Box { center, size, rotate }, material)
     }
 
-    pub fn triangle(self, [a, b, c]: [DVec3; 3], kind: MaterialKind) -> Self {
-        self.shape(Shape::Triangle { a, b, c }, kind)
+    pub fn triangle(self, [a, b, c]: [DVec3; 3], material: Material) -> Self {
+        self.shape(Shape::Triangle { a, b, c }, material)
     }
 
     /// An instance without smoothing: (scale, rotate, translate).
-    pub fn mesh(mut self, mesh: TriangleMesh, placed: [DVec3; 3], kind: MaterialKind) -> Self {
+    pub fn mesh(mut self, mesh: TriangleMesh, placed: [DVec3; 3], material: Material) -> Self {
         let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("nobody cancels");
@@ -143,7 +143,7 @@ impl Build {
         self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
-        self.shape(Shape::Mesh { file, scale, rotate, translate, smooth: false }, kind)
+        self.shape(Shape::Mesh(Mesh { file, scale, rotate, translate, smooth: false }), material)
     }
 
     /// An instance of a mesh file with materials of its own, without smoothing.
@@ -182,22 +182,15 @@ impl Build {
             let texels = &self.texels[needed.declared.expect("declared in the scene")];
             parts.textures.insert(needed.source, Arc::clone(texels));
         }
-        World::assemble(&self.scene, &parts, None, &CancelToken::new()).expect("nobody cancels")
+        let geometry = Geometry::of_scene(&self.scene, &parts.meshes, &CancelToken::new());
+        let geometry = Arc::new(geometry.expect("nobody cancels"));
+        let lights = lights(&self.scene, &geometry);
+        World::new(&self.scene, &parts, geometry, lights)
     }
 
     pub fn settings(&self, seed: u32) -> RenderSettings {
-        let render = &self.scene.render;
-        RenderSettings {
-            width: render.width,
-            height: render.height,
-            max_depth: render.max_depth,
-            shadows: render.shadows,
-            shadow_samples: render.shadow_samples,
-            filter: render.filter,
-            dof: true,
-            seed,
-            view: self.view,
-        }
+        let render = Render { seed, ..self.scene.render };
+        RenderSettings { render, dof: true, view: self.view }
     }
 
     /// The whole picture, means of the samples.
@@ -232,32 +225,32 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }
 
-pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> MaterialKind {
-    let grey = |x| ColorSource::Constant(Vec3::splat(x));
-    MaterialKind::Phong {
-        diffuse: grey(diffuse),
-        specular: grey(specular),
-        shininess,
-        ambient: None,
-        emission: Vec3::splat(emission),
-        normal_map: None,
-    }
+/// A dark material without a normal map.
+pub fn plain(kind: MaterialKind) -> Material {
+    Material { name: String::new(), kind, emission: Vec3::ZERO, normal_map: None }
 }
 
-pub fn matte(reflectance: f32) -> MaterialKind {
+pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Material {
+    let grey = |x| ColorSource::Constant(Vec3::splat(x));
+    let kind =
+        MaterialKind::Phong { diffuse: grey(diffuse), specular: grey(specular), shininess, ambient: None };
+    Material { emission: Vec3::splat(emission), ..plain(kind) }
+}
+
+pub fn matte(reflectance: f32) -> Material {
     phong(reflectance, 0.0, 1.0, 0.0)
 }
 
-pub fn emitter(radiance: f32) -> MaterialKind {
+pub fn emitter(radiance: f32) -> Material {
     phong(0.0, 0.0, 1.0, radiance)
 }
 
-pub fn mirror(reflectance: f32) -> MaterialKind {
-    MaterialKind::Mirror { reflectance: Vec3::splat(reflectance) }
+pub fn mirror(reflectance: f32) -> Material {
+    plain(MaterialKind::Mirror { reflectance: Vec3::splat(reflectance) })
 }
 
-pub fn glass(ior: f32) -> MaterialKind {
-    MaterialKind::Glass { ior, tint: Vec3::ONE }
+pub fn glass(ior: f32) -> Material {
+    plain(MaterialKind::Glass { ior, tint: Vec3::ONE })
 }
 
 /// A material of a mesh file by its illumination model: 2 is matte grey, 9 glass.

@@ -3,16 +3,18 @@
 use std::f64::consts::PI;
 
 use glimt::integrators::View;
-use glimt::materials::Material;
+use glimt::materials::Bsdf;
 use glimt::math::{DVec3, Vec2, Vec3};
-use glimt::scene::description::{ColorSource, Falloff, MaterialKind, Shadows, Shape, TextureFilter, Wrap};
+use glimt::scene::description::{
+    ColorSource, Falloff, Material, MaterialKind, Mesh, Shadows, Shape, TextureFilter, Wrap,
+};
 
 use super::scenes::{Build, emitter, lat_long_sphere, matte, phong, scene};
 use super::{assert_close, v};
 
 /// A square of a material at the origin, facing up, under a light of E = 3·cos 20° from 20° beside the normal, seen from
 /// `degrees` beside the normal on the other side.
-fn lobe(kind: MaterialKind, degrees: f64) -> Build {
+fn lobe(kind: Material, degrees: f64) -> Build {
     let at = |degrees: f64| v(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
     scene()
         .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), kind)
@@ -44,7 +46,7 @@ fn the_normalised_lobe() {
 fn the_parts_add_up_to_the_picture() {
     // Lₐ = ka·Isa; the picture at depth 0 is the emission alone.
     let mut kind = phong(0.3, 0.5, 20.0, 0.25);
-    if let MaterialKind::Phong { ambient, .. } = &mut kind {
+    if let MaterialKind::Phong { ambient, .. } = &mut kind.kind {
         *ambient = Some(ColorSource::Constant(Vec3::splat(0.6)));
     }
     let lit = lobe(kind, 35.0).with(|scene| scene.render.ambient = Vec3::splat(0.2));
@@ -99,11 +101,11 @@ const GREY: Vec3 = Vec3::new(0.5, 0.5, 0.5);
 /// Whose diffuse colour, by ambient light 1, is the picture
 /// red green
 /// blue grey.
-fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, MaterialKind) {
+fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = build.texture(&[&[RED, GREEN], &[BLUE, GREY]], filter, wrap, repeat);
     let mut kind = phong(0.0, 0.0, 1.0, 0.0);
-    if let MaterialKind::Phong { diffuse, .. } = &mut kind {
+    if let MaterialKind::Phong { diffuse, .. } = &mut kind.kind {
         *diffuse = ColorSource::Texture(texture);
     }
     (build, kind)
@@ -144,7 +146,7 @@ fn the_border_belongs_to_the_row_and_column_that_begin_there() {
     let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
     let world = square.world();
-    let Material::Phong(phong) = &world.materials[0] else { panic!("a phong material") };
+    let Bsdf::Phong(phong) = &world.materials[0].bsdf else { panic!("a phong material") };
     let at = |u, w| phong.diffuse.at(Vec2::new(u, w), &mut 0);
     assert_eq!([at(0.0, 0.0), at(0.5, 0.0), at(0.0, 0.5), at(0.5, 0.5)], [BLUE, GREY, RED, GREEN]);
 }
@@ -196,7 +198,7 @@ fn facets_do_not_show_at_the_edge_of_the_light() {
                     matte(1.0),
                 )
                 .with(|scene| match &mut scene.objects[0].shape {
-                    Shape::Mesh { smooth, .. } => *smooth = true,
+                    Shape::Mesh(Mesh { smooth, .. }) => *smooth = true,
                     other => panic!("{other:?} is no mesh"),
                 })
                 .point_light(DVec3::X * 1e4, 1.0, Falloff::None)

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use super::super::super::description::{Located, Shape};
+use super::super::super::description::{Located, Mesh, Shape};
 use super::super::limits::Limits;
 use super::super::table::Table;
 use crate::math::DVec3;
@@ -41,5 +41,5 @@ pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
     let rotate = table.optional("rotate").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     let translate = table.optional("translate").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     let smooth = table.optional("smooth").flag().unwrap_or(true);
-    Some(Shape::Mesh { file: files.index(file?), scale, rotate, translate, smooth })
+    Some(Shape::Mesh(Mesh { file: files.index(file?), scale, rotate, translate, smooth }))
 }

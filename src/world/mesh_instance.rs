@@ -1,45 +1,13 @@
-//! The closed set of shapes.
+//! A mesh, placed.
 
 use std::sync::Arc;
 
 use super::mesh_tree::MeshTree;
-use crate::geometry::cone::Cone;
-use crate::geometry::cuboid::Cuboid;
-use crate::geometry::cylinder::Cylinder;
-use crate::geometry::disk::Disk;
-use crate::geometry::parallelogram::Parallelogram;
-use crate::geometry::plane::Plane;
-use crate::geometry::sphere::Sphere;
-use crate::geometry::torus::Torus;
-use crate::geometry::triangle::Triangle;
+use crate::accel::{Ends, PACKET};
+use crate::geometry::rows::{HitRows, lanes};
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
-
-/// A shape in world coordinates.
-#[derive(Clone, Debug)]
-pub enum Shape {
-    /// A sphere.
-    Sphere(Sphere),
-    /// A parallelogram.
-    Quad(Parallelogram),
-    /// An infinite plane.
-    Plane(Plane),
-    /// An oriented box.
-    Box(Cuboid),
-    /// A single triangle.
-    Triangle(Triangle),
-    /// A disk.
-    Disk(Disk),
-    /// A cylinder.
-    Cylinder(Cylinder),
-    /// A cone.
-    Cone(Cone),
-    /// A torus.
-    Torus(Torus),
-    /// An instance of a mesh.
-    Mesh(Box<MeshInstance>),
-}
 
 /// A mesh, placed.
 #[derive(Clone, Debug)]
@@ -50,74 +18,6 @@ pub struct MeshInstance {
     pub transform: Transform,
     /// Interpolate vertex normals.
     pub smooth: bool,
-}
-
-impl Shape {
-    /// The nearest hit.
-    pub fn closest(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
-        match self {
-            Self::Sphere(sphere) => sphere.intersect(ray_f64),
-            Self::Quad(quad) => quad.intersect(ray_f64),
-            Self::Plane(plane) => plane.intersect(ray_f64),
-            Self::Box(cuboid) => cuboid.intersect(ray_f64),
-            Self::Triangle(triangle) => triangle.intersect(ray_f64),
-            Self::Disk(disk) => disk.intersect(ray_f64),
-            Self::Cylinder(cylinder) => cylinder.intersect(ray_f64),
-            Self::Cone(cone) => cone.intersect(ray_f64),
-            Self::Torus(torus) => torus.intersect(ray_f64),
-            Self::Mesh(mesh) => mesh.tree.closest(&mesh.local_ray(ray)),
-        }
-    }
-
-    /// Whether the ray hits anything of it but the primitive `except`.
-    pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
-        match self {
-            Self::Mesh(mesh) => mesh.tree.any(&mesh.local_ray(ray), except),
-            _ => self.closest(ray, ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
-        }
-    }
-
-    /// The surface at a hit.
-    pub fn surface(&self, ray: &Ray, hit: &ShapeHit) -> SurfacePoint {
-        let ray = ray.to_f64();
-        match self {
-            Self::Sphere(sphere) => sphere.surface(&ray, hit),
-            Self::Quad(quad) => quad.surface(&ray, hit),
-            Self::Plane(plane) => plane.surface(&ray, hit),
-            Self::Box(cuboid) => cuboid.surface(&ray, hit),
-            Self::Triangle(triangle) => triangle.surface(hit),
-            Self::Disk(disk) => disk.surface(&ray, hit),
-            Self::Cylinder(cylinder) => cylinder.surface(&ray, hit),
-            Self::Cone(cone) => cone.surface(&ray, hit),
-            Self::Torus(torus) => torus.surface(&ray, hit),
-            Self::Mesh(mesh) => mesh.surface(&ray, hit),
-        }
-    }
-
-    /// The box around it; none where it has no end.
-    pub fn bounds(&self) -> Option<Aabb> {
-        match self {
-            Self::Sphere(sphere) => Some(sphere.bounds()),
-            Self::Quad(quad) => Some(quad.bounds()),
-            Self::Plane(_) => None,
-            Self::Box(cuboid) => Some(cuboid.bounds()),
-            Self::Triangle(triangle) => Some(triangle.bounds()),
-            Self::Disk(disk) => Some(disk.bounds()),
-            Self::Cylinder(cylinder) => Some(cylinder.bounds()),
-            Self::Cone(cone) => Some(cone.bounds()),
-            Self::Torus(torus) => Some(torus.bounds()),
-            Self::Mesh(mesh) => Some(mesh.bounds()),
-        }
-    }
-
-    /// Triangles that it is made of.
-    pub fn triangle_count(&self) -> u64 {
-        match self {
-            Self::Triangle(_) => 1,
-            Self::Mesh(mesh) => mesh.tree.loaded().mesh.triangles.len() as u64,
-            _ => 0,
-        }
-    }
 }
 
 impl MeshInstance {
@@ -133,7 +33,8 @@ impl MeshInstance {
         }
     }
 
-    fn bounds(&self) -> Aabb {
+    /// The box around it.
+    pub(super) fn bounds(&self) -> Aabb {
         let local = self.tree.bounds();
         if local.is_empty() {
             return Aabb::EMPTY;
@@ -151,7 +52,8 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
-    fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    /// The surface at a hit.
+    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
@@ -251,5 +153,53 @@ impl MeshInstance {
         let dpdu = (ab * duv_c.y - ac * duv_b.y) / determinant;
         let dpdv = (ac * duv_b.x - ab * duv_c.x) / determinant;
         (uv, world(dpdu), world(dpdv))
+    }
+
+    /// The nearest hits of the rays in `met`; the others end below 0.
+    #[inline(never)]
+    pub(super) fn closest_rows(&self, rays: &[Ray], met: u32, ends: &Ends, found: &mut HitRows) {
+        let mut hits = [None; PACKET];
+        let hits = &mut hits[..rays.len()];
+        self.in_mesh(rays, met, |local| self.tree.closest_packet(local, ends, hits));
+        for (lane, hit) in hits.iter().enumerate() {
+            if let Some(hit) = hit {
+                found.put(lane, hit);
+            }
+        }
+    }
+
+    /// A bit for each ray in `met` that hits anything of it but its own of `except`.
+    #[inline(never)]
+    pub(super) fn any_rows(
+        &self,
+        rays: &[Ray],
+        met: u32,
+        ends: &Ends,
+        except: Option<(u32, &[u32; PACKET])>,
+    ) -> u32 {
+        let mut parts = [None; PACKET];
+        let mut found = 0;
+        let except = match except {
+            Some((own, numbers)) => {
+                lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
+                &parts[..rays.len()]
+            }
+            None => &[],
+        };
+        self.in_mesh(rays, met, |local| found = self.tree.any_packet(local, ends, except));
+        found
+    }
+
+    /// Those rays of a packet that are in `met` in a mesh's coordinates, the others as they are.
+    #[inline]
+    fn in_mesh(&self, rays: &[Ray], met: u32, trace: impl FnOnce(&[Ray])) {
+        if self.transform == Transform::IDENTITY {
+            return trace(rays);
+        }
+        let mut local = [rays[0]; PACKET];
+        for lane in lanes(met) {
+            local[lane] = self.local_ray(&rays[lane]);
+        }
+        trace(&local[..rays.len()]);
     }
 }

@@ -1,48 +1,12 @@
-//! Queues of rays, and the rays of the camera.
+//! Queues of rays.
 
 use std::cell::RefCell;
-use std::ops::Range;
 
-use super::RenderSettings;
 use super::medium::Medium;
-use crate::control::CancelToken;
-use crate::film::Rect;
 use crate::geometry::Ray;
 use crate::lights::{LightSamples, Source};
-use crate::math::{DVec2, Vec2, Vec3};
-use crate::sampling::filter::Filter;
-use crate::sampling::{PixelSampler, Purpose, warp};
-use crate::scene::description::PixelFilter;
-use crate::world::{Hit, World};
-
-/// The samples of a tile. A slot is the place of a sample among them: all of the first pixel, all of the next.
-pub struct SampleBlock {
-    /// The pixels.
-    pub tile: Rect,
-    /// Numbers of the samples of each.
-    pub samples: Range<u32>,
-}
-
-impl SampleBlock {
-    /// Samples in all.
-    pub fn len(&self) -> usize {
-        self.tile.area() * self.samples.len()
-    }
-
-    /// Pixel and sample number of a slot.
-    fn place(&self, slot: u32) -> (u32, u32, u32) {
-        let samples = self.samples.len() as u32;
-        let (pixel, sample) = (slot / samples, slot % samples);
-        let (x, y) = (pixel % self.tile.width, pixel / self.tile.width);
-        (self.tile.x + x, self.tile.y + y, self.samples.start + sample)
-    }
-
-    /// The random numbers of a slot.
-    pub fn sampler(&self, seed: u32, slot: u32) -> PixelSampler {
-        let (x, y, sample) = self.place(slot);
-        PixelSampler::new(seed, x, y, sample)
-    }
-}
+use crate::math::Vec3;
+use crate::world::Hit;
 
 /// A ray on its way.
 #[derive(Clone, Copy)]
@@ -149,45 +113,4 @@ impl Queues {
 
 thread_local! {
     static QUEUES: RefCell<Queues> = RefCell::default();
-}
-
-/// What all rays of a tile have in common.
-pub struct Tracer<'a> {
-    /// The scene.
-    pub world: &'a World,
-    /// The settings.
-    pub settings: &'a RenderSettings,
-    /// The samples.
-    pub block: &'a SampleBlock,
-    /// Says when to stop.
-    pub token: &'a CancelToken,
-}
-
-impl Tracer<'_> {
-    /// Rays through the pixels of some slots, in place of what is in the queue.
-    pub fn camera_rays(&self, slots: Range<u32>, queue: &mut Vec<PathRay>) {
-        queue.clear();
-        queue.extend(slots.map(|slot| self.camera_ray(slot)));
-    }
-
-    fn camera_ray(&self, slot: u32) -> PathRay {
-        let (x, y, sample) = self.block.place(slot);
-        let sampler = PixelSampler::new(self.settings.seed, x, y, sample);
-        let [fx, fy, lx, ly] = sampler.get4(Purpose::CAMERA);
-        let sample = filter(self.settings.filter).sample(Vec2::new(fx, fy));
-        let place = (sample.offset + Vec2::splat(0.5)).as_dvec2();
-        let lens = if self.settings.dof { warp::disk(Vec2::new(lx, ly)) } else { Vec2::ZERO };
-        let from_corner = DVec2::new(f64::from(x), f64::from(y)) + place;
-        let ray = self.world.camera.ray(self.settings.from_middle(from_corner), lens);
-        PathRay { ray, throughput: Vec3::splat(sample.weight), slot, path: 1, medium: Medium::default() }
-    }
-}
-
-fn filter(filter: PixelFilter) -> Filter {
-    match filter {
-        PixelFilter::Box => Filter::Box,
-        PixelFilter::Tent => Filter::Tent,
-        PixelFilter::Gaussian => Filter::Gaussian,
-        PixelFilter::Mitchell => Filter::Mitchell,
-    }
 }

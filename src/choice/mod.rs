@@ -1,0 +1,109 @@
+//! Values that are chosen by name: the same words in scene files, on the command line and in reports.
+
+/// A closed set of values that are chosen by name. [`choice!`](crate::choice!) writes one.
+pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
+    /// All values, in the order in which they are offered.
+    const ALL: &'static [Self];
+
+    /// Names that other versions know: refused with their own words.
+    const UNAVAILABLE: &'static [&'static str];
+
+    /// Its name.
+    fn name(self) -> &'static str;
+
+    /// What it means, in a few words.
+    fn meaning(self) -> &'static str;
+
+    /// The value of this name.
+    fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|one| one.name() == name)
+    }
+}
+
+/// A choice in a report: its name.
+///
+/// # Errors
+/// Those of the serializer.
+pub fn serialize<C: Choice, S: serde::Serializer>(choice: &C, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(choice.name())
+}
+
+/// An enum with its names, and `Choice` for it. The doc comment of a value is also what help says that it means.
+///
+/// ```
+/// glimt::choice! {
+///     /// Directions.
+///     pub enum Turn {
+///         /// Against the clock.
+///         Left = "left",
+///         /// With it.
+///         Right = "right",
+///     }
+///     unavailable "back"
+/// }
+/// use glimt::choice::Choice;
+/// assert_eq!(Turn::named("right"), Some(Turn::Right));
+/// assert_eq!(Turn::Left.meaning(), "Against the clock");
+/// ```
+#[macro_export]
+macro_rules! choice {
+    (
+        $(#[doc = $doc:literal])+
+        $visibility:vis enum $name:ident {
+            $($(#[doc = $meaning:literal])+ $value:ident = $word:literal,)+
+        }
+        $(unavailable $($unavailable:literal),+)?
+    ) => {
+        $(#[doc = $doc])+
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        $visibility enum $name {
+            $($(#[doc = $meaning])+ $value,)+
+        }
+
+        impl $crate::choice::Choice for $name {
+            const ALL: &'static [Self] = &[$(Self::$value),+];
+            const UNAVAILABLE: &'static [&'static str] = &[$($($unavailable),+)?];
+
+            fn name(self) -> &'static str {
+                match self {
+                    $(Self::$value => $word,)+
+                }
+            }
+
+            fn meaning(self) -> &'static str {
+                let lines = match self {
+                    $(Self::$value => concat!($($meaning),+),)+
+                };
+                lines.trim().trim_end_matches('.')
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    choice! {
+        /// Numbers.
+        enum Number {
+            /// One, which
+            /// has two lines.
+            One = "one",
+            /// Two.
+            Two = "2",
+        }
+        unavailable "three"
+    }
+
+    #[test]
+    fn every_value_is_found_by_its_name_and_no_other_word_is_one() {
+        for &number in Number::ALL {
+            assert_eq!(Number::named(number.name()), Some(number));
+        }
+        assert_eq!(Number::ALL, [Number::One, Number::Two]);
+        assert_eq!((Number::named("One"), Number::named("three")), (None, None));
+        assert_eq!(Number::UNAVAILABLE, ["three"]);
+        assert_eq!(Number::One.meaning(), "One, which has two lines");
+    }
+}

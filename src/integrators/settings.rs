@@ -1,0 +1,34 @@
+//! How a world is rendered.
+
+use super::View;
+use crate::math::DVec2;
+use crate::scene::description::Render;
+use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
+
+/// How a world is rendered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// The scene's, with what this run changes of them.
+    pub render: Render,
+    /// Whether the lens has its aperture; false: a pinhole.
+    pub dof: bool,
+    /// What is shown.
+    pub view: View,
+}
+
+impl RenderSettings {
+    /// A place in the picture, in pixels from its top left corner, as the camera takes it: from its middle to the right
+    /// and up, in halves of its height.
+    pub fn from_middle(&self, from_corner: DVec2) -> DVec2 {
+        let Render { width, height, .. } = self.render;
+        let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
+        DVec2::new(from_corner.x - half_width, half_height - from_corner.y) / half_height
+    }
+}
+
+impl Fingerprinted for RenderSettings {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        let Self { render, dof, view } = *self;
+        key.add(&render, of).flag(dof).choice(view);
+    }
+}

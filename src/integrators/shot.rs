@@ -1,0 +1,52 @@
+//! What all rays of a tile have in common.
+
+use std::ops::Range;
+
+use super::RenderSettings;
+use crate::control::CancelToken;
+use crate::film::Rect;
+use crate::sampling::PixelSampler;
+use crate::world::World;
+
+/// A world, how it is rendered, and the samples that are asked for.
+pub struct Shot<'a> {
+    /// The scene.
+    pub world: &'a World,
+    /// The settings.
+    pub settings: &'a RenderSettings,
+    /// The samples.
+    pub block: &'a SampleBlock,
+    /// Says when to stop.
+    pub token: &'a CancelToken,
+}
+
+impl Shot<'_> {
+    /// The random numbers of a slot.
+    pub fn sampler(&self, slot: u32) -> PixelSampler {
+        let (x, y, sample) = self.block.place(slot);
+        PixelSampler::new(self.settings.render.seed, x, y, sample)
+    }
+}
+
+/// The samples of a tile. A slot is the place of a sample among them: all of the first pixel, all of the next.
+pub struct SampleBlock {
+    /// The pixels.
+    pub tile: Rect,
+    /// Numbers of the samples of each.
+    pub samples: Range<u32>,
+}
+
+impl SampleBlock {
+    /// Samples in all.
+    pub fn len(&self) -> usize {
+        self.tile.area() * self.samples.len()
+    }
+
+    /// Pixel and sample number of a slot.
+    pub fn place(&self, slot: u32) -> (u32, u32, u32) {
+        let samples = self.samples.len() as u32;
+        let (pixel, sample) = (slot / samples, slot % samples);
+        let (x, y) = (pixel % self.tile.width, pixel / self.tile.width);
+        (self.tile.x + x, self.tile.y + y, self.samples.start + sample)
+    }
+}

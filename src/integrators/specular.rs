@@ -1,0 +1,86 @@
+//! The ways on at mirrors and glass.
+
+use super::medium::ior;
+use super::queues::PathRay;
+use super::vertices::{Shading, Vertex};
+use crate::materials::Glass;
+use crate::materials::fresnel::{dielectric, refract};
+use crate::materials::mirror::reflect;
+use crate::math::Vec3;
+use crate::world::World;
+
+/// Which way a path goes on: tells the paths of one sample apart.
+const REFLECTED: u32 = 1;
+const REFRACTED: u32 = 2;
+
+/// The mirrored ray; a shading normal that sends it below the surface gives way to the geometric one.
+pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
+    let incident = path.ray.direction;
+    let side = -incident.dot(vertex.normal);
+    let mut direction = reflect(incident, shading.normal);
+    if !(direction.dot(vertex.normal) * side > 0.0) {
+        direction = reflect(incident, vertex.normal);
+    }
+    PathRay {
+        ray: vertex.leaving(direction.normalize()),
+        throughput: path.throughput * reflectance,
+        path: path.next_path(REFLECTED),
+        ..*path
+    }
+}
+
+/// What the surface of a glass makes of a ray.
+pub struct Interface {
+    /// The part of its radiance that is reflected.
+    pub reflectance: f32,
+    /// The ray on the other side, with all of its radiance; none where all is reflected.
+    pub refracted: Option<PathRay>,
+}
+
+/// A ray at the surface of a glass.
+pub fn interface(
+    world: &World,
+    path: &PathRay,
+    vertex: &Vertex<'_>,
+    shading: &Shading,
+    glass: &Glass,
+) -> Interface {
+    let (near, far, medium) = if vertex.is_front {
+        (ior(world, path.medium), glass.ior, path.medium.entered(vertex.part))
+    } else {
+        match path.medium.left(vertex.part) {
+            Some(left) => (ior(world, path.medium), ior(world, left), left),
+            None => (glass.ior, ior(world, path.medium), path.medium),
+        }
+    };
+    let eta = far / near;
+    let (reflectance, direction) = boundary(vertex, shading, path.ray.direction, eta);
+    let refracted = direction.map(|direction| PathRay {
+        ray: vertex.leaving(direction),
+        // Radiance over the square of the index is what refraction conserves.
+        throughput: path.throughput / (eta * eta),
+        path: path.next_path(REFRACTED),
+        medium,
+        ..*path
+    });
+    Interface { reflectance, refracted }
+}
+
+/// Reflectance and refracted direction by the shading normal. Where that looks away from the ray, or sends the refracted
+/// ray back to the side that it came from, by the geometric one: the ray must be where its medium says.
+fn boundary(vertex: &Vertex<'_>, shading: &Shading, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
+    let (shading, geometric) = (shading.normal, vertex.normal);
+    let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;
+    let by = |normal: Vec3| {
+        let (reflectance, cosine) = dielectric(-normal.dot(incident), eta);
+        (reflectance, cosine.map(|cosine| refract(incident, normal, eta, cosine)))
+    };
+    let shaded = if shading.dot(incident) < 0.0 { by(shading) } else { by(geometric) };
+    match shaded {
+        (_, Some(direction)) if !crosses(&direction) => {
+            let (reflectance, direction) = by(geometric);
+            (reflectance, direction.filter(crosses))
+        }
+        _ => shaded,
+    }
+}

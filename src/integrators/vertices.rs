@@ -1,0 +1,133 @@
+//! What is ready at a hit, once for all that goes on from there: the geometry, the normal that shading goes by, what bounds it,
+//! and the BSDF.
+
+use super::RayCounters;
+use super::medium::Inside;
+use super::queues::PathRay;
+use super::shot::Shot;
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Ray, SurfacePoint};
+use crate::materials::Material;
+use crate::materials::phong::PhongBsdf;
+use crate::math::Vec3;
+use crate::math::lanes::{Lanes, Lanes3, dot, lane};
+use crate::world::Hit;
+
+/// Where a path meets a surface.
+pub struct Vertex<'a> {
+    /// The surface.
+    pub surface: SurfacePoint,
+    /// Its material.
+    pub material: &'a Material,
+    /// The part of an object that it is, should that be glass.
+    pub part: Inside,
+    /// Whether the path comes to the front.
+    pub is_front: bool,
+    /// Unit direction that the path comes from.
+    pub to_eye: Vec3,
+    /// Geometric normal on the eye's side.
+    pub normal: Vec3,
+    /// −1 where that is the back, else 1.
+    side: f32,
+}
+
+impl<'a> Vertex<'a> {
+    /// Where a ray hits.
+    pub fn new(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
+        let surface = shot.world.geometry.surface(&path.ray, hit);
+        let index = shot.world.material_index(hit);
+        let to_eye = -path.ray.direction;
+        let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
+        Self {
+            material: &shot.world.materials[index],
+            part: Inside { object: hit.object, material: index as u32 },
+            is_front: surface.normal.dot(path.ray.direction) < 0.0,
+            to_eye,
+            normal: surface.normal * side,
+            side,
+            surface,
+        }
+    }
+
+    /// The interpolated normal, bent by a normal map, on the front side.
+    pub fn front_shading_normal(&self, counters: &mut RayCounters) -> Vec3 {
+        let surface = &self.surface;
+        let Some(map) = &self.material.normal_map else { return surface.shading_normal };
+        counters.texture_lookups += 1;
+        map.bend(surface.uv, surface.shading_normal, surface.dpdu, surface.dpdv)
+    }
+
+    /// What shading goes by.
+    pub fn shading(&self, counters: &mut RayCounters) -> Shading {
+        let normal = self.front_shading_normal(counters) * self.side;
+        let smooth_normal = self.surface.shading_normal * self.side;
+        let bend = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
+        Shading { normal, smooth_normal, bend }
+    }
+
+    /// A ray that starts here.
+    pub fn leaving(&self, direction: Vec3) -> Ray {
+        let SurfacePoint { point, error, normal, .. } = self.surface;
+        Ray::new(offset_origin(point, error, normal, direction), direction)
+    }
+
+    /// Where shadow rays start.
+    pub fn shadow_origin(&self) -> Vec3 {
+        offset_origin(self.surface.shadow_point, self.surface.error, self.normal, self.normal)
+    }
+}
+
+/// The normals that shading goes by, on the eye's side.
+pub struct Shading {
+    /// The interpolated normal, bent by a normal map.
+    pub normal: Vec3,
+    /// The interpolated normal.
+    smooth_normal: Vec3,
+    /// The cosine between them; none where nothing bends them apart.
+    bend: Option<f32>,
+}
+
+impl Shading {
+    /// Cosines at the surface for light from some directions, softened where bent normals leave the light; not above 0 where
+    /// the light is behind the smooth surface or its bent normal.
+    pub fn cosines(&self, directions: &Lanes3) -> Lanes {
+        let mut cosines = dot(directions, self.normal);
+        if self.bend.is_some() {
+            for (i, cosine) in cosines.iter_mut().enumerate().filter(|(_, cosine)| **cosine > 0.0) {
+                *cosine *= self.terminator(*cosine, lane(directions, i));
+            }
+        }
+        cosines
+    }
+
+    /// Cosines between the mirrored directions and the one to the eye.
+    pub fn mirrored_cosines(&self, to_eye: Vec3, directions: &Lanes3) -> Lanes {
+        // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
+        let mirrored_eye = self.normal * (2.0 * self.normal.dot(to_eye)) - to_eye;
+        dot(directions, mirrored_eye)
+    }
+
+    /// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing
+    /// bends them (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+    fn terminator(&self, cosine: f32, direction: Vec3) -> f32 {
+        let Some(between) = self.bend else { return 1.0 };
+        let smooth = self.smooth_normal.dot(direction);
+        if !(smooth > 0.0) {
+            return 0.0;
+        }
+        let g = (smooth / (cosine * between)).min(1.0);
+        if between > 0.0 { -g * g * g + g * g + g } else { 1.0 }
+    }
+}
+
+/// A vertex with a lobe that is no δ, ready to be lit.
+pub struct LitVertex<'a> {
+    /// The path that came here.
+    pub path: &'a PathRay,
+    /// Where.
+    pub vertex: &'a Vertex<'a>,
+    /// What shading goes by.
+    pub shading: Shading,
+    /// What it makes of light.
+    pub bsdf: PhongBsdf,
+}

@@ -1,0 +1,197 @@
+//! Densities of samples, and the way from a hit back to its light.
+
+use super::emitter::Emitter;
+use super::triangles::TriangleEmitter;
+use super::*;
+use crate::geometry::cone::Cone;
+use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cylinder::Cylinder;
+use crate::geometry::disk::Disk;
+use crate::geometry::parallelogram::Parallelogram;
+use crate::geometry::plane::Plane;
+use crate::geometry::sphere::Sphere;
+use crate::geometry::torus::Torus;
+use crate::geometry::triangle::Triangle;
+use crate::geometry::{Ray, Shape, ShapeHit};
+use crate::math::DVec3;
+use crate::sampling::{Decision, PixelSampler};
+
+/// Every way to sample a shape: rectangles by solid angle, other parallelograms and distant ones by area.
+fn shapes() -> Vec<Shape> {
+    let (p, q) = (DVec3::new(0.3, -0.2, 0.1), DVec3::new(1.0, 0.5, -0.4));
+    vec![
+        Shape::Sphere(Sphere { center: p, radius: 0.7 }),
+        Shape::Quad(Parallelogram::new(p, DVec3::X, DVec3::new(0.0, 1.0, -0.5))),
+        Shape::Quad(Parallelogram::new(p, DVec3::X * 0.01, DVec3::Y * 0.01)),
+        Shape::Quad(Parallelogram::new(p, DVec3::X, q)),
+        Shape::Box(Cuboid::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
+        Shape::Triangle(Triangle { a: p, b: q, c: DVec3::Y }),
+        Shape::Disk(Disk::new(p, q, 0.6)),
+        Shape::Cylinder(Cylinder::new(p, q, 0.5, true)),
+        Shape::Cone(Cone::new(p, q, 0.4, true)),
+        Shape::Torus(Torus::new(p, q, 1.0, 0.4)),
+    ]
+}
+
+const OBJECT: u32 = 7;
+
+fn lights_of(shape: &Shape) -> Lights {
+    let lights = area_lights(shape, Vec3::ONE, OBJECT).into_iter().map(Light::Area);
+    Lights::new(std::iter::once(Light::Point(POINT)).chain(lights).collect())
+}
+
+const POINT: PointLight =
+    PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: point::Falloff::Square };
+
+/// What a ray from a point meets, and where.
+fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)> {
+    let ray = Ray::new(from, direction).to_f64();
+    let hit = shape.intersect(&ray)?;
+    Some((Met { direction, distance: hit.t, normal: shape.surface(&ray, &hit).normal }, hit))
+}
+
+/// Samples of a light for a point: directions, where they end, and one over their densities.
+fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
+    let Some(seen) = light.seen_from(from) else { return Vec::new() };
+    let mut queue = Vec::new();
+    for (numbers, used) in PixelSampler::new(1, 2, 3, 0).pairs(1, Decision::Light(number), count) {
+        seen.samples(numbers, used, &mut queue);
+    }
+    let one = |samples: &LightSamples, i: usize| {
+        let ray = samples.ray(from, i);
+        (lane(&samples.directions, i), ray.at(1.0), samples.factors[i] * samples.radiance.x)
+    };
+    queue.iter().flat_map(|samples| (0..samples.count).map(move |i| one(samples, i))).collect()
+}
+
+fn points() -> [Vec3; 3] {
+    [Vec3::new(2.0, 1.5, 3.0), Vec3::new(-3.0, 0.4, 1.0), Vec3::new(0.5, 4.0, -1.5)]
+}
+
+#[test]
+fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
+    for shape in shapes() {
+        let lights = lights_of(&shape);
+        let (mut compared, mut hidden) = (0, 0);
+        for from in points() {
+            for (number, light) in lights.iter() {
+                for (direction, target, factor) in samples(light, number, from, 64) {
+                    let Some((met, hit)) = met(&shape, from, direction) else { continue };
+                    // A torus may hide the point, and the very edge of a shape may be missed.
+                    if (from + direction * met.distance - target).length() > 1e-3 {
+                        hidden += 1;
+                        continue;
+                    }
+                    let (found, of_hit) = lights.of_hit(OBJECT, hit.primitive).expect("it is a light");
+                    assert_eq!(found, number, "{shape:?}");
+                    let product = of_hit.pdf(from, &met) * factor;
+                    assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared >= 64 && hidden * 3 < compared, "{shape:?}: {compared}, {hidden} hidden");
+    }
+}
+
+#[test]
+fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
+    for shape in shapes() {
+        let lights = lights_of(&shape);
+        for from in points() {
+            // Directions in a cone around the shape.
+            let to_middle = shape.middle() - from.as_dvec3();
+            let sin = (1.7 / to_middle.length()).min(1.0) as f32;
+            let cone = SphereCone::new(to_middle.as_vec3(), sin);
+            let (mut sums, n) = (vec![0.0; lights.len()], 200_000);
+            for i in 0..n {
+                let direction = cone.direction(i, n);
+                let Some((met, hit)) = met(&shape, from, direction) else { continue };
+                let Some((number, light)) = lights.of_hit(OBJECT, hit.primitive) else { continue };
+                sums[number as usize] += f64::from(light.pdf(from, &met) * cone.solid_angle()) / f64::from(n);
+            }
+            // Of a torus only what hides nothing of itself is found: less than all.
+            let is_convex = shape.concave_error(Vec3::ZERO).is_none();
+            for (sum, (number, light)) in sums.iter().zip(lights.iter()).skip(1) {
+                let all = samples(light, number, from, 1024);
+                let seen = all.iter().filter(|(direction, target, _)| {
+                    met(&shape, from, *direction)
+                        .is_some_and(|(met, _)| (from + *direction * met.distance - *target).length() < 1e-2)
+                });
+                let part = if is_convex && !all.is_empty() { 1.0 } else { seen.count() as f64 / 1024.0 };
+                // By area, samples on the back count for nothing: what is seen sums to the part that faces the point.
+                let facing = all.len() as f64 / 1024.0;
+                let expected = if is_convex { part * facing } else { part };
+                assert!(
+                    (sum - expected).abs() < 0.03,
+                    "{shape:?} {number} from {from}: {sum} is not {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// Directions of a cone, evenly by solid angle.
+struct SphereCone {
+    frame: crate::math::frame::Frame,
+    one_minus_cos: f32,
+}
+
+impl SphereCone {
+    fn new(axis: Vec3, sin: f32) -> Self {
+        let one_minus_cos = 1.0 - (1.0 - sin * sin).max(0.0).sqrt();
+        Self { frame: crate::math::frame::Frame::from_normal(axis.normalize()), one_minus_cos }
+    }
+
+    fn solid_angle(&self) -> f32 {
+        std::f32::consts::TAU * self.one_minus_cos
+    }
+
+    fn direction(&self, i: u32, n: u32) -> Vec3 {
+        let cos = 1.0 - self.one_minus_cos * (i as f32 + 0.5) / n as f32;
+        let (sin_phi, cos_phi) = ((f64::from(i) * 2.399_963_229_728_653) as f32).sin_cos();
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let crate::math::frame::Frame { s, t, n } = self.frame;
+        (s * (sin * cos_phi) + t * (sin * sin_phi) + n * cos).normalize()
+    }
+}
+
+#[test]
+fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
+    let corners = |z: f64| [DVec3::new(0.0, 0.0, z), DVec3::new(1.0, 0.0, z), DVec3::new(0.0, 1.0, z)];
+    let light = |numbers: &[u32], radiance: f32| {
+        let triangles = numbers.iter().map(|&number| (corners(f64::from(number)), number)).collect();
+        Light::Area(AreaLight {
+            shape: Emitter::Triangles(TriangleEmitter::new(triangles).expect("an area")),
+            radiance: Vec3::splat(radiance),
+            object: 3,
+            part: Part::Listed,
+        })
+    };
+    let lights = Lights::new(vec![light(&[0, 4], 1.0), Light::Point(POINT), light(&[2], 2.0)]);
+    let of_hit = |object, primitive| lights.of_hit(object, primitive).map(|(number, _)| number);
+    assert_eq!(
+        [0, 1, 2, 3, 4, 5].map(|triangle| of_hit(3, triangle)),
+        [Some(0), None, Some(2), None, Some(0), None]
+    );
+    assert_eq!(of_hit(4, 0), None);
+    let met = Met { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z };
+    let (_, light) = lights.of_hit(3, 2).expect("a light");
+    // d²/(A·cos) = 4/½.
+    assert!((light.pdf(Vec3::ZERO, &met) - 8.0).abs() < 1e-5);
+    assert_eq!(light.pdf(Vec3::ZERO, &Met { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
+    assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, &met), 0.0);
+}
+
+#[test]
+fn a_plane_is_no_light() {
+    assert!(area_lights(&Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)), Vec3::ONE, 0).is_empty());
+}
+
+#[test]
+fn light_from_beyond_is_stopped_by_anything_on_its_way() {
+    let sample =
+        LightSample { end: End::Beyond, direction: Vec3::Y, weight: Vec3::ONE, source: Source::Nothing };
+    let ray = LightSamples::from(sample).ray(Vec3::X, 0);
+    assert_eq!((ray.origin, ray.direction, ray.t_max), (Vec3::X, Vec3::Y, f32::INFINITY));
+}

@@ -1,0 +1,188 @@
+//! `[textures.*]` and `[materials.*]`.
+
+use std::path::PathBuf;
+
+use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::Located;
+use crate::choice;
+pub use crate::materials::texture::{TextureFilter, Wrap};
+use crate::math::{Vec2, Vec3};
+
+/// An image that materials look up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// Its name in the scene.
+    pub name: String,
+    /// Its file, resolved against the scene's folder.
+    pub file: Located<PathBuf>,
+    /// Interpolation.
+    pub filter: TextureFilter,
+    /// Outside [0, 1].
+    pub wrap: Wrap,
+    /// How often it fits into u and v; not 0.
+    pub repeat: Vec2,
+    /// What its numbers are.
+    pub encoding: Encoding,
+}
+
+choice! {
+    /// What a texture's numbers are.
+    pub enum Encoding {
+        /// sRGB for 8-bit colour, linear for normal maps and float files.
+        Auto = "auto",
+        /// sRGB, decoded.
+        Srgb = "srgb",
+        /// Used as they are.
+        Linear = "linear",
+    }
+}
+
+/// A colour or a texture.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ColorSource {
+    /// The same everywhere.
+    Constant(Vec3),
+    /// Index into [`Scene::textures`](super::Scene::textures).
+    Texture(usize),
+}
+
+/// A named material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Its name in the scene.
+    pub name: String,
+    /// What it does with light that arrives.
+    pub kind: MaterialKind,
+    /// Radiance on the front side.
+    pub emission: Vec3,
+    /// What bends the shading normals.
+    pub normal_map: Option<NormalMap>,
+}
+
+/// A tangent-space normal map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalMap {
+    /// Index into [`Scene::textures`](super::Scene::textures).
+    pub texture: usize,
+    /// Factor on its slopes, ≥ 0.
+    pub strength: f32,
+}
+
+/// What a texture is looked up for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureUse {
+    /// Colours.
+    Color,
+    /// Normals.
+    Normal,
+}
+
+/// What a material does with light that arrives.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MaterialKind {
+    /// Normalised Phong.
+    Phong {
+        /// kd.
+        diffuse: ColorSource,
+        /// ks.
+        specular: ColorSource,
+        /// α ≥ 0.
+        shininess: f32,
+        /// ka; none: the diffuse colour.
+        ambient: Option<ColorSource>,
+    },
+    /// A perfect mirror of this reflectance in [0, 1].
+    Mirror {
+        /// Reflectance.
+        reflectance: Vec3,
+    },
+    /// Smooth dielectric.
+    Glass {
+        /// Index of refraction inside, in [0.1, 10]; below 1: thinner than what is outside, as a bubble in water.
+        ior: f32,
+        /// Transmittance per unit of length inside, in [0, 1].
+        tint: Vec3,
+    },
+}
+
+impl ColorSource {
+    /// Index of the texture that it is, if it is one.
+    fn texture(&self) -> Option<usize> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Texture(index) => Some(*index),
+        }
+    }
+}
+
+impl Material {
+    /// Whether what has it is a light.
+    pub fn emits(&self) -> bool {
+        self.emission != Vec3::ZERO
+    }
+
+    /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with what for.
+    pub fn textures(&self) -> Vec<(usize, TextureUse)> {
+        let Self { name: _, kind, emission: _, normal_map } = self;
+        let colors: [Option<&ColorSource>; 3] = match kind {
+            MaterialKind::Phong { diffuse, specular, shininess: _, ambient } => {
+                [Some(diffuse), Some(specular), ambient.as_ref()]
+            }
+            MaterialKind::Mirror { reflectance: _ } | MaterialKind::Glass { ior: _, tint: _ } => [None; 3],
+        };
+        let colors = colors.into_iter().flatten().filter_map(ColorSource::texture);
+        let normals = normal_map.iter().map(|map| (map.texture, TextureUse::Normal));
+        colors.map(|index| (index, TextureUse::Color)).chain(normals).collect()
+    }
+}
+
+/// How it is looked up; its texels have keys of their own.
+impl Fingerprinted for Texture {
+    fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
+        let Self { name: _, file, filter, wrap, repeat, encoding } = self;
+        key.path(&file.value).choice(*filter).choice(*wrap).choice(*encoding).f32(repeat.x).f32(repeat.y);
+    }
+}
+
+impl Fingerprinted for ColorSource {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        match self {
+            Self::Constant(color) => {
+                key.index(0).vec3(*color);
+            }
+            Self::Texture(index) => {
+                of.textures[*index].add_to(key.index(1), of);
+            }
+        }
+    }
+}
+
+impl Fingerprinted for NormalMap {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        let Self { texture, strength } = *self;
+        of.textures[texture].add_to(key.f32(strength), of);
+    }
+}
+
+impl Fingerprinted for MaterialKind {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        match self {
+            Self::Phong { diffuse, specular, shininess, ambient } => {
+                key.index(0).f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
+            }
+            Self::Mirror { reflectance } => {
+                key.index(1).vec3(*reflectance);
+            }
+            Self::Glass { ior, tint } => {
+                key.index(2).f32(*ior).vec3(*tint);
+            }
+        }
+    }
+}
+
+impl Fingerprinted for Material {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        let Self { name: _, kind, emission, normal_map } = self;
+        key.add(kind, of).vec3(*emission).add(normal_map, of);
+    }
+}

@@ -1,0 +1,66 @@
+//! The lowered scene: what a scene file means, with every default filled in and every invariant kept by
+//! validation. Nothing here knows the file's syntax; objects refer to each other by index.
+//!
+//! Lengths are in the scene's unit, angles in degrees, colours linear Rec. 709. All numbers are finite.
+
+mod camera;
+mod light;
+mod material;
+mod render;
+mod shape;
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+pub use camera::Camera;
+pub use light::{Falloff, PointLight};
+pub use material::{
+    ColorSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter, TextureUse, Wrap,
+};
+pub use render::{Accel, Integrator, MOST_SCATTERINGS, PixelFilter, Render, Shadows, Tonemap};
+pub use shape::{Lowered, Mesh, Object, Shape};
+
+/// A whole scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The `[render]` table.
+    pub render: Render,
+    /// Where the picture goes, if the scene says so, resolved against the scene's folder.
+    pub output: Option<PathBuf>,
+    /// The `[camera]` table.
+    pub camera: Camera,
+    /// The `[photons]` table.
+    pub photons: Photons,
+    /// `[textures.*]`, in the order of the file.
+    pub textures: Vec<Texture>,
+    /// `[materials.*]`, in the order of the file.
+    pub materials: Vec<Material>,
+    /// The mesh files that `[[mesh]]` tables name, each once.
+    pub mesh_files: Vec<Located<PathBuf>>,
+    /// Every shape, in the order of the file within its kind.
+    pub objects: Vec<Object>,
+    /// `[[light]]`, in the order of the file.
+    pub lights: Vec<PointLight>,
+}
+
+/// A value with its place in the scene file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Located<T> {
+    /// The value.
+    pub value: T,
+    /// Bytes of the scene file.
+    pub span: Range<usize>,
+}
+
+/// Photon maps: read and validated, used by the integrators that have them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photons {
+    /// Whether the scene asks for them.
+    pub enabled: bool,
+    /// Photons emitted in a pass, ≥ 1.
+    pub count: u64,
+    /// First gather radius; 0 = chosen from the scene's size.
+    pub radius: f64,
+    /// Most bounces.
+    pub bounces: u32,
+}

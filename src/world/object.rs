@@ -1,0 +1,110 @@
+//! What stands in a scene: shapes and meshes.
+
+use super::mesh_instance::MeshInstance;
+use crate::accel::{Ends, PACKET};
+use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
+
+/// A thing that rays can hit.
+#[derive(Clone, Debug)]
+pub enum Object {
+    /// A shape.
+    Shape(Shape),
+    /// An instance of a mesh.
+    Mesh(Box<MeshInstance>),
+}
+
+impl Object {
+    /// The nearest hit.
+    pub fn closest(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
+        match self {
+            Self::Shape(shape) => shape.intersect(ray_f64),
+            Self::Mesh(mesh) => mesh.tree.closest(&mesh.local_ray(ray)),
+        }
+    }
+
+    /// Whether the ray hits anything of it but the primitive `except`.
+    pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
+        match self {
+            Self::Shape(shape) => shape.intersect(ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
+            Self::Mesh(mesh) => mesh.tree.any(&mesh.local_ray(ray), except),
+        }
+    }
+
+    /// The nearest hits of the rays of a packet that are in `met`; the others end below 0. `found` holds none before.
+    #[inline(always)]
+    pub fn closest_rows(&self, rays: &[Ray], rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+        match self {
+            Self::Shape(shape) => shape.intersect_rows(rays, rows, met, ends, found),
+            Self::Mesh(mesh) => mesh.closest_rows(rays, met, ends, found),
+        }
+    }
+
+    /// A bit for each ray in `met` that hits anything of it; the others end below 0. `except` holds the bits of the rays that
+    /// may hit one of its primitives each, and the primitives.
+    #[inline(always)]
+    pub fn any_rows(
+        &self,
+        rays: &[Ray],
+        rows: &RayRows,
+        met: u32,
+        ends: &Ends,
+        except: Option<(u32, &[u32; PACKET])>,
+    ) -> u32 {
+        let shape = match self {
+            Self::Shape(shape) => shape,
+            Self::Mesh(mesh) => return mesh.any_rows(rays, met, ends, except),
+        };
+        let mut found = HitRows::none();
+        shape.intersect_rows(rays, rows, met, ends, &mut found);
+        let mut hit = 0;
+        for lane in 0..PACKET {
+            let bit = 1 << lane;
+            hit |= if found.t[lane].is_nan() { 0 } else { bit };
+        }
+        if let Some((own, parts)) = except {
+            for (lane, &part) in parts.iter().enumerate() {
+                let bit = own & 1 << lane;
+                hit &= if found.primitive[lane] == part { !bit } else { !0 };
+            }
+        }
+        hit
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &Ray, hit: &ShapeHit) -> SurfacePoint {
+        let ray = ray.to_f64();
+        match self {
+            Self::Shape(shape) => shape.surface(&ray, hit),
+            Self::Mesh(mesh) => mesh.surface(&ray, hit),
+        }
+    }
+
+    /// The box around it; none where it has no end.
+    pub fn bounds(&self) -> Option<Aabb> {
+        match self {
+            Self::Shape(shape) => shape.bounds(),
+            Self::Mesh(mesh) => Some(mesh.bounds()),
+        }
+    }
+
+    /// The instance that it is, if it is a mesh.
+    pub fn mesh(&self) -> Option<&MeshInstance> {
+        match self {
+            Self::Shape(_) => None,
+            Self::Mesh(mesh) => Some(mesh),
+        }
+    }
+
+    /// Triangles that it is made of.
+    pub fn triangle_count(&self) -> u64 {
+        match self {
+            Self::Shape(shape) => shape.triangle_count(),
+            Self::Mesh(mesh) => mesh.tree.loaded().mesh.triangles.len() as u64,
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "side_by_side_tests.rs"]
+mod tests;
