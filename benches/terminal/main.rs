@@ -175,7 +175,7 @@ impl Window {
         let (width, height) = (last.width, last.height);
         let share = 0.05_f64.sqrt();
         let (across, down) = ((f64::from(width) * share) as u32, (f64::from(height) * share) as u32);
-        let mut other = last.clone();
+        let mut other = last;
         for y in height / 3..height / 3 + down {
             for x in width / 3..width / 3 + across {
                 let pixel = &mut other.pixels[(y * width + x) as usize];

@@ -74,7 +74,8 @@ fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
         let lights = lights_of(&shape);
         let (mut compared, mut hidden) = (0, 0);
         for from in points() {
-            for (number, light) in lights.iter() {
+            // The first is the point light.
+            for (number, light) in lights.iter().skip(1) {
                 for (direction, target, factor) in samples(light, number, from, 64) {
                     let Some((met, hit)) = met(&shape, from, direction) else { continue };
                     // A torus may hide the point, and the very edge of a shape may be missed.
@@ -98,10 +99,12 @@ fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
 fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
     for shape in shapes() {
         let lights = lights_of(&shape);
+        let around = shape.bounds().expect("it has an end");
+        let reach = around.extent().length() * 0.5 + (around.center() - shape.middle().as_vec3()).length();
         for from in points() {
             // Directions in a cone around the shape.
             let to_middle = shape.middle() - from.as_dvec3();
-            let sin = (1.7 / to_middle.length()).min(1.0) as f32;
+            let sin = (f64::from(reach) / to_middle.length()).min(1.0) as f32;
             let cone = SphereCone::new(to_middle.as_vec3(), sin);
             let (mut sums, n) = (vec![0.0; lights.len()], 200_000);
             for i in 0..n {

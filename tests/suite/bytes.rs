@@ -146,7 +146,7 @@ fn rgb(color: vt100::Color) -> [u8; 3] {
             let index = usize::from(index - 16);
             [index / 36, index / 6 % 6, index % 6].map(|step| [0, 95, 135, 175, 215, 255][step])
         }
-        other => panic!("{other:?} is of no picture"),
+        other => unreachable!("{other:?} is of no picture"),
     }
 }
 
@@ -159,7 +159,7 @@ fn scene(name: &str) -> String {
 fn changed(a: &Picture, b: &Picture) -> usize {
     let width = a.width as usize;
     let is_off = |i: usize| (0..3).any(|k| a.pixels[i][k].abs_diff(b.pixels[i][k]) > 1);
-    let tops = (0..a.pixels.len()).filter(|i| i / width % 2 == 0);
+    let tops = (0..a.pixels.len()).filter(|i| (i / width).is_multiple_of(2));
     tops.filter(|i| is_off(*i) || is_off(i + width)).count()
 }
 

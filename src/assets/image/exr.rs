@@ -166,10 +166,10 @@ fn copy(block: &UncompressedBlock, header: &Header, channels: [usize; 3], sample
             match header.channels.list[line.location.channel].sample_type {
                 SampleType::F32 => place(row, slot, start, line.value, f32::from_ne_bytes),
                 SampleType::F16 => {
-                    place(row, slot, start, line.value, |bytes| f16::from_ne_bytes(bytes).to_f32())
+                    place(row, slot, start, line.value, |bytes| f16::from_ne_bytes(bytes).to_f32());
                 }
                 SampleType::U32 => {
-                    place(row, slot, start, line.value, |bytes| u32::from_ne_bytes(bytes) as f32)
+                    place(row, slot, start, line.value, |bytes| u32::from_ne_bytes(bytes) as f32);
                 }
             }
         }

@@ -58,7 +58,12 @@ fn assert_same(text: &str) -> bool {
         .iter()
         .map(|error| (error.span().unwrap_or_default(), error.message().to_owned()))
         .collect();
-    assert_eq!(errors(&our_errors), their_errors, "{text:?}");
+    let our_found = errors(&our_errors).into_iter().map(|(span, message)| {
+        // The crate does not say where a key has too many parts.
+        let is_placed = message != "recursion limit" || their_errors.iter().any(|(other, _)| *other == span);
+        (if is_placed { span } else { 0..0 }, message)
+    });
+    assert_eq!(our_found.collect::<Vec<_>>(), their_errors, "{text:?}");
     assert_same_table(text, ours.root(), theirs.get_ref());
     our_errors.is_empty()
 }
@@ -216,7 +221,7 @@ fn lines() -> impl Strategy<Value = String> {
     let end = prop::sample::select(vec!["\n", "\n", "\n", "\r\n", "\n\n", "\r"]);
     (any::<bool>(), prop::collection::vec((line(), end), 0..12)).prop_map(|(has_mark, lines)| {
         let text: String = lines.into_iter().map(|(line, end)| line + end).collect();
-        if has_mark && text.len() % 5 == 0 { format!("{MARK}{text}") } else { text }
+        if has_mark && text.len().is_multiple_of(5) { format!("{MARK}{text}") } else { text }
     })
 }
 

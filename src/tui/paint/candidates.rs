@@ -22,10 +22,14 @@ pub(super) struct Candidates {
 pub(super) fn candidates(cells: &[Option<[Shade; 2]>], taste: Taste) -> Candidates {
     let column = |half: usize| cells.iter().map_while(move |cell| cell.map(|halves| halves[half]));
     let both = cells.iter().map_while(|cell| *cell).flatten();
-    Candidates { upper: shades(column(0), taste), lower: shades(column(1), taste), both: shades(both, taste) }
+    Candidates {
+        upper: shades(&column(0), taste),
+        lower: shades(&column(1), taste),
+        both: shades(&both, taste),
+    }
 }
 
-fn shades(wanted: impl Iterator<Item = Shade> + Clone, taste: Taste) -> Vec<Shade> {
+fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), taste: Taste) -> Vec<Shade> {
     let mut shades = Vec::with_capacity(MOST);
     let Some(first) = wanted.clone().next() else { return shades };
     let mut add = |shade| {

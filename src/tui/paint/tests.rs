@@ -308,7 +308,8 @@ fn pictured(columns: u16, rows: u16, pixel: impl Fn(u16, u16) -> [u8; 3]) -> (Bu
 
 /// Numbers without an order, the same for the same place and seed.
 fn noise(x: u16, y: u16, seed: u32) -> u8 {
-    let mut hash = u32::from(x) * 0x9E37_79B1 ^ u32::from(y) * 0x85EB_CA77 ^ seed.wrapping_mul(0xC2B2_AE3D);
+    let mut hash =
+        (u32::from(x) * 0x9E37_79B1) ^ (u32::from(y) * 0x85EB_CA77) ^ seed.wrapping_mul(0xC2B2_AE3D);
     hash = (hash ^ (hash >> 15)).wrapping_mul(0x2C1B_3C6D);
     hash = (hash ^ (hash >> 12)).wrapping_mul(0x297A_2D39);
     (hash ^ (hash >> 15)) as u8
@@ -424,8 +425,8 @@ fn aims_that_come_faster_than_they_are_drawn_lead_to_the_edge() {
     for seed in 0..16 {
         let (buffer, picture) = picture_of(seed);
         desk.painter.aim(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
-        // About three rows.
-        desk.slice(3 * 20 * usize::from(SIDE.0));
+        // About three rows of such noise.
+        desk.slice(3 * 40 * usize::from(SIDE.0));
     }
     let looks = on_screen(&desk, Rect::new(1, 0, SIDE.0, SIDE.1));
     let blank = looks.iter().filter(|look| **look == Look::BLANK).count();

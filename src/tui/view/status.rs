@@ -74,7 +74,7 @@ fn bar_words(state: &State) -> String {
             }
         }
         (Activity::Waiting | Activity::Broken | Activity::Cancelled, _) => {
-            words.push(activity(state).0.to_owned())
+            words.push(activity(state).0.to_owned());
         }
         (Activity::Running { .. }, Some(progress)) => {
             words.push(format!("{}%", percent(progress.fraction)));

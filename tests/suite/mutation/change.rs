@@ -163,6 +163,7 @@ fn place(bytes: &[u8], random: &mut Random) -> usize {
     random.below(within)
 }
 
+#[expect(clippy::ptr_arg, reason = "one signature for all changes")]
 fn flip_bits(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     for _ in 0..=random.below(8) {
         let at = place(bytes, random);
@@ -170,6 +171,7 @@ fn flip_bits(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     }
 }
 
+#[expect(clippy::ptr_arg, reason = "one signature for all changes")]
 fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     for _ in 0..=random.below(8) {
         let at = place(bytes, random);
@@ -178,6 +180,7 @@ fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
 }
 
 /// A number of 1, 2, 4 or 8 bytes in either order.
+#[expect(clippy::ptr_arg, reason = "one signature for all changes")]
 fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let (at, length) = (place(bytes, random), 1 << random.below(4));
     let number = *random.pick(EDGES);

@@ -136,7 +136,7 @@ fn the_picture_follows_the_size_of_the_window() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    let small = terminal.look(Colors::of).red;
+    let small = terminal.settled(|screen| Colors::of(screen).red);
     terminal.resize(200, 60);
     let is_at = |screen: &vt100::Screen, row: usize| {
         screen.contents().lines().nth(row).is_some_and(|line| line.starts_with("q quit"))

@@ -169,6 +169,19 @@ impl Terminal {
         Self { master: pair.master, _slave: pair.slave, child, keys, screen, relay, is_reading }
     }
 
+    /// What is seen once it stays so: words come before the picture.
+    pub fn settled<T: PartialEq>(&self, look: impl Fn(&vt100::Screen) -> T) -> T {
+        let mut before = self.look(&look);
+        loop {
+            std::thread::sleep(Duration::from_millis(300));
+            let now = self.look(&look);
+            if now == before {
+                return now;
+            }
+            before = now;
+        }
+    }
+
     pub fn press(&mut self, keys: &str) {
         if let Some(relay) = &self.relay {
             relay.press(keys);

@@ -70,9 +70,9 @@ fn offer<const N: usize>(
     }
     if has_planar {
         let mut to_right = planes;
-        for i in 0..N {
-            to_right.right[i] += planar[i];
-            planes.left[i] += planar[i];
+        for (i, planar) in planar.into_iter().enumerate() {
+            to_right.right[i] += planar;
+            planes.left[i] += planar;
         }
         search.offer(axis, true, &to_right);
     }
@@ -114,7 +114,9 @@ mod tests {
                 .map(|id| {
                     let from = step(10.0);
                     let along = step(8.0)
-                        * Vec3::from(std::array::from_fn(|axis| (id as usize % 5 != axis) as u8 as f32));
+                        * Vec3::from(std::array::from_fn(|axis| {
+                            f32::from(u8::from(id as usize % 5 != axis))
+                        }));
                     Reference::new(id, [from, from + along, from + along * 0.5])
                 })
                 .collect();
