@@ -18,8 +18,8 @@ impl Taste {
     /// Every colour to 1/255.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
-    /// An error of 10/255 in all channels of a half is about worth the bytes of a colour.
-    pub(super) const MOVING: Self = Self { byte: 18.0, most: 255, spans: &[1, 4, 9] };
+    /// An error of 12/255 in all channels of a half is about worth the bytes of a colour.
+    pub(super) const MOVING: Self = Self { byte: 24.0, most: 255, spans: &[1, 4, 9] };
 
     /// The same where a byte is worth this much, or as much as for a moving picture at least.
     pub(super) fn at(self, byte: f32) -> Self {
