@@ -8,7 +8,7 @@
 //! | room | what it knows |
 //! | --- | --- |
 //! | [`system`] | the operating system's errors in plain words, which files have an end |
-//! | [`choice`] | values that are chosen by name |
+//! | [`choice`](mod@choice) | values that are chosen by name |
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
