@@ -70,6 +70,8 @@ pub(super) struct Engine {
     assets: Vec<FileRead>,
     /// All files that must not be written: what the last scene that could be read is made of, and what was named since.
     inputs: Inputs,
+    /// Whether the scene as it is now could not be read: nobody knows all the files that it names.
+    is_broken: bool,
 }
 
 /// Orders that come while a request is under way.
@@ -113,6 +115,7 @@ impl Engine {
             pool: None,
             assets: Vec::new(),
             inputs: Inputs::default(),
+            is_broken: false,
         }
     }
 
@@ -128,6 +131,11 @@ impl Engine {
         }
         // What is watched cannot be written.
         self.inputs.add_read(&findings.files);
+        match &outcome {
+            Ok(_) => self.is_broken = false,
+            Err(Stop::Failed(Failure::Scene(_))) => self.is_broken = true,
+            Err(Stop::Failed(Failure::Work(_)) | Stop::Cancelled) => {}
+        }
         if let Ok(report) = &outcome {
             self.write_report(report, &findings, sink);
         }
@@ -159,6 +167,15 @@ impl Engine {
         if !canvas.is_covered() {
             let message = "nothing is written: the render was stopped before every pixel had a sample";
             return sink.write_failed(message.to_owned());
+        }
+        if self.is_broken
+            && let Some(path) = self.written.not_ours(&plan.outputs, &self.contents)
+        {
+            let path = path.display();
+            return sink.write_failed(format!(
+                "nothing is written: the scene has errors and may name {path}, which was not written by this run; mend \
+                 the scene first"
+            ));
         }
         let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
         let written = &mut self.written;

@@ -108,8 +108,10 @@ pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
         &found.shininess_texture,
         &found.dissolve_texture,
     ];
-    let is_map =
-        |key: &str| key.starts_with("map_") || ["norm", "bump", "disp", "decal", "refl"].contains(&key);
+    let is_map = |key: &str| {
+        let key = key.to_ascii_lowercase();
+        key.starts_with("map_") || ["norm", "bump", "disp", "decal", "refl"].contains(&key.as_str())
+    };
     let others = found.unknown_param.iter().filter(|(key, _)| is_map(key)).map(|(_, value)| value);
     let mut names: Vec<String> = known
         .into_iter()
@@ -142,7 +144,8 @@ fn file_name(statement: &str) -> Option<String> {
         rest = behind.trim_start();
         let numeric = ["o", "s", "t", "mm"].contains(&name);
         for _ in 0..most {
-            let (argument, behind) = rest.split_once(char::is_whitespace)?;
+            // The last word is the file.
+            let Some((argument, behind)) = rest.split_once(char::is_whitespace) else { break };
             if numeric && argument.parse::<f32>().is_err() {
                 break;
             }
@@ -204,6 +207,16 @@ mod tests {
         let mut expected = maps.map(|map| PathBuf::from(format!("models/{map}.png")));
         expected.sort();
         assert_eq!(pictures(&found[0], Path::new("models")), expected);
+    }
+
+    #[test]
+    fn options_may_have_fewer_numbers_than_three() {
+        for options in
+            ["-o 0", "-o 0 0", "-s 1 1", "-t 0.5", "-blendu on -o 0 0", "-mm 0", "-clamp on -s 2 -o 1 1"]
+        {
+            let found = read(&format!("newmtl a\nmap_Kd {options} u.png\n")).expect("whole");
+            assert_eq!(found[0].diffuse_texture, Some(PathBuf::from("models/u.png")), "{options}");
+        }
     }
 
     #[test]

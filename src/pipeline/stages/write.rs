@@ -23,6 +23,21 @@ use crate::scene::fingerprint::{Fingerprint, Key};
 pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
 
 impl Written {
+    /// The first of these that is there and does not hold what was written to it.
+    pub(in crate::pipeline) fn not_ours<'a>(
+        &self,
+        paths: &'a [PathBuf],
+        contents: &Contents,
+    ) -> Option<&'a Path> {
+        let holds = |path: &Path, known: &Content| {
+            // A token that nobody cancels.
+            contents.read(path, &CancelToken::new()).is_ok_and(|content| content == *known)
+        };
+        let is_ours = |path: &Path| self.0.get(path).is_some_and(|(_, known)| holds(path, known));
+        let is_there = |path: &Path| path.symlink_metadata().is_ok();
+        paths.iter().map(PathBuf::as_path).find(|path| is_there(path) && !is_ours(path))
+    }
+
     /// Write everything next time.
     fn forget(&mut self) {
         self.0.clear();

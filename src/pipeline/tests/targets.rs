@@ -133,3 +133,23 @@ fn a_link_that_changes_during_the_render_is_seen_before_the_write() {
     assert_eq!(fs::read(bench.path("skin.ppm")).expect("a texture"), before);
     assert!(!bench.path("elsewhere.ppm").exists());
 }
+
+#[test]
+fn while_the_scene_is_broken_only_what_this_run_wrote_is_replaced() {
+    let mut bench = Bench::new(SCENE);
+    let output = bench.path("out.ppm");
+    bench.done();
+    bench.edit("\"skin.ppm\"", "\"out.ppm\"\nbogus = 1");
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::Written { .. }), "nothing is lost");
+    fs::write(&output, "a picture of somebody else").expect("written");
+    bench.worker.send(Command::Write);
+    let Event::WriteFailed { message, .. } = bench.next() else { panic!("it is refused") };
+    assert!(message.contains("out.ppm") && message.contains("the scene has errors"), "{message}");
+    assert_eq!(fs::read(&output).expect("there"), b"a picture of somebody else");
+    // Where nothing is, nothing is lost.
+    fs::remove_file(&output).expect("removed");
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::Written { .. }));
+}

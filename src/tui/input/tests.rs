@@ -211,6 +211,19 @@ fn a_paste_without_an_end_is_over_by_silence_time_or_length() {
 }
 
 #[test]
+fn answers_do_not_keep_a_paste_open() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~q"), []);
+    let mut found = Vec::new();
+    for _ in 0..10 {
+        found.extend(bench.read(b"\x1b[0n"));
+        found.extend(bench.wait(150));
+    }
+    assert_eq!(found[0], Input::Paste, "a second after the last text");
+    assert_eq!(bench.read(b"q"), [plain('q')]);
+}
+
+#[test]
 fn a_sequence_without_an_end_is_given_up() {
     for begun in [&b"\x1b]0;t"[..], b"\x1bP", b"\x1b[", b"\x1b[1;", b"\x1bO", b"\x1bX", b"\x1b(", b"\x1b[M"] {
         let mut bench = Bench::new();
