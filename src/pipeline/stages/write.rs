@@ -133,10 +133,11 @@ pub(in crate::pipeline) fn write(
         match write_one(image, canvas, to, path, token) {
             Ok(bytes) => {
                 count += 1;
-                sink.written(path, bytes);
-                // The picture is on disk: a cancel from here on does not undo that.
+                // The picture is on disk: a cancel from here on does not undo that. What it holds is looked at before
+                // anybody is told, who may put something else there.
                 let content = contents.read(path, &CancelToken::new())?;
                 written.0.insert(path.clone(), (key, content));
+                sink.written(path, bytes);
             }
             Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => errors.push(error.to_string()),
