@@ -102,7 +102,9 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
             let (file, bytes) = copies.edit(scene, *edit)?;
             let begin = Instant::now();
             fs::write(&file, &bytes)?;
-            let end = terminal.when(PAUSE, |now| mode.is_other(&before, now))?;
+            let end = terminal
+                .when(PAUSE, |now| mode.is_other(&before, now))
+                .map_err(|error| format!("{} {}: {error}", scene.name, edit.0))?;
             times.push(end - begin);
         }
         words.push(format!("{} {}", edit.0, figures(times)));
@@ -110,15 +112,17 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     for key in scene.keys {
         let mut times = Vec::new();
         for _ in 0..ROUNDS {
-            // Another picture each time, so that none is found among those that are kept.
+            // Another picture each time, so that none is found among those that are kept. The camera changes every view.
             let before = ready(&mut terminal, mode)?;
-            let (file, bytes) = copies.edit(scene, scene.edits[0])?;
+            let (file, bytes) = copies.edit(scene, scene.camera())?;
             fs::write(&file, &bytes)?;
             terminal.when(PAUSE, |now| mode.is_other(&before, now))?;
             let before = ready(&mut terminal, mode)?;
             let begin = Instant::now();
             terminal.press(key)?;
-            let end = terminal.when(PAUSE, |now| mode.is_other(&before, now))?;
+            let end = terminal
+                .when(PAUSE, |now| mode.is_other(&before, now))
+                .map_err(|error| format!("{} {key}: {error}", scene.name))?;
             times.push(end - begin);
         }
         words.push(format!("{key} {}", figures(times)));

@@ -9,8 +9,18 @@ use super::Outcome;
 /// and 1 that is another one each time; without it, the file of this name is a picture that gets darker by it.
 pub struct Scene {
     pub name: &'static str,
-    pub edits: &'static [(&'static str, &'static str, &'static str)],
+    pub edits: &'static [Edit],
     pub keys: &'static [&'static str],
+}
+
+/// The kind, what is replaced, by what.
+pub type Edit = (&'static str, &'static str, &'static str);
+
+impl Scene {
+    /// The edit of the camera, which stands second everywhere.
+    pub fn camera(&self) -> Edit {
+        self.edits[1]
+    }
 }
 
 pub const SCENES: &[Scene] = &[
@@ -115,7 +125,7 @@ impl Copies {
     }
 
     /// The file that an edit changes, and what it holds then.
-    pub fn edit(&mut self, scene: &Scene, (_, from, to): (&str, &str, &str)) -> Outcome<(PathBuf, Vec<u8>)> {
+    pub fn edit(&mut self, scene: &Scene, (_, from, to): Edit) -> Outcome<(PathBuf, Vec<u8>)> {
         self.edits += 1;
         let number = 0.1 + f64::from(self.edits) * 0.377 % 0.9;
         let of_project = |name: &Path| Path::new(env!("CARGO_MANIFEST_DIR")).join(name);

@@ -85,11 +85,16 @@ impl Terminal {
         let deadline = Instant::now() + LIMIT;
         thread::sleep(pause);
         while Instant::now() < deadline {
-            for (time, bytes) in std::mem::take(&mut *lock(&self.chunks)) {
+            let chunks = std::mem::take(&mut *lock(&self.chunks));
+            let mut found = None;
+            for (time, bytes) in chunks {
                 self.screen.process(&bytes);
-                if differs(&cells(self.screen.screen())) {
-                    return Ok(time);
+                if found.is_none() && differs(&cells(self.screen.screen())) {
+                    found = Some(time);
                 }
+            }
+            if let Some(time) = found {
+                return Ok(time);
             }
             thread::sleep(Duration::from_millis(20));
         }
