@@ -18,6 +18,8 @@ const FIRST_QUESTIONS: &[u8] = b"\x1b[?2026$p\x1b[c";
 const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
 const END: &[u8] = b"\x1b[?2026l";
+/// The longest that a slice is planned before it is sent and before keys are looked for.
+const TURN: Duration = Duration::from_millis(4);
 /// Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 
@@ -73,23 +75,21 @@ impl Display {
         }
     }
 
-    /// Sends what the line has room for; whether that was anything.
+    /// Sends a slice of what the line has room for; whether that was anything.
     pub(super) fn pump(&mut self, now: Instant) -> bool {
-        let mut has_sent = false;
-        while !self.is_complete {
-            let room = self.line.room(now);
-            if room == 0 {
-                break;
-            }
-            let slice = self.painter.slice(room.saturating_sub(BEGIN.len() + END.len()));
-            if slice.is_empty() {
-                self.complete();
-                break;
-            }
-            has_sent = true;
-            self.send_slice(slice, now);
+        let room = if self.is_complete { 0 } else { self.line.room(now) };
+        if room == 0 {
+            return false;
         }
-        has_sent
+        let room = room.saturating_sub(BEGIN.len() + END.len());
+        let late = now + TURN;
+        let slice = self.painter.slice_until(room, || Instant::now() >= late);
+        if slice.is_empty() {
+            self.complete();
+            return false;
+        }
+        self.send_slice(slice, now);
+        true
     }
 
     fn complete(&mut self) {
@@ -141,8 +141,12 @@ impl Display {
     }
 
     /// When there may be room for what is left, without an answer.
-    pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
-        if self.is_complete { None } else { self.line.wake(now) }
+    pub(super) fn wake(&mut self, now: Instant) -> Option<Instant> {
+        match () {
+            () if self.is_complete => None,
+            () if self.line.room(now) > 0 => Some(now),
+            () => self.line.wake(now),
+        }
     }
 
     /// The report on the last picture, once, and again when the terminal's first answer came after it.

@@ -153,6 +153,12 @@ impl Painter {
     /// have to be written: what follows builds on them. Between two slices nobody else may move the cursor or
     /// change the colours.
     pub fn slice(&mut self, most_bytes: usize) -> Vec<u8> {
+        self.slice_until(most_bytes, || false)
+    }
+
+    /// The same, and what there is once `is_late` says so, which is asked before each row: a picture takes longer to
+    /// be planned than a key may wait.
+    pub fn slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = Slice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {
             return slice.bytes;
@@ -175,6 +181,10 @@ impl Painter {
             if let Some(Part::Picture(y)) = self.part {
                 self.memory.row_done(y);
                 self.rows[usize::from(y)] = Progress { aim: self.aim, is_done: true };
+            }
+            if !slice.bytes.is_empty() && is_late() {
+                self.part = None;
+                return slice.bytes;
             }
             self.part = self.parts.next();
             let strokes = match self.part {

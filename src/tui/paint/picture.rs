@@ -32,10 +32,13 @@ impl Default for Budget {
 }
 
 impl Budget {
-    /// The row at the least error that the bytes allow.
+    /// The row at the least error that the bytes allow. Bytes get cheaper after rows that left some.
     fn spend(&mut self, targets: &[Target], start: Start) -> Row {
-        self.bytes += FIRST_BYTES * targets.len() as u32;
-        self.taste = self.taste.at(self.taste.byte / STEP);
+        let share = FIRST_BYTES * targets.len() as u32;
+        self.bytes += share;
+        if self.bytes > 2 * share {
+            self.taste = self.taste.at(self.taste.byte / STEP);
+        }
         loop {
             let found = row(targets, start, self.taste);
             let bytes = found.bytes + ROW_BYTES;

@@ -120,7 +120,13 @@ fn step(last: &[Way], target: Target, wanted: &[Option<[Shade; 2]>], taste: Tast
     let changes = if leave <= taste.byte { Candidates::default() } else { candidates(wanted, taste) };
     let changes = Changes::new(&changes, halves, taste);
     for (parent, way) in last.iter().enumerate() {
-        changes.draw(parent, way, &mut beam);
+        changes.turn_one(parent, way, &mut beam);
+    }
+    // Where both colours are set, nothing is left of the pen: the cheapest way goes on.
+    let base = |way: &Way| way.cost + way.gap.bytes() as f32 * taste.byte;
+    if let Some((parent, way)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
+    {
+        changes.turn_both(parent, way, &mut beam);
     }
     beam.ways
 }
@@ -190,44 +196,85 @@ impl Changes {
         Self { halves, taste, all, upper: upper.len(), lower: upper.len() + lower.len() }
     }
 
-    /// Every way to draw the cell at the end of a way to it.
-    fn draw(&self, parent: usize, way: &Way, beam: &mut Beam) {
-        let byte = self.taste.byte;
+    /// The ways to draw the cell at the end of a way to it, with the pen as it is or with one other colour. A colour for
+    /// one half is shown in that one.
+    fn turn_one(&self, parent: usize, way: &Way, beam: &mut Beam) {
+        let mut ends = End::new(self, parent, way, beam);
+        if !ends.is_near() {
+            return;
+        }
         let errors = |shade| self.halves.map(|half| self.taste.error(shade, half));
         let pen = Ends { fg: way.fg, fg_errors: errors(way.fg), bg: way.bg, bg_errors: errors(way.bg) };
-        let (bytes, error) = (way.bytes + way.gap.bytes(), way.cost - way.bytes as f32 * byte);
-        let mut bound = beam.bound();
-        let mut end = |ends: Ends, sgr: u32, glyphs: &[Glyph]| {
-            for glyph in glyphs {
-                let bytes = bytes + sgr + glyph.symbol().len() as u32;
-                let cost = bytes as f32 * byte + error + ends.error(*glyph);
-                if cost < bound {
-                    let Ends { fg, bg, .. } = ends;
-                    let gap = Gap::Cells(0);
-                    beam.add(Way { fg, bg, gap, bytes, cost, parent, glyph: Some(*glyph) });
-                    bound = beam.bound();
-                }
-            }
-        };
-        end(pen, 0, &Glyph::ALL);
-        for change in &self.all {
+        for glyph in Glyph::ALL {
+            ends.add(pen, 0, glyph);
+        }
+        for (index, change) in self.all.iter().enumerate() {
             let bytes = change.bytes + 3;
+            let (as_fg, as_bg) = match index {
+                _ if index < self.upper => (Glyph::Upper, Glyph::Lower),
+                _ if index < self.lower => (Glyph::Lower, Glyph::Upper),
+                _ => (Glyph::Full, Glyph::Blank),
+            };
             if change.shade.fits(Layer::Foreground) {
-                end(pen.with_fg(change), bytes, &[Glyph::Upper, Glyph::Lower, Glyph::Full]);
+                ends.add(pen.with_fg(change), bytes, as_fg);
             }
             if change.shade.fits(Layer::Background) {
-                end(pen.with_bg(change), bytes, &[Glyph::Upper, Glyph::Lower, Glyph::Blank]);
+                ends.add(pen.with_bg(change), bytes, as_bg);
             }
         }
+    }
+
+    /// The same with both colours.
+    fn turn_both(&self, parent: usize, way: &Way, beam: &mut Beam) {
+        let mut ends = End::new(self, parent, way, beam);
         for upper in &self.all[..self.upper] {
             for lower in &self.all[self.upper..self.lower] {
                 let bytes = upper.bytes + lower.bytes + 4;
                 for (fg, bg, glyph) in [(upper, lower, Glyph::Upper), (lower, upper, Glyph::Lower)] {
                     if fg.shade.fits(Layer::Foreground) && bg.shade.fits(Layer::Background) {
-                        end(pen.with_fg(fg).with_bg(bg), bytes, &[glyph]);
+                        ends.add(Ends::of(fg, bg), bytes, glyph);
                     }
                 }
             }
+        }
+    }
+}
+
+/// Ways on from the end of one.
+struct End<'a> {
+    parent: usize,
+    /// With those that lead to the cell.
+    bytes: u32,
+    /// Of the cells before.
+    error: f32,
+    /// The price of a byte.
+    byte: f32,
+    beam: &'a mut Beam,
+    /// Of the beam.
+    bound: f32,
+}
+
+impl<'a> End<'a> {
+    fn new(changes: &Changes, parent: usize, way: &Way, beam: &'a mut Beam) -> Self {
+        let byte = changes.taste.byte;
+        let error = way.cost - way.bytes as f32 * byte;
+        let bound = beam.bound();
+        Self { parent, bytes: way.bytes + way.gap.bytes(), error, byte, beam, bound }
+    }
+
+    /// Whether anything that is drawn here can be worth a look.
+    fn is_near(&self) -> bool {
+        (self.bytes + 1) as f32 * self.byte + self.error < self.bound
+    }
+
+    fn add(&mut self, ends: Ends, sgr: u32, glyph: Glyph) {
+        let bytes = self.bytes + sgr + glyph.symbol().len() as u32;
+        let cost = bytes as f32 * self.byte + self.error + ends.error(glyph);
+        if cost < self.bound {
+            let Ends { fg, bg, .. } = ends;
+            let parent = self.parent;
+            self.beam.add(Way { fg, bg, gap: Gap::Cells(0), bytes, cost, parent, glyph: Some(glyph) });
+            self.bound = self.beam.bound();
         }
     }
 }
@@ -242,6 +289,10 @@ struct Ends {
 }
 
 impl Ends {
+    fn of(fg: &Change, bg: &Change) -> Self {
+        Self { fg: fg.shade, fg_errors: fg.errors, bg: bg.shade, bg_errors: bg.errors }
+    }
+
     fn with_fg(self, change: &Change) -> Self {
         Self { fg: change.shade, fg_errors: change.errors, ..self }
     }
