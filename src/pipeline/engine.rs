@@ -35,6 +35,7 @@ use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
+use crate::system::priority;
 use crate::world::World;
 
 /// What an engine works with; tests work with other means.
@@ -43,11 +44,13 @@ pub(super) struct Means {
     pub(super) kernel: Kernel,
     /// What one film may take, at most.
     pub(super) most_film_bytes: u64,
+    /// Whether everything else on this machine goes before the render.
+    pub(super) is_background: bool,
 }
 
 impl Default for Means {
     fn default() -> Self {
-        Self { kernel: crate::integrators::render_tile, most_film_bytes: u64::MAX }
+        Self { kernel: crate::integrators::render_tile, most_film_bytes: u64::MAX, is_background: false }
     }
 }
 
@@ -392,9 +395,16 @@ impl Engine {
         }
         self.pool = None;
         let name = |index| format!("glimt-{index}");
+        let is_background = self.means.is_background;
+        let begin = move |_| {
+            if is_background {
+                priority::lower();
+            }
+        };
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(name)
+            .start_handler(begin)
             .build()
             .map_err(|error| Stop::work(format!("cannot start {threads} threads: {error}")))?;
         Ok(self.pool.insert(Arc::new(pool)).clone())

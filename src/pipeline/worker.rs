@@ -16,12 +16,12 @@ use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
 
-/// Start a worker with its thread.
+/// Start a worker with its thread. Its renders let the front end and everything else on the machine go first.
 ///
 /// # Errors
 /// The system has no thread left.
 pub fn start() -> std::io::Result<Handle> {
-    start_with(Means::default())
+    start_with(Means { is_background: true, ..Means::default() })
 }
 
 /// A worker with other means.

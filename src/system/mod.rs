@@ -1,6 +1,7 @@
-//! What the operating system says, in plain words, and which files have an end.
+//! What the operating system says, in plain words, which files have an end, and which threads go first.
 
 pub mod file;
+pub(crate) mod priority;
 
 use std::io::{Error, ErrorKind};
 

@@ -19,7 +19,7 @@ const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
 const END: &[u8] = b"\x1b[?2026l";
 /// The longest that a slice is planned before it is sent and before keys are looked for.
-const TURN: Duration = Duration::from_millis(4);
+const TURN: Duration = Duration::from_millis(3);
 /// Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 

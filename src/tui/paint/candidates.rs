@@ -7,7 +7,7 @@ use crate::tui::color::nearest_256;
 /// The most of them for one half, and for both together.
 const MOST: usize = 6;
 /// No colour is looked for that serves longer than this.
-const LONGEST: usize = 32;
+const LONGEST: usize = 8;
 
 /// Colours for the halves of one cell.
 #[derive(Clone, Debug, Default)]

@@ -67,6 +67,16 @@ impl Shade {
         }
     }
 
+    /// A number that no other shade has.
+    pub(super) fn number(self) -> u32 {
+        match self {
+            Self::Ground => 1 << 24,
+            Self::Ink => 2 << 24,
+            Self::Palette(index) => 3 << 24 | u32::from(index),
+            Self::Rgb([r, g, b]) => u32::from_be_bytes([0, r, g, b]),
+        }
+    }
+
     /// What it looks like, where that is known.
     pub(super) fn rgb(self) -> Option<[u8; 3]> {
         match self {

@@ -10,7 +10,7 @@ use super::shade::{Layer, Shade, digits};
 use super::taste::Taste;
 
 /// Ways that are kept from cell to cell.
-const BEAM: usize = 10;
+const BEAM: usize = 5;
 /// Bytes after which any pen is any other one anywhere: what is this much worse than the best never wins.
 const MOST_BYTES: f32 = 46.0;
 
@@ -46,6 +46,8 @@ pub(super) struct Dab {
 struct Way {
     fg: Shade,
     bg: Shade,
+    /// Both colours as one number.
+    pen: u64,
     gap: Gap,
     bytes: u32,
     /// Bytes and errors.
@@ -54,6 +56,11 @@ struct Way {
     parent: usize,
     /// None: the cell was left.
     glyph: Option<Glyph>,
+}
+
+/// Two colours as one number.
+fn pen(fg: Shade, bg: Shade) -> u64 {
+    u64::from(fg.number()) << 32 | u64::from(bg.number())
 }
 
 /// Cells between the cursor and the next one.
@@ -92,7 +99,8 @@ pub(super) struct Row {
 /// What leads through the row at the least cost.
 pub(super) fn row(targets: &[Target], start: Start, taste: Taste) -> Row {
     let gap = if start.is_there { Gap::Cells(0) } else { Gap::Far };
-    let first = Way { fg: start.fg, bg: start.bg, gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
+    let Start { fg, bg, .. } = start;
+    let first = Way { fg, bg, pen: pen(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
     let mut ways = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
@@ -140,7 +148,7 @@ struct Beam {
 
 impl Beam {
     fn add(&mut self, way: Way) {
-        let is_same = |other: &Way| (other.fg, other.bg, other.gap) == (way.fg, way.bg, way.gap);
+        let is_same = |other: &Way| other.pen == way.pen && other.gap == way.gap;
         if let Some(other) = self.ways.iter_mut().find(|other| is_same(other)) {
             if way.cost < other.cost {
                 *other = way;
@@ -273,7 +281,8 @@ impl<'a> End<'a> {
         if cost < self.bound {
             let Ends { fg, bg, .. } = ends;
             let parent = self.parent;
-            self.beam.add(Way { fg, bg, gap: Gap::Cells(0), bytes, cost, parent, glyph: Some(glyph) });
+            let (pen, gap, glyph) = (pen(fg, bg), Gap::Cells(0), Some(glyph));
+            self.beam.add(Way { fg, bg, pen, gap, bytes, cost, parent, glyph });
             self.bound = self.beam.bound();
         }
     }
