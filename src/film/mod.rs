@@ -88,6 +88,18 @@ impl RadianceImage {
         Self { width, height, pixels: vec![Vec3::ZERO; width as usize * height as usize] }
     }
 
+    /// Takes over the pixels of a rectangle, in rows. What is not finite is black, as in a [`Film`].
+    pub(crate) fn put(&mut self, rect: Rect, pixels: &[Vec3]) {
+        let width = self.width as usize;
+        let rows = self.pixels.chunks_exact_mut(width).skip(rect.y as usize);
+        for (row, new) in rows.zip(pixels.chunks_exact(rect.width as usize)) {
+            let row = row.iter_mut().skip(rect.x as usize);
+            for (pixel, new) in row.zip(new) {
+                *pixel = if new.is_finite() { *new } else { Vec3::ZERO };
+            }
+        }
+    }
+
     /// The same picture at another size: every new pixel is the mean over its area of the old ones, exact for
     /// any ratio, so that the mean of the whole stays.
     pub fn resized(&self, width: u32, height: u32) -> Self {

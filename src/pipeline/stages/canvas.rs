@@ -54,9 +54,12 @@ impl Canvas {
         self.film.memory_bytes() + done + base + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// What brings every tile to this many samples.
+    /// What brings every tile to this many samples: the tiles that lack some, in the film's order.
     pub(super) fn jobs(&self, target: u32) -> Vec<Job> {
-        jobs(&self.film, |tile| self.done[tile]..target)
+        let of = |&tile: &usize| {
+            Some(Job { tile, rect: self.film.tile_rect(tile)?, samples: self.done[tile]..target })
+        };
+        self.film.tile_order().iter().filter_map(of).filter(|job| !job.samples.is_empty()).collect()
     }
 
     /// Pixels times samples.
@@ -64,10 +67,4 @@ impl Canvas {
         let area = |tile| self.film.tile_rect(tile).map_or(0, |rect| rect.area() as u64);
         (0..self.done.len()).map(|tile| area(tile) * u64::from(samples_of(tile))).sum()
     }
-}
-
-/// The tiles that lack samples, in the film's order.
-pub(super) fn jobs(film: &Film, samples_of: impl Fn(usize) -> std::ops::Range<u32>) -> Vec<Job> {
-    let job = |&tile: &usize| Some(Job { tile, rect: film.tile_rect(tile)?, samples: samples_of(tile) });
-    film.tile_order().iter().filter_map(job).filter(|job| !job.samples.is_empty()).collect()
 }

@@ -10,12 +10,12 @@ use super::super::pace::{Clock, Pace};
 use super::super::plan::Plan;
 use super::super::protocol::{PreviewSize, RenderProgress};
 use super::super::sink::Sink;
-use super::super::trace::{Tracer, next_pass};
-use super::canvas::{Canvas, jobs};
+use super::super::trace::{Job, Tracer, next_pass};
+use super::canvas::Canvas;
 use super::films::Films;
 use super::preview::Screen;
 use super::{Staged, Stop};
-use crate::film::{Film, Rect};
+use crate::film::{RadianceImage, Rect};
 use crate::integrators::{RayCounters, RenderSettings};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
@@ -224,20 +224,30 @@ impl<'a> Painter<'a> {
         }
         let render = Render { width, height, ..plan.settings.render };
         let settings = RenderSettings { render, ..plan.settings };
-        let crop = plan.crop.map(|rect| scale(rect, (full_width, full_height), (width, height)));
-        let film = Film::new(width, height, crop).map_err(Stop::work)?;
-        let jobs = jobs(&film, |_| 0..1);
+        let whole = Rect { x: 0, y: 0, width, height };
+        let rect = plan.crop.map_or(whole, |rect| scale(rect, (full_width, full_height), (width, height)));
         let tracer = Tracer { settings: &settings, ..self.rendering.tracer };
-        tracer.run(&jobs, |result| {
+        let mut base = RadianceImage::black(width, height);
+        tracer.run(&coarse_jobs(rect), |result| {
             if let Some((job, samples, _)) = result {
-                film.add(job.tile, &samples);
+                base.put(job.rect, &samples.radiance);
             }
             true
         })?;
-        self.canvas.base = Some(film.radiance());
+        self.canvas.base = Some(base);
         self.show();
         Ok(())
     }
+}
+
+/// Small pieces, so that all threads end at about the same time.
+fn coarse_jobs(rect: Rect) -> Vec<Job> {
+    const SIDE: u32 = 16;
+    let starts = |start: u32, length: u32| (start..start + length).step_by(SIDE as usize);
+    let piece = |(x, y)| Rect { x, y, width: SIDE, height: SIDE }.intersection(&rect);
+    let places = starts(rect.y, rect.height).flat_map(|y| starts(rect.x, rect.width).map(move |x| (x, y)));
+    let job = |(tile, rect)| Job { tile, rect, samples: 0..1 };
+    places.filter_map(piece).enumerate().map(job).collect()
 }
 
 /// The pixels of a smaller picture that lie under a rectangle of a larger one.
@@ -256,6 +266,24 @@ fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_pieces_of_a_coarse_picture_cover_it_once() {
+        let rect = Rect { x: 3, y: 5, width: 40, height: 17 };
+        let mut seen = vec![0; 64 * 64];
+        for job in coarse_jobs(rect) {
+            for y in job.rect.y..job.rect.y + job.rect.height {
+                for x in job.rect.x..job.rect.x + job.rect.width {
+                    seen[(y * 64 + x) as usize] += 1;
+                }
+            }
+        }
+        let one = Rect { width: 1, height: 1, ..rect };
+        for (i, times) in (0..64 * 64).zip(seen) {
+            let is_inside = Rect { x: i % 64, y: i / 64, ..one }.intersection(&rect).is_some();
+            assert_eq!(times, i32::from(is_inside), "pixel {i}");
+        }
+    }
 
     #[test]
     fn a_crop_covers_its_part_of_a_smaller_picture() {
