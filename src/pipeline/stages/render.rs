@@ -213,11 +213,26 @@ impl<'a> Painter<'a> {
         self.next_preview = Instant::now() + PREVIEW_INTERVAL;
     }
 
-    /// A first picture with one sample at the preview's own resolution, where that is much less work than one pass.
+    /// Columns and rows of the first picture. Where rays are slow, since no cache holds the trees, it has half as many
+    /// pixels as the preview.
+    fn coarse_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
+        /// Triangles whose trees take some tens of megabytes.
+        const LARGE: u64 = 250_000;
+        let side =
+            |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
+        if self.rendering.tracer.world.triangle_count() < LARGE {
+            (width, height)
+        } else {
+            (side(width), side(height))
+        }
+    }
+
+    /// A first picture with one sample at about the preview's own resolution, where that is much less work than one pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let plan = self.rendering.plan;
         let (full_width, full_height) = (plan.settings.render.width, plan.settings.render.height);
-        let Some((width, height)) = self.screen.size() else { return Ok(()) };
+        let Some(shown) = self.screen.size() else { return Ok(()) };
+        let (width, height) = self.coarse_size(shown);
         let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
         if pixels(width, height) * 2 > pixels(full_width, full_height) {
             return Ok(());
@@ -234,7 +249,7 @@ impl<'a> Painter<'a> {
             }
             true
         })?;
-        self.canvas.base = Some(base);
+        self.canvas.base = Some(base.resized(shown.0, shown.1));
         self.show();
         Ok(())
     }
