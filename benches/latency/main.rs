@@ -113,10 +113,10 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
         let mut times = Vec::new();
         for _ in 0..ROUNDS {
             // Another picture each time, so that none is found among those that are kept. The camera changes every view.
-            let before = ready(&mut terminal, mode)?;
+            ready(&mut terminal, mode)?;
             let (file, bytes) = copies.edit(scene, scene.camera())?;
             fs::write(&file, &bytes)?;
-            terminal.when(PAUSE, |now| mode.is_other(&before, now))?;
+            std::thread::sleep(2 * PAUSE);
             let before = ready(&mut terminal, mode)?;
             let begin = Instant::now();
             terminal.press(key)?;
