@@ -23,12 +23,29 @@ const TURN: Duration = Duration::from_millis(3);
 /// Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 
+/// What is known of the way to the terminal before anything was sent.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Way {
+    /// Inside tmux or screen, which answer themselves and draw when they like.
+    pub(super) is_multiplexed: bool,
+    /// Over a network.
+    pub(super) is_remote: bool,
+    /// Whether the terminal knows REP.
+    pub(super) can_repeat: bool,
+}
+
+impl Way {
+    /// Nothing is known of the line yet. What answers inside a multiplexer says nothing of a network behind it.
+    fn line(self, now: Instant) -> Line {
+        Line::new(self.is_multiplexed && self.is_remote, now)
+    }
+}
+
 /// The screen as the loop sees it.
 pub(super) struct Display {
     painter: Painter,
     line: Line,
-    /// Inside tmux or screen, which answer themselves and draw when they like.
-    is_multiplexed: bool,
+    way: Way,
     /// Whether the terminal knows mode 2026.
     is_synchronized: bool,
     /// Whether all that is wanted has been sent.
@@ -43,11 +60,11 @@ pub(super) struct Display {
 
 impl Display {
     /// A screen of which nothing is known.
-    pub(super) fn new(depth: ColorDepth, is_multiplexed: bool, now: Instant) -> Self {
+    pub(super) fn new(depth: ColorDepth, way: Way, now: Instant) -> Self {
         let mut display = Self {
-            painter: Painter::new(depth),
-            line: Line::new(is_multiplexed, now),
-            is_multiplexed,
+            painter: Painter::new(depth).repeating(way.can_repeat),
+            line: way.line(now),
+            way,
             is_synchronized: false,
             is_complete: true,
             frame: None,
@@ -61,7 +78,7 @@ impl Display {
     /// Somebody else used the terminal: its content is unknown, and so is the line.
     pub(super) fn restart(&mut self, now: Instant) {
         self.painter.forget();
-        self.line = Line::new(self.is_multiplexed, now);
+        self.line = self.way.line(now);
         self.is_complete = false;
         self.send(FIRST_QUESTIONS.to_vec(), Some(Question::Attributes), now);
     }
@@ -101,7 +118,7 @@ impl Display {
     }
 
     fn send_slice(&mut self, mut slice: Vec<u8>, now: Instant) {
-        if self.is_synchronized && !self.is_multiplexed && slice.len() >= LARGE {
+        if self.is_synchronized && !self.way.is_multiplexed && slice.len() >= LARGE {
             slice.splice(0..0, BEGIN.iter().copied());
             slice.extend_from_slice(END);
         }
@@ -138,6 +155,11 @@ impl Display {
     /// Whether all that is wanted has been sent.
     pub(super) fn is_complete(&self) -> bool {
         self.is_complete
+    }
+
+    /// What the line takes, as far as it shows; none: more than anybody would notice.
+    pub(super) fn bytes_per_second(&self) -> Option<f64> {
+        self.line.bytes_per_second()
     }
 
     /// When there may be room for what is left, without an answer.

@@ -11,11 +11,11 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::color::{self, ColorDepth};
-use super::display::Display;
+use super::display::{Display, Way};
 use super::event::{Effect, Event, Source};
 use super::input;
 use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
-use super::paint::Fidelity;
+use super::paint::{Advice, Fidelity, Moment, advise, can_repeat};
 use super::signals::{self, Listener};
 use super::state::{PreviewKind, Setup, State};
 use super::terminal::{self, Screen};
@@ -57,7 +57,7 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
 
     let ui = Ui {
         screen,
-        display: Display::new(depth, is_multiplexed(|name| std::env::var(name).ok()), Instant::now()),
+        display: Display::new(depth, way(|name| std::env::var(name).ok()), Instant::now()),
         drawn: Drawn::default(),
         events,
         postponed: VecDeque::new(),
@@ -107,11 +107,18 @@ fn forward<T: Send + 'static>(
     Ok(())
 }
 
-/// Inside tmux or screen: they answer in the terminal's place.
-fn is_multiplexed(variable: impl Fn(&str) -> Option<String>) -> bool {
-    let is_set = |name| variable(name).is_some_and(|value| !value.is_empty());
+/// What the environment tells of the way to the terminal.
+fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
+    let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
     let term = variable("TERM").unwrap_or_default();
-    is_set("TMUX") || is_set("STY") || term.starts_with("tmux") || term.starts_with("screen")
+    Way {
+        is_multiplexed: is_set("TMUX")
+            || is_set("STY")
+            || term.starts_with("tmux")
+            || term.starts_with("screen"),
+        is_remote: ["SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"].into_iter().any(is_set),
+        can_repeat: can_repeat(variable),
+    }
 }
 
 struct Ui {
@@ -134,7 +141,11 @@ struct Ui {
 struct Drawn {
     picture: Option<Arc<Picture>>,
     generation: u64,
-    /// Whether there is a newer one of the same request in the slot, to be taken when this one has been sent.
+    /// Samples of a pixel, in the mean.
+    samples: f64,
+    /// When it was aimed at.
+    at: Option<Instant>,
+    /// Whether there is a newer one of the same request in the slot, which was not worth its bytes yet.
     is_old: bool,
     /// Whether it is the first one of its request.
     is_first: bool,
@@ -228,15 +239,54 @@ impl Ui {
         None
     }
 
-    /// There is a newer picture. While one of the same request is under way it stays in the slot, where a still newer
-    /// one takes its place: the line carries whole pictures, and never a queue of them.
+    /// There is a newer picture. Until it is worth its bytes it stays in the slot, where a still newer one takes its place:
+    /// the line carries whole pictures, and never a queue of them.
     fn preview(&mut self, generation: u64) -> Option<End> {
-        let is_under_way = self.drawn.picture.is_some() && !self.display.is_complete();
-        if is_under_way && generation == self.drawn.generation {
+        if generation == self.drawn.generation && !self.is_resized() && self.advice() == Advice::Wait {
             self.drawn.is_old = true;
             return None;
         }
         self.take_preview()
+    }
+
+    /// Whether the newest picture has another size than the one that is drawn.
+    fn is_resized(&self) -> bool {
+        let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
+        let size = |picture: &Picture| (picture.width, picture.height);
+        let sizes = latest.as_ref().zip(self.drawn.picture.as_ref());
+        sizes.is_some_and(|(latest, drawn)| size(&latest.picture) != size(drawn))
+    }
+
+    /// What to do with a picture of the same request as the one that is drawn.
+    fn advice(&self) -> Advice {
+        let now = Instant::now();
+        let progress = self.state.progress.as_ref();
+        let picture = self.drawn.picture.as_ref();
+        advise(&Moment {
+            bytes_per_second: self.display.bytes_per_second(),
+            cells: picture.map_or(0, |picture| picture.width * picture.height / 2),
+            samples: self.samples(),
+            aimed_samples: picture.map(|_| self.drawn.samples),
+            since_aim: self.drawn.at.map_or(Duration::MAX, |at| now.saturating_duration_since(at)),
+            is_shown: self.display.is_complete(),
+            is_final: self.is_still(),
+            final_in: progress
+                .and_then(|progress| progress.eta_seconds)
+                .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
+        })
+    }
+
+    /// Samples that a pixel has by now, in the mean.
+    fn samples(&self) -> f64 {
+        self.state
+            .progress
+            .as_ref()
+            .map_or(0.0, |progress| progress.fraction * f64::from(progress.total_samples))
+    }
+
+    /// Whether the newest picture stays as it is.
+    fn is_still(&self) -> bool {
+        !self.state.is_running() || self.state.paused
     }
 
     fn take_preview(&mut self) -> Option<End> {
@@ -319,14 +369,15 @@ impl Ui {
             return false;
         }
         let is_first = self.drawn.generation != shown.generation;
-        let picture = Some(shown.picture.clone());
-        self.drawn = Drawn { picture, generation: shown.generation, is_first, ..Drawn::default() };
+        let (picture, samples, at) = (Some(shown.picture.clone()), self.samples(), Some(Instant::now()));
+        let generation = shown.generation;
+        self.drawn = Drawn { picture, generation, samples, at, is_first, ..Drawn::default() };
         true
     }
 
     fn fidelity(&self) -> Fidelity {
         match () {
-            () if !self.state.is_running() || self.state.paused => Fidelity::Still,
+            () if self.is_still() => Fidelity::Still,
             () if self.drawn.is_first => Fidelity::First,
             () => Fidelity::Moving,
         }
@@ -344,7 +395,7 @@ impl Ui {
                 return end;
             }
         }
-        if self.drawn.is_old && self.display.is_complete() {
+        if self.drawn.is_old && self.advice() != Advice::Wait {
             let end = self.take_preview();
             if end.is_some() {
                 return end;
@@ -390,17 +441,17 @@ mod tests {
     }
 
     #[test]
-    fn a_multiplexer_is_known_by_its_variables() {
-        let is_in = |pairs: &[(&str, &str)]| {
-            is_multiplexed(|name| {
-                pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
-            })
+    fn multiplexers_and_networks_are_known_by_their_variables() {
+        let way = |pairs: &[(&str, &str)]| {
+            way(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
         };
-        assert!(!is_in(&[("TERM", "xterm-256color"), ("TMUX", "")]));
-        assert!(is_in(&[("TERM", "xterm-256color"), ("TMUX", "/tmp/tmux-0/default,1,0")]));
-        assert!(is_in(&[("TERM", "tmux-256color")]));
-        assert!(is_in(&[("TERM", "screen.xterm-256color")]));
-        assert!(is_in(&[("STY", "1234.pts-0")]));
+        assert!(!way(&[("TERM", "xterm-256color"), ("TMUX", "")]).is_multiplexed);
+        assert!(way(&[("TERM", "xterm-256color"), ("TMUX", "/tmp/tmux-0/default,1,0")]).is_multiplexed);
+        assert!(way(&[("TERM", "tmux-256color")]).is_multiplexed);
+        assert!(way(&[("TERM", "screen.xterm-256color")]).is_multiplexed);
+        assert!(way(&[("STY", "1234.pts-0")]).is_multiplexed);
+        assert!(way(&[("SSH_CONNECTION", "10.0.0.1 5000 10.0.0.2 22")]).is_remote);
+        assert!(!way(&[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_TTY", "")]).is_remote);
     }
 
     #[test]

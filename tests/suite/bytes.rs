@@ -13,22 +13,27 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 24 };
-const PREVIEW: PreviewSize = PreviewSize { width: 60, height: 40 };
+/// Windows, and the previews that fit into them beside the words.
+const SIZES: [(Rect, PreviewSize); 3] = [
+    (Rect { x: 0, y: 0, width: 80, height: 24 }, PreviewSize { width: 60, height: 40 }),
+    (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewSize { width: 90, height: 72 }),
+    (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewSize { width: 170, height: 112 }),
+];
 /// Pixels across and down of the film. Larger ones have less noise in their previews.
 const FILM: u32 = 320;
 
 /// Renders scenes one after the other.
 struct Studio {
     handle: Handle,
+    preview: PreviewSize,
     generation: u64,
     folder: tempfile::TempDir,
 }
 
 impl Studio {
-    fn new() -> Self {
+    fn new(preview: PreviewSize) -> Self {
         let handle = glimt::pipeline::start().expect("a worker");
-        Self { handle, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
+        Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
     }
 
     /// The last preview of a scene. Without a number of samples: the coarse picture that comes first, with one sample
@@ -36,7 +41,7 @@ impl Studio {
     fn preview(&mut self, scene: &str, samples: Option<u32>) -> Picture {
         let path: PathBuf = self.folder.path().join("scene.toml");
         std::fs::write(&path, scene).expect("written");
-        let side = if samples.is_some() { FILM } else { PREVIEW.height };
+        let side = if samples.is_some() { FILM } else { self.preview.height };
         let overrides = Overrides {
             width: Some(side),
             height: Some(side),
@@ -48,7 +53,7 @@ impl Studio {
             generation: self.generation,
             scene: path,
             overrides,
-            preview: Some(PREVIEW),
+            preview: Some(self.preview),
             write: Writing::No,
             force: false,
         };
@@ -79,20 +84,21 @@ impl Studio {
 
 /// A painter and the terminal behind it.
 struct Screen {
+    window: Rect,
     painter: Painter,
     terminal: vt100::Parser,
 }
 
 impl Screen {
-    fn new() -> Self {
+    fn new(window: Rect) -> Self {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
-        let terminal = vt100::Parser::new(side(WINDOW.height), side(WINDOW.width), 0);
-        Self { painter: Painter::new(ColorDepth::TrueColor), terminal }
+        let terminal = vt100::Parser::new(side(window.height), side(window.width), 0);
+        Self { window, painter: Painter::new(ColorDepth::TrueColor), terminal }
     }
 
     /// Bytes until a picture is shown.
     fn show(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {
-        let mut buffer = Buffer::empty(WINDOW);
+        let mut buffer = Buffer::empty(self.window);
         let place = Rect::new(2, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
         for y in 0..place.height {
             for x in 0..place.width {
@@ -178,23 +184,26 @@ fn through(screen: &mut Screen, pictures: &[(Picture, Fidelity)]) -> (usize, usi
 fn renders_and_edits_stay_within_their_bytes_and_end_exactly() {
     let green = "green = { diffuse = [0.13, 0.45, 0.09] }";
     let red = "red = { diffuse = [0.70, 0.13, 0.10]";
-    for (name, from, to) in [
+    let edits = [
         ("cornell.toml", green, "green = { diffuse = [0.13, 0.25, 0.39] }"),
         ("cornell.toml", "size = [0.6, 0.6, 0.6]", "size = [0.6, 0.75, 0.6]"),
         ("spheres.toml", red, "red = { diffuse = [0.20, 0.53, 0.10]"),
         ("spheres.toml", "position = [0, 1.3, 5.5]", "position = [0.2, 1.4, 5.5]"),
-    ] {
-        let (before, mut studio, mut screen) = (scene(name), Studio::new(), Screen::new());
+    ];
+    for ((window, preview), (name, from, to)) in SIZES.iter().flat_map(|size| edits.map(|edit| (*size, edit)))
+    {
+        let place = format!("{name}, {to}, at {}×{}", window.width, window.height);
+        let (before, mut studio, mut screen) = (scene(name), Studio::new(preview), Screen::new(window));
         assert!(before.contains(from), "{name} has no `{from}`");
         let old = studio.pictures(&before);
         let new = studio.pictures(&before.replace(from, to));
         let [(old_last, _), (new_last, _)] = [&old, &new].map(|pictures| pictures.last().expect("pictures"));
         let cells = old_last.pixels.len() / 2;
         let (first, all) = through(&mut screen, &old);
-        assert!(first <= 12 * cells, "{name}: {first} bytes for a first picture of {cells} cells");
-        assert!(all <= 48 * cells, "{name}: {all} bytes for {cells} cells");
+        assert!(first <= 12 * cells, "{place}: {first} bytes for a first picture of {cells} cells");
+        assert!(all <= 48 * cells, "{place}: {all} bytes for {cells} cells");
         let edited = changed(old_last, new_last);
         let (_, all) = through(&mut screen, &new);
-        assert!(edited > 0 && all <= 48 * edited, "{name}, {to}: {all} bytes for {edited} cells");
+        assert!(edited > 0 && all <= 48 * edited, "{place}: {all} bytes for {edited} cells");
     }
 }

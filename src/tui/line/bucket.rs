@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// Below a line of 1 Mbit/s, 125 kB a second, so that its queue drains.
-const RATE: f64 = 100_000.0;
+pub(super) const RATE: f64 = 100_000.0;
 /// What may be sent at once: 100 ms of that line.
 const FULL: f64 = 12_000.0;
 

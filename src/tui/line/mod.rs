@@ -185,6 +185,22 @@ impl Line {
         self.round_trips.least().filter(|_| self.pace == Pace::Answers)
     }
 
+    /// What the line takes, as far as it shows; none: more than anybody would notice.
+    pub(super) fn bytes_per_second(&self) -> Option<f64> {
+        /// Pictures take no time on such a line.
+        const FAST: f64 = 2e6;
+        let by_window = || {
+            let round_trip = self.round_trips.least()?.as_secs_f64();
+            Some(self.window / round_trip.max(1e-6))
+        };
+        let rate = match self.pace {
+            Pace::Answers if !self.is_multiplexed => by_window(),
+            Pace::Answers | Pace::Silent => Some(bucket::RATE),
+            Pace::Asked { .. } => None,
+        };
+        rate.filter(|rate| *rate < FAST)
+    }
+
     fn window_bytes(&self) -> usize {
         (self.window as usize).min(MOST)
     }

@@ -102,8 +102,11 @@ impl Folder {
 
     /// The program at work on the scene, at the end of a thin line, in a terminal of 120×40 cells.
     pub fn thin_line(&self, answers: Answers) -> Terminal {
-        let tmux: &[_] =
-            if answers == Answers::Multiplexer { &[("TMUX", "/tmp/tmux-0/default,1,0")] } else { &[] };
+        let tmux: &[_] = if answers == Answers::Multiplexer {
+            &[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_CONNECTION", "192.0.2.1 5000 192.0.2.2 22")]
+        } else {
+            &[]
+        };
         Terminal::open(&[PROGRAM, "scene.toml"], tmux, self.0.path(), size(120, 40), Some(answers))
     }
 
@@ -136,7 +139,7 @@ impl Terminal {
         let mut builder = CommandBuilder::new(command[0]);
         builder.args(&command[1..]);
         builder.cwd(folder);
-        for name in ["NO_COLOR", "TMUX", "TERM_PROGRAM", "ENV"] {
+        for name in ["NO_COLOR", "TMUX", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "TERM_PROGRAM", "ENV"] {
             builder.env_remove(name);
         }
         builder.env("TERM", "xterm-256color");
