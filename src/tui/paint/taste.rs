@@ -18,15 +18,15 @@ impl Taste {
     /// Every colour to 1/255.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
-    /// An error of 12/255 in all channels of a half is about worth the bytes of a colour.
-    pub(super) const MOVING: Self = Self { byte: 24.0, most: 255, spans: &[1, 4, 9] };
+    /// An error of 14/255 in all channels of a half is about worth the bytes of a colour.
+    pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
     /// The same where a byte is worth this much, or as much as for a moving picture at least.
     pub(super) fn at(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
-            ..30.0 => Self::MOVING.spans,
-            30.0..100.0 => &[3, 8, 16],
+            ..40.0 => Self::MOVING.spans,
+            40.0..100.0 => &[3, 8, 16],
             100.0..400.0 => &[6, 14, 28],
             _ => &[12, 28, 60],
         };
