@@ -31,7 +31,8 @@ pub struct SurfacePoint {
     pub error: Vec3,
     /// Unit geometric normal of the front side.
     pub normal: Vec3,
-    /// Where shadow rays start on the side of the eye: the point, or above it where facets stand for a surface that bulges.
+    /// Where light is looked for on the side of the eye, if nothing is on the way there: the point, or above it where facets
+    /// stand for a surface that bulges.
     pub shadow_point: Vec3,
     /// Unit interpolated normal on the same side.
     pub shading_normal: Vec3,

@@ -2,6 +2,7 @@
 
 mod camera;
 mod direct;
+mod facets;
 mod glass;
 mod mirror;
 mod robust;

@@ -135,8 +135,12 @@ impl Build {
     }
 
     /// An instance without smoothing: (scale, rotate, translate).
-    pub fn mesh(mut self, mesh: TriangleMesh, placed: [DVec3; 3], material: Material) -> Self {
-        let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
+    pub fn mesh(self, mesh: TriangleMesh, placed: [DVec3; 3], material: Material) -> Self {
+        self.loaded(LoadedMesh { mesh, ..LoadedMesh::default() }, placed, material)
+    }
+
+    /// The same of what was read from a file.
+    pub fn loaded(mut self, loaded: LoadedMesh, placed: [DVec3; 3], material: Material) -> Self {
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("nobody cancels");
         self.parts.meshes.push(Arc::new(tree));
@@ -144,6 +148,14 @@ impl Build {
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
         self.shape(Shape::Mesh(Mesh { file, scale, rotate, translate, smooth: false }), material)
+    }
+
+    /// The last mesh, smooth.
+    pub fn smooth(self) -> Self {
+        self.with(|scene| match scene.objects.last_mut().map(|object| &mut object.shape) {
+            Some(Shape::Mesh(Mesh { smooth, .. })) => *smooth = true,
+            other => panic!("{other:?} is no mesh"),
+        })
     }
 
     /// An instance of a mesh file with materials of its own, without smoothing.
