@@ -3,6 +3,7 @@
 mod camera;
 mod direct;
 mod facets;
+mod far;
 mod glass;
 mod mirror;
 mod robust;

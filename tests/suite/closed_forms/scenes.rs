@@ -14,7 +14,7 @@ use glimt::scene::description::{
     Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Located, Material, MaterialKind, Mesh, Object,
     Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
 };
-use glimt::world::{Geometry, MeshTree, Parts, World, lights, textures_needed};
+use glimt::world::{Geometry, MeshTree, Parts, World, lights, origin, textures_needed};
 
 use super::v;
 
@@ -152,9 +152,10 @@ impl Build {
 
     /// The last mesh, smooth.
     pub fn smooth(self) -> Self {
-        self.with(|scene| match scene.objects.last_mut().map(|object| &mut object.shape) {
-            Some(Shape::Mesh(Mesh { smooth, .. })) => *smooth = true,
-            other => panic!("{other:?} is no mesh"),
+        self.with(|scene| {
+            if let Some(Shape::Mesh(mesh)) = scene.objects.last_mut().map(|object| &mut object.shape) {
+                mesh.smooth = true;
+            }
         })
     }
 
@@ -194,7 +195,8 @@ impl Build {
             let texels = &self.texels[needed.declared.expect("declared in the scene")];
             parts.textures.insert(needed.source, Arc::clone(texels));
         }
-        let geometry = Geometry::of_scene(&self.scene, &parts.meshes, &CancelToken::new());
+        let origin = origin(&self.scene.camera, None);
+        let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("nobody cancels"));
         let lights = lights(&self.scene, &geometry);
         World::new(&self.scene, &parts, geometry, lights)

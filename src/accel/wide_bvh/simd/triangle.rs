@@ -32,10 +32,11 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     let on_edge = least.eq(zero) | greatest.eq(zero);
     let determinant = wa + wb + wc;
     let inverse = ax.like(1.0).over(determinant);
-    let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
+    let depth = wa * az + wb * bz + wc * cz;
+    let t = depth * shear_z * inverse;
     let ahead = zero.lt(t) & t.le(t_max);
     let candidate = if is_single {
-        zero.lt(t) | on_edge | may_be_doubtful(corners, determinant, shear_z, t)
+        zero.lt(t) | on_edge | may_be_doubtful(corners, determinant, depth)
     } else {
         zero.le(zero)
     };
@@ -50,19 +51,19 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// A unit of rounding, and a little more for the rounding of [`may_be_doubtful`] itself.
-const UNIT: f32 = 1.05 * 0.5 * f32::EPSILON;
+/// Unit of rounding, by the part of the reach that makes a needle, and a little more for the rounding of [`may_be_doubtful`]
+/// itself.
+const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
 /// False only where the triangle is no needle and t is not within its error of 0. With s the sum of the greatest x and y, of
 /// which the product is at most s²/4, and d the greatest z, [`distance_error`] is at most (27·s² + 30·d·s) units of rounding
-/// of the reach, by the determinant. What is too small for a number counts as doubtful.
+/// of the reach, by the determinant; `depth` is t times the determinant, by that of z. What is next to no number passes.
 #[inline(always)]
-fn may_be_doubtful<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, t: V) -> V::Mask {
-    let (sum, depth) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
-    let error = sum * (sum * sum.like(27.0 * UNIT) + depth * sum.like(30.0 * UNIT));
-    let size = determinant.abs();
-    let needle = (size * sum.like(ILL_CONDITIONED)).le(error + sum * sum.like(1e-37));
-    needle | (size * t.abs()).le(error * (depth * shear_z.abs()) + sum.like(1e-37))
+fn may_be_doubtful<V: Lanes>(corners: &Corners<V>, determinant: V, depth: V) -> V::Mask {
+    let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
+    let least = sum.like(1e-37);
+    let bound = sum * (sum * sum.like(27.0 * UNITS) + deepest * sum.like(30.0 * UNITS)) + least;
+    determinant.abs().le(bound) | depth.abs().le(bound * (deepest * sum.like(ILL_CONDITIONED)) + least)
 }
 
 /// See `ShearedRay::distance_error`.
@@ -119,11 +120,12 @@ mod tests {
             let determinant = wa + wb + wc;
             let shear_z = like.like(2.0_f32.powf(next() * 8.0));
             let inverse = like.like(1.0).over(determinant);
-            let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
+            let weighted = wa * az + wb * bz + wc * cz;
+            let t = weighted * shear_z * inverse;
             let (error, reach) = distance_error(&corners, shear_z, inverse);
             let is_needle = F4::bits((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = F4::bits(t.abs().le(error)) != 0;
-            let passes = F4::bits(may_be_doubtful(&corners, determinant, shear_z, t)) != 0;
+            let passes = F4::bits(may_be_doubtful(&corners, determinant, weighted)) != 0;
             assert!(passes || !(is_needle || is_at_start), "{scalar:?}");
             needles += u32::from(is_needle);
             starts += u32::from(is_at_start && !is_needle);
