@@ -32,14 +32,10 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     let on_edge = least.eq(zero) | greatest.eq(zero);
     let determinant = wa + wb + wc;
     let inverse = ax.like(1.0).over(determinant);
-    let depth = wa * az + wb * bz + wc * cz;
-    let t = depth * shear_z * inverse;
+    let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
     let ahead = zero.lt(t) & t.le(t_max);
-    let candidate = if is_single {
-        zero.lt(t) | on_edge | may_be_doubtful(corners, determinant, depth)
-    } else {
-        zero.le(zero)
-    };
+    let candidate =
+        if is_single { on_edge | may_count(corners, determinant, shear_z, t) } else { zero.le(zero) };
     let (mut hit, mut doubtful) = (0, 0);
     if V::bits(V::without(candidate, outside)) != 0 {
         let (error, reach) = distance_error(corners, shear_z, inverse);
@@ -51,19 +47,18 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// Unit of rounding, by the part of the reach that makes a needle, and a little more for the rounding of [`may_be_doubtful`]
-/// itself.
+/// Unit of rounding, by the part of the reach that makes a needle, and a little more for the rounding of [`may_count`] itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
-/// False only where the triangle is no needle and t is not within its error of 0. With s the sum of the greatest x and y, of
-/// which the product is at most s²/4, and d the greatest z, [`distance_error`] is at most (27·s² + 30·d·s) units of rounding
-/// of the reach, by the determinant; `depth` is t times the determinant, by that of z. What is next to no number passes.
+/// False only where the triangle is no needle, and t below 0 by more than its error. With s the sum of the greatest x and y, of
+/// which the product is at most s²/4, and d the greatest z, [`distance_error`] is at most 30·s·(s + d) units of rounding of
+/// the reach, by the determinant. A determinant of which the inverse may be infinite counts as a needle's.
 #[inline(always)]
-fn may_be_doubtful<V: Lanes>(corners: &Corners<V>, determinant: V, depth: V) -> V::Mask {
+fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, t: V) -> V::Mask {
     let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
-    let least = sum.like(1e-37);
-    let bound = sum * (sum * sum.like(27.0 * UNITS) + deepest * sum.like(30.0 * UNITS)) + least;
-    determinant.abs().le(bound) | depth.abs().le(bound * (deepest * sum.like(ILL_CONDITIONED)) + least)
+    let bound = sum * ((sum + deepest) * sum.like(30.0 * UNITS)) + sum.like(1e-37);
+    let (size, reach) = (determinant.abs(), deepest * (shear_z.abs() * sum.like(ILL_CONDITIONED)));
+    size.le(bound) | sum.like(0.0).le(bound * reach + size * t)
 }
 
 /// See `ShearedRay::distance_error`.
@@ -110,7 +105,7 @@ mod tests {
             let shift = size * 2.0_f32.powf(next() * 7.0 - 18.0);
             let mut corner = |part: f32, z: f32| {
                 let at = |axis: usize, off: f32| along[axis] * size * part + off * width;
-                let z = if is_thin { depth * (1.0 - 0.1 * next().abs()) } else { z * depth + shift };
+                let z = if is_thin { -depth * (1.0 - 0.1 * next().abs()) } else { z * depth + shift };
                 [at(0, next()), at(1, next()), z]
             };
             let scalar = [corner(1.0, 1.0), corner(-1.0, -1.0), corner(0.0, 0.0)];
@@ -120,13 +115,16 @@ mod tests {
             let determinant = wa + wb + wc;
             let shear_z = like.like(2.0_f32.powf(next() * 8.0));
             let inverse = like.like(1.0).over(determinant);
-            let weighted = wa * az + wb * bz + wc * cz;
-            let t = weighted * shear_z * inverse;
+            let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
             let (error, reach) = distance_error(&corners, shear_z, inverse);
             let is_needle = F4::bits((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = F4::bits(t.abs().le(error)) != 0;
-            let passes = F4::bits(may_be_doubtful(&corners, determinant, weighted)) != 0;
-            assert!(passes || !(is_needle || is_at_start), "{scalar:?}");
+            let passes = F4::bits(may_count(&corners, determinant, shear_z, t)) != 0;
+            let is_ahead = F4::bits(like.lt(t)) != 0;
+            assert!(passes || !(is_ahead || is_needle || is_at_start), "{scalar:?}");
+            if is_ahead {
+                continue;
+            }
             needles += u32::from(is_needle);
             starts += u32::from(is_at_start && !is_needle);
             passed += u32::from(passes);
