@@ -58,6 +58,8 @@
 //!   are a function of pixel, sample and dimension, and every sum has a fixed order.
 //! - Rays travel in batches; a hit carries a bound on its error, from which the next ray starts: no distance is a
 //!   constant. Where a constant tells degenerate from usable it is relative to the size of what it judges.
+//! - A scene's coordinates are `f64`; what is traced is `f32` from an origin near what the camera looks at (`world::origin`),
+//!   meshes from one of their own.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
 //! - Files are touched in `assets`, `output`, `scene` (the scene, and whether what it names is there),
 //!   `pipeline::watch` and `cli::new` alone.

@@ -221,7 +221,7 @@ mod tests {
         let ray = Ray::new(Vec3::new(9.0, 0.5, 0.0), Vec3::NEG_X).to_f64();
         let hit = hat(true).intersect(&ray).expect("aimed at it");
         let surface = hat(true).surface(&ray, &hit);
-        assert_eq!(surface.uv, Vec2::new(0.5, 0.25));
+        assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.25));
         assert!((surface.dpdv - Vec3::new(-1.0, 2.0, 0.0)).length() < 1e-6);
         let (point, normal) = hat(true).side(0.5, 0.25);
         assert!((point - DVec3::new(0.75, 0.5, 0.0)).length() < 1e-14);

@@ -208,7 +208,7 @@ mod tests {
             assert_eq!((hit.primitive, hit.t), (face, 1.0));
             let surface = cube.surface(&ray, &hit);
             assert!((surface.normal - u.cross(v).normalize().as_vec3()).length() < 1e-6);
-            assert!((surface.uv - Vec2::splat(0.5)).length() < 1e-6);
+            assert!((surface.uv.as_vec2() - Vec2::splat(0.5)).length() < 1e-6);
             assert!(
                 (surface.dpdu - u.as_vec3()).length() < 1e-5 && (surface.dpdv - v.as_vec3()).length() < 1e-5
             );

@@ -183,7 +183,7 @@ mod tests {
         let ray = Ray::new(Vec3::new(9.0, 3.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = bar(true).intersect(&ray).expect("aimed at it");
         let surface = bar(true).surface(&ray, &hit);
-        assert_eq!(surface.uv, Vec2::new(0.5, 0.75));
+        assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.75));
         assert!((surface.dpdv - Vec3::Y * 4.0).length() < 1e-6);
         assert!((surface.dpdu - Vec3::NEG_Z * std::f32::consts::PI).length() < 1e-6);
         let (point, normal) = bar(true).side(0.5, 0.75);

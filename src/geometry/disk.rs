@@ -140,7 +140,7 @@ mod tests {
         let ray = Ray::new(Vec3::new(1.0, -0.5, 5.0), Vec3::NEG_Z).to_f64();
         let hit = disk.intersect(&ray).expect("the disk is ahead");
         let surface = disk.surface(&ray, &hit);
-        assert_eq!((surface.uv, surface.normal), (Vec2::new(0.75, 0.375), Vec3::Z));
+        assert_eq!((surface.uv.as_vec2(), surface.normal), (Vec2::new(0.75, 0.375), Vec3::Z));
         assert_eq!((surface.dpdu, surface.dpdv), (Vec3::X * 4.0, Vec3::Y * 4.0));
     }
 

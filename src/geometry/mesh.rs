@@ -1,12 +1,14 @@
 //! Triangle meshes as plain data.
 
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec3, Vec2, Vec3};
 
 /// Triangles over shared vertices, in the mesh's own coordinates. Every index is in range and every position
 /// finite; no triangle has coincident corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Vertex positions.
+    /// Where the positions start, in the file's coordinates: 0, or near what is far from there.
+    pub origin: DVec3,
+    /// Vertex positions, from the origin.
     pub positions: Vec<Vec3>,
     /// Unit vertex normals, or empty.
     pub normals: Vec<Vec3>,

@@ -146,7 +146,7 @@ mod tests {
         let hit = quad.intersect(&ray).expect("the ray is aimed at the quad");
         assert!((hit.t - 1.0).abs() < 1e-6);
         let surface = quad.surface(&ray, &hit);
-        assert!((surface.uv - Vec2::new(0.25, 0.75)).length() < 1e-6);
+        assert!((surface.uv.as_vec2() - Vec2::new(0.25, 0.75)).length() < 1e-6);
         assert!((surface.point - target).length() < 1e-5);
         let outside = (quad.corner + quad.u * 1.01 + quad.v * 0.5).as_vec3();
         assert_eq!(quad.intersect(&Ray::new(origin, outside - origin).to_f64()), None);

@@ -3,7 +3,7 @@
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface::flat_axes;
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::{DVec3, Vec2};
+use crate::math::{DVec2, DVec3, Vec2};
 
 /// All points p with (p − point)·normal = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,8 @@ impl Plane {
         let (s, t) = (offset.dot(self.u), offset.dot(self.v));
         let point = self.point + self.u * s + self.v * t;
         let reach = self.point.abs().max_element() + s.abs() + t.abs();
-        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v, reach)
+        let uv = DVec2::new(s, t);
+        SurfacePoint { uv, ..SurfacePoint::exact(point, self.normal, uv.as_vec2(), self.u, self.v, reach) }
     }
 
     /// It has no part with an area.
@@ -98,7 +99,7 @@ mod tests {
         let hit = floor.intersect(&down).expect("the floor is below");
         assert_eq!(hit.t, 2.0);
         let surface = floor.surface(&down, &hit);
-        assert_eq!((surface.point, surface.uv), (Vec3::new(2.25, 1.0, -1.5), Vec2::new(2.25, 1.5)));
+        assert_eq!((surface.point, surface.uv.as_vec2()), (Vec3::new(2.25, 1.0, -1.5), Vec2::new(2.25, 1.5)));
         for parallel in [Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 2.0, 0.0)] {
             assert_eq!(floor.intersect(&Ray::new(parallel, Vec3::X).to_f64()), None);
         }

@@ -30,6 +30,12 @@ impl Ray {
         Self { origin: from, direction, t_max: 1.0 - shortening.min(0.5) }
     }
 
+    /// A segment, longer by what its ends may be off.
+    pub fn beyond(self, error: Vec3) -> Self {
+        let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
+        Self { t_max: self.t_max + relative, ..self }
+    }
+
     /// The point at `t`.
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + self.direction * t

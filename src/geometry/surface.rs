@@ -1,6 +1,6 @@
 //! What a shape says about a hit.
 
-use crate::math::{DVec3, Vec2, Vec3};
+use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// The nearest meeting of a ray and a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,12 +31,13 @@ pub struct SurfacePoint {
     pub error: Vec3,
     /// Unit geometric normal of the front side.
     pub normal: Vec3,
-    /// Where shadow rays start on the side of the eye: the point, or above it where facets stand for a surface that bulges.
+    /// Where light is looked for on the side of the eye, if nothing is on the way there: the point, or above it where facets
+    /// stand for a surface that bulges.
     pub shadow_point: Vec3,
     /// Unit interpolated normal on the same side.
     pub shading_normal: Vec3,
-    /// Texture coordinates.
-    pub uv: Vec2,
+    /// Texture coordinates; far from its point those of a plane are large, and count by their fractions.
+    pub uv: DVec2,
     /// Change of the point with u, any length; 0 where the parametrisation has none.
     pub dpdu: Vec3,
     /// Change of the point with v.
@@ -67,7 +68,7 @@ impl SurfacePoint {
             error: error(point, reach),
             normal,
             shading_normal: normal,
-            uv,
+            uv: uv.as_dvec2(),
             dpdu: dpdu.as_vec3(),
             dpdv: dpdv.as_vec3(),
             barycentric: Vec3::new(1.0 - uv.x - uv.y, uv.x, uv.y),

@@ -46,8 +46,8 @@ impl ShearedRay {
         self.axes
     }
 
-    /// The hit at a t in (0, `t_max`], from either side. A t within the test's own error of 0 is none
-    /// (*Physically Based Rendering*, 4th ed., section 6.8.7).
+    /// The hit at a t in (0, `t_max`], from either side. A t within the test's own error of 0 (*Physically Based Rendering*, 4th
+    /// ed., section 6.8.7) is computed again in double precision.
     #[inline(always)]
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let [x, y, z] = self.axes;
@@ -85,7 +85,10 @@ impl ShearedRay {
         if error > reach * ILL_CONDITIONED {
             return self.intersect_needle(corners, t_max);
         }
-        (t > error && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
+        if t.abs() <= error {
+            return self.intersect_at_start(corners, t_max);
+        }
+        (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
 
     /// The hit of a triangle so thin for its distance that single precision cannot tell where it is along the ray. That the ray
@@ -93,15 +96,7 @@ impl ShearedRay {
     /// an edge counts.
     #[cold]
     fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
-        let [x, y, z] = self.axes;
-        let direction = self.direction.as_dvec3();
-        let shear = direction / direction[z];
-        let [a, b, c] = corners.map(|corner| {
-            let p = corner.as_dvec3() - self.origin.as_dvec3();
-            DVec3::new(p[x] - shear[x] * p[z], p[y] - shear[y] * p[z], p[z] / direction[z])
-        });
-        let cross = |p: DVec3, q: DVec3| p.x * q.y - p.y * q.x;
-        let (wa, wb, wc) = (cross(c, b), cross(a, c), cross(b, a));
+        let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
         let sum = wa + wb + wc;
         let is_inside = wa * sum >= 0.0 && wb * sum >= 0.0 && wc * sum >= 0.0 && sum != 0.0;
         let (t, u, v) = if is_inside {
@@ -115,6 +110,30 @@ impl ShearedRay {
         };
         let t = t as f32;
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: u as f32, v: v as f32 })
+    }
+
+    /// The hit of a triangle whose plane passes so near the start that single precision cannot tell on which side. That the ray
+    /// goes through the triangle is settled.
+    #[cold]
+    fn intersect_at_start(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
+        let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
+        let sum = wa + wb + wc;
+        let t = ((wa * a.z + wb * b.z + wc * c.z) / sum) as f32;
+        let [u, v] = [wb, wc].map(|weight| (weight / sum).clamp(0.0, 1.0) as f32);
+        (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u, v })
+    }
+
+    /// Corners as seen along the ray, whose z are distances along it, and the edge functions.
+    fn in_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
+        let [x, y, z] = self.axes;
+        let direction = self.direction.as_dvec3();
+        let shear = direction / direction[z];
+        let [a, b, c] = corners.map(|corner| {
+            let p = corner.as_dvec3() - self.origin.as_dvec3();
+            DVec3::new(p[x] - shear[x] * p[z], p[y] - shear[y] * p[z], p[z] / direction[z])
+        });
+        let cross = |p: DVec3, q: DVec3| p.x * q.y - p.y * q.x;
+        ([a, b, c], [cross(c, b), cross(a, c), cross(b, a)])
     }
 
     /// Bound on the absolute error of t, and the greatest t of a corner. The sheared x and y err by lengths, z by units of t,

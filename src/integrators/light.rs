@@ -3,10 +3,11 @@
 use super::queues::{Arrival, ShadowQueue};
 use super::shot::Shot;
 use super::sink::{Reflected, Sink};
-use super::vertices::LitVertex;
+use super::vertices::{LitVertex, Outlook};
 use super::view::Measure;
 use crate::lights::{LightSamples, SeenLight};
 use crate::math::Vec3;
+use crate::math::lanes::lane;
 use crate::sampling::{Decision, Repetitions};
 use crate::scene::description::Shadows;
 use crate::world::Loops;
@@ -26,8 +27,9 @@ pub struct DirectLight<'a, 's> {
 impl DirectLight<'_, '_> {
     /// Light a vertex: contributions that nothing can stop are added, the others wait for their shadow rays.
     pub fn shade(&mut self, vertex: &LitVertex<'_>) {
-        let (shot, point) = (self.shot, vertex.vertex.surface.point);
-        let mut arrivals = Arrivals::new(self, vertex);
+        let (shot, outlook) = (self.shot, vertex.vertex.outlook(self.shot));
+        let point = outlook.point;
+        let mut arrivals = Arrivals::new(self, vertex, outlook);
         for (number, light) in shot.world.lights.iter() {
             if shot.settings.render.shadows == Shadows::Hard {
                 if let Some(sample) = light.middle(point) {
@@ -67,7 +69,7 @@ impl Loops for Draw<'_, '_> {
 struct Arrivals<'a, 'l, 's, 'v> {
     light: &'a mut DirectLight<'l, 's>,
     vertex: &'a LitVertex<'v>,
-    shadow_origin: Vec3,
+    outlook: Outlook,
     /// Length of the queue before.
     first: usize,
     /// Sum of all that could arrive.
@@ -75,9 +77,9 @@ struct Arrivals<'a, 'l, 's, 'v> {
 }
 
 impl<'a, 'l, 's, 'v> Arrivals<'a, 'l, 's, 'v> {
-    fn new(light: &'a mut DirectLight<'l, 's>, vertex: &'a LitVertex<'v>) -> Self {
+    fn new(light: &'a mut DirectLight<'l, 's>, vertex: &'a LitVertex<'v>, outlook: Outlook) -> Self {
         let first = light.shadows.len();
-        Self { light, vertex, shadow_origin: vertex.vertex.shadow_origin(), first, total: 0.0 }
+        Self { light, vertex, outlook, first, total: 0.0 }
     }
 
     /// As many samples of a light as the settings ask for.
@@ -125,11 +127,14 @@ impl<'a, 'l, 's, 'v> Arrivals<'a, 'l, 's, 'v> {
     fn arrive(&mut self, value: Vec3, samples: &LightSamples, i: usize) {
         let (contribution, slot) = (value * self.vertex.path.throughput, self.vertex.path.slot);
         self.total += value.x;
+        if self.outlook.hides(lane(&samples.directions, i)) {
+            return;
+        }
         let can_be_stopped = self.light.shot.settings.render.shadows != Shadows::Off;
         match self.light.sink.measure {
             Measure::Radiance(_) if !can_be_stopped => self.light.sink.add_reflected(slot, contribution),
             Measure::Radiance(_) | Measure::ArrivingShare => {
-                let ray = samples.ray(self.shadow_origin, i);
+                let ray = samples.ray(self.outlook.point, i);
                 self.light.shadows.push(ray, samples.source, Arrival { contribution, slot });
             }
         }

@@ -7,10 +7,12 @@ use super::queues::PathRay;
 use super::shot::Shot;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint};
+use crate::lights::Source;
 use crate::materials::Material;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::lanes::{Lanes, Lanes3, dot, lane};
+use crate::scene::description::Shadows;
 use crate::world::Hit;
 
 /// Where a path meets a surface.
@@ -71,9 +73,39 @@ impl<'a> Vertex<'a> {
         Ray::new(offset_origin(point, error, normal, direction), direction)
     }
 
-    /// Where shadow rays start.
-    pub fn shadow_origin(&self) -> Vec3 {
-        offset_origin(self.surface.shadow_point, self.surface.error, self.normal, self.normal)
+    /// Where light is looked for. A facet of a smooth mesh looks from a point above it, so that its neighbours do not shadow
+    /// what the normals say is lit, if nothing is on the way there: what arrives at that point reaches the facet around no
+    /// corner of a closed surface. Else it looks from the facet itself, and sees nothing behind that.
+    pub fn outlook(&self, shot: &Shot<'_>) -> Outlook {
+        let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
+        let on_facet = offset_origin(point, error, self.normal, self.normal);
+        let is_traced = shot.settings.render.shadows != Shadows::Off;
+        let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, shadow_point - on_facet) };
+        let is_above = lift.direction.dot(self.normal) > LEAST_LIFT * self.normal.abs().dot(error);
+        if is_above && !(is_traced && shot.world.geometry.occluded(&lift.beyond(error), Source::Nothing)) {
+            return Outlook { point: shadow_point, horizon: None };
+        }
+        let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
+        Outlook { point: on_facet, horizon }
+    }
+}
+
+/// How many times its own error a point is to be lifted at least, or the facet serves as well.
+const LEAST_LIFT: f32 = 8.0;
+
+/// Where light is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Outlook {
+    /// The point that lights are seen from and shadow rays start from.
+    pub point: Vec3,
+    /// A normal: nothing is seen behind it. None where the cosines say so anyway, or the shadow rays.
+    horizon: Option<Vec3>,
+}
+
+impl Outlook {
+    /// Whether light from a direction is certainly stopped.
+    pub fn hides(&self, direction: Vec3) -> bool {
+        self.horizon.is_some_and(|normal| !(normal.dot(direction) > 0.0))
     }
 }
 

@@ -6,7 +6,7 @@ use super::vertices::Vertex;
 use super::{FirstHit, RayCounters};
 use crate::control::Cancelled;
 use crate::geometry::SurfacePoint;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, Vec3};
 
 /// Show what each camera ray in the queue hits; black where nothing.
 pub fn shade(
@@ -25,7 +25,7 @@ pub fn shade(
             FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
             FirstHit::Depth => Vec3::splat(nearness(shot, surface)),
             FirstHit::Barycentric => surface.barycentric,
-            FirstHit::Uv => fraction(surface.uv).extend(0.0),
+            FirstHit::Uv => fraction(surface.uv).as_vec2().extend(0.0),
             FirstHit::Albedo => vertex.material.bsdf.albedo(surface.uv, &mut counters.texture_lookups),
         };
         radiance[path.slot as usize] = value * path.throughput;
@@ -40,6 +40,6 @@ fn nearness(shot: &Shot<'_>, surface: &SurfacePoint) -> f32 {
     (camera.focus / (camera.focus + depth)) as f32
 }
 
-fn fraction(uv: Vec2) -> Vec2 {
+fn fraction(uv: DVec2) -> DVec2 {
     uv - uv.floor()
 }

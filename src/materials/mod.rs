@@ -13,7 +13,7 @@ pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use phong::Phong;
 
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, Vec3};
 
 /// A material, ready to be looked up.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +47,7 @@ impl Bsdf {
     }
 
     /// Its main colour, and how many texture look-ups that took.
-    pub fn albedo(&self, uv: Vec2, lookups: &mut u64) -> Vec3 {
+    pub fn albedo(&self, uv: DVec2, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Phong(phong) => phong.diffuse.at(uv, lookups),
             Self::Mirror(mirror) => mirror.reflectance,

@@ -4,7 +4,7 @@
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::texture::Color;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, Vec3};
 
 /// Diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub struct PhongBsdf {
 
 impl Phong {
     /// Look its textures up.
-    pub fn at(&self, uv: Vec2, lookups: &mut u64) -> PhongBsdf {
+    pub fn at(&self, uv: DVec2, lookups: &mut u64) -> PhongBsdf {
         let diffuse = self.diffuse.at(uv, lookups);
         PhongBsdf {
             diffuse,

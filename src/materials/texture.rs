@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::texels::Texels;
 use crate::choice;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, Vec2, Vec3};
 
 choice! {
     /// Texture interpolation.
@@ -53,7 +53,7 @@ pub enum Color {
 
 impl Color {
     /// The colour at texture coordinates, and how many texture look-ups that took.
-    pub fn at(&self, uv: Vec2, lookups: &mut u64) -> Vec3 {
+    pub fn at(&self, uv: DVec2, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Constant(color) => *color,
             Self::Texture(texture) => {
@@ -66,12 +66,12 @@ impl Color {
 
 impl Texture {
     /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
-    pub fn lookup(&self, uv: Vec2) -> Vec3 {
+    pub fn lookup(&self, uv: DVec2) -> Vec3 {
         let size = Vec2::new(self.texels.width as f32, self.texels.height as f32);
-        let tile = |x: f32| if x.is_finite() { x } else { 0.0 };
-        let place = |x: f32, size: f32| self.wrap.fold(tile(x)) * size;
-        let x = place(uv.x * self.repeat.x, size.x);
-        let y = place(uv.y * self.repeat.y, size.y);
+        let tile = |x: f64| if x.is_finite() { x } else { 0.0 };
+        let place = |x: f64, size: f32| self.wrap.fold(tile(x)) as f32 * size;
+        let tiles = uv * self.repeat.as_dvec2();
+        let (x, y) = (place(tiles.x, size.x), place(tiles.y, size.y));
         match self.filter {
             TextureFilter::Nearest => self.texel(x.floor(), y.floor()),
             TextureFilter::Bilinear => self.bilinear(x - 0.5, y - 0.5),
@@ -96,7 +96,7 @@ impl Texture {
 
 impl Wrap {
     /// Into [0, 1].
-    fn fold(self, x: f32) -> f32 {
+    fn fold(self, x: f64) -> f64 {
         match self {
             Self::Repeat => x - x.floor(),
             Self::Clamp => x.clamp(0.0, 1.0),
@@ -131,7 +131,7 @@ mod tests {
     }
 
     fn bilinear(wrap: Wrap, u: f32, v: f32) -> f32 {
-        numbered(TextureFilter::Bilinear, wrap).lookup(Vec2::new(u, v)).x
+        numbered(TextureFilter::Bilinear, wrap).lookup(Vec2::new(u, v).as_dvec2()).x
     }
 
     #[test]
@@ -154,8 +154,8 @@ mod tests {
         assert!((bilinear(Wrap::Clamp, 9.0, 9.0) - 3.0).abs() < 1e-6);
         let mut repeated = numbered(TextureFilter::Nearest, Wrap::Repeat);
         repeated.repeat = Vec2::new(2.0, 1.0);
-        assert_eq!(repeated.lookup(Vec2::new(0.6, 0.1)).x, 0.0);
-        assert_eq!(repeated.lookup(Vec2::new(0.4, 0.1)).x, 1.0);
+        assert_eq!(repeated.lookup(DVec2::new(0.6, 0.1)).x, 0.0);
+        assert_eq!(repeated.lookup(DVec2::new(0.4, 0.1)).x, 1.0);
     }
 
     #[test]
@@ -166,7 +166,7 @@ mod tests {
                 for bad in [f32::NAN, f32::INFINITY, -1e30, 1e30, 1.0, 0.0, -0.0, 1.0_f32.next_down(), -1e-9]
                 {
                     assert!(
-                        (0.0..=3.0).contains(&texture.lookup(Vec2::new(bad, bad)).x),
+                        (0.0..=3.0).contains(&texture.lookup(Vec2::new(bad, bad).as_dvec2()).x),
                         "{filter:?} {wrap:?} {bad}"
                     );
                 }

@@ -5,6 +5,7 @@ pub mod float;
 pub mod frame;
 pub mod lanes;
 pub mod limits;
+pub mod origin;
 pub mod transform;
 
 pub use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3, Vec4};

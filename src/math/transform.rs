@@ -28,6 +28,11 @@ impl Transform {
         }
     }
 
+    /// The same map from coordinates that start at `inside` to those that start at `outside`.
+    pub fn between(self, inside: DVec3, outside: DVec3) -> Self {
+        Self { translation: self.translation + self.linear * inside - outside, ..self }
+    }
+
     /// A point to the outside.
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.linear * p + self.translation

@@ -7,7 +7,7 @@ use std::sync::mpsc;
 use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::scene::description::{Lowered, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
 use crate::world::file_emission;
@@ -37,7 +37,7 @@ pub fn check(path: &Path) -> Result<Checked, Failure> {
     let (parsed, meshes, textures, warnings) =
         Engine::new(Means::default(), Arc::default()).read_all(path, &sink)?;
     let scene = &parsed.loaded.scene;
-    let triangles = |shape: &Shape| match shape.lowered() {
+    let triangles = |shape: &Shape| match shape.lowered(DVec3::ZERO) {
         Lowered::Shape(shape) => shape.triangle_count(),
         Lowered::Mesh(mesh) => meshes[mesh.file].mesh.mesh.triangles.len() as u64,
     };

@@ -36,7 +36,7 @@ use crate::lights::Lights;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::world::World;
+use crate::world::{World, origin};
 
 /// What an engine works with; tests work with other means.
 #[derive(Clone, Copy)]
@@ -260,7 +260,9 @@ impl Engine {
         // The orbiter's numbers are few: their text stands for them.
         let orbiter = parsed.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
-        let built = table.run(Stage::Accel, || accel(scene, &of, &meshes, &mut self.accel, &reading))?;
+        let origin = origin(&scene.camera, parsed.orbiter.as_ref());
+        let build = || accel(scene, (&of, origin), &meshes, &mut self.accel, &reading);
+        let built = table.run(Stage::Accel, build)?;
         let lights =
             table.run(Stage::Lights, || Ok(lights(scene, &of, &built.geometry, &mut self.lights)))?;
         let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);

@@ -11,7 +11,7 @@ impl World {
     /// Put the parts together.
     pub fn new(scene: &Scene, parts: &Parts, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
         let (materials, object_materials) = lower_materials(scene, parts);
-        let camera = Camera::new(&scene.camera, parts.orbiter.as_ref());
+        let camera = Camera::new(&scene.camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
         Self { camera, geometry, materials, object_materials, lights }
     }
 }

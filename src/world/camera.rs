@@ -52,6 +52,22 @@ impl Camera {
         }
     }
 
+    /// The point that it turns about, and its distance.
+    pub fn aim(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> (DVec3, f64) {
+        match camera {
+            description::Camera::LookAt { position, look_at, .. } => (*look_at, position.distance(*look_at)),
+            description::Camera::Orbiter { .. } => {
+                let orbiter = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
+                (DVec3::from_array(orbiter.center), orbiter.size)
+            }
+        }
+    }
+
+    /// The same in coordinates that start elsewhere.
+    pub fn seen_from(self, origin: DVec3) -> Self {
+        Self { position: self.position - origin, ..self }
+    }
+
     /// The view of a gKit orbiter: world → eye is T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
     fn from_orbiter(orbiter: &OrbiterCamera) -> Self {
         let [x, y] = orbiter.rotation;

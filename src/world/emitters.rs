@@ -15,7 +15,7 @@ use crate::scene::description::{self, Scene};
 pub fn lights(scene: &Scene, geometry: &Geometry) -> Arc<Lights> {
     let points = scene.lights.iter().map(|light| {
         let description::PointLight { position, intensity, falloff } = *light;
-        Light::Point(PointLight { position, intensity, falloff })
+        Light::Point(PointLight { position: position - geometry.origin(), intensity, falloff })
     });
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let areas = objects.flat_map(|((id, object), described)| {

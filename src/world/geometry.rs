@@ -6,6 +6,7 @@ use crate::accel::{Bvh, Instructions};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint};
 use crate::lights::Source;
+use crate::math::DVec3;
 use crate::math::transform::Transform;
 use crate::scene::description::{self, Lowered, Scene};
 
@@ -24,6 +25,8 @@ pub struct Hit {
 #[derive(Debug)]
 pub struct Geometry {
     objects: Vec<Object>,
+    /// Where the coordinates of all of them start, in the scene's.
+    origin: DVec3,
     tree: Bvh,
     /// Objects that are not in the tree.
     unbounded: Vec<u32>,
@@ -31,13 +34,18 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// The objects of a scene, whose mesh files have these trees.
+    /// The objects of a scene, whose mesh files have these trees, in coordinates that start at `origin`.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn of_scene(scene: &Scene, meshes: &[Arc<MeshTree>], token: &CancelToken) -> Result<Self, Cancelled> {
-        let objects = scene.objects.iter().map(|object| lowered(&object.shape, meshes, token));
-        Self::build(objects.collect::<Result<_, _>>()?, token)
+    pub fn of_scene(
+        scene: &Scene,
+        meshes: &[Arc<MeshTree>],
+        origin: DVec3,
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        let objects = scene.objects.iter().map(|object| lowered(&object.shape, meshes, origin, token));
+        Ok(Self { origin, ..Self::build(objects.collect::<Result<_, _>>()?, token)? })
     }
 
     /// Build the tree over objects.
@@ -50,12 +58,17 @@ impl Geometry {
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
         let (tree, instructions) = (Bvh::build(&boxes, token)?, Instructions::best());
-        Ok(Self { objects, tree, unbounded, instructions })
+        Ok(Self { objects, origin: DVec3::ZERO, tree, unbounded, instructions })
     }
 
     /// The objects, known by their index.
     pub fn objects(&self) -> &[Object] {
         &self.objects
+    }
+
+    /// Where all coordinates start, in the scene's.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
     }
 
     /// The tree over the objects that have an end.
@@ -144,15 +157,18 @@ impl Geometry {
 fn lowered(
     shape: &description::Shape,
     meshes: &[Arc<MeshTree>],
+    origin: DVec3,
     token: &CancelToken,
 ) -> Result<Object, Cancelled> {
-    let mesh = match shape.lowered() {
+    let mesh = match shape.lowered(origin) {
         Lowered::Shape(shape) => return Ok(Object::Shape(shape)),
         Lowered::Mesh(mesh) => mesh,
     };
+    let tree = &meshes[mesh.file];
+    let placed = Transform::scale_rotate_translate(mesh.scale, mesh.rotate, mesh.translate);
     let instance = MeshInstance {
-        tree: Arc::clone(&meshes[mesh.file]),
-        transform: Transform::scale_rotate_translate(mesh.scale, mesh.rotate, mesh.translate),
+        tree: Arc::clone(tree),
+        transform: placed.between(tree.loaded().mesh.origin, origin),
         smooth: mesh.smooth,
     };
     if instance.smooth {

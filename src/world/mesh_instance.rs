@@ -70,7 +70,7 @@ impl MeshInstance {
             error: self.error(point, local),
             normal,
             shading_normal: self.shading_normal(vertices, barycentric, normal),
-            uv,
+            uv: uv.as_dvec2(),
             dpdu,
             dpdv,
             barycentric,

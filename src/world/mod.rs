@@ -8,6 +8,7 @@ mod lower;
 mod mesh_instance;
 pub mod mesh_tree;
 mod object;
+mod origin;
 mod packet;
 pub mod textures;
 
@@ -22,6 +23,7 @@ pub use lower::file_emission;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use object::Object;
+pub use origin::origin;
 pub use textures::{NeededTexture, TextureSource, textures_needed};
 
 use crate::assets::OrbiterCamera;

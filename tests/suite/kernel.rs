@@ -246,6 +246,62 @@ fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     }
 }
 
+/// Where a ray goes through a triangle in double precision, with the least of its weights; none where it is parallel.
+fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3() - ray.origin.as_dvec3());
+    let (direction, normal) = (ray.direction.as_dvec3(), (b - a).cross(c - a));
+    let weights = [b.cross(c), c.cross(a), a.cross(b)].map(|normal| normal.dot(direction));
+    let sum: f64 = weights.iter().sum();
+    let least = weights.iter().map(|weight| weight / sum).fold(f64::INFINITY, f64::min);
+    (sum != 0.0).then(|| (normal.dot(a) / normal.dot(direction), least))
+}
+
+/// Slivers of all widths, and rays that start right before or behind one, well inside its edges: what single precision cannot
+/// tell from the start is decided by more digits.
+#[test]
+fn hits_right_at_the_start_of_a_ray_are_found() {
+    let mut random = Random(91);
+    let slivers: Vec<[Vec3; 3]> = (0..2000)
+        .map(|_| {
+            let (at, along) = (random.vector() * 4.0, random.vector());
+            let width = 10.0_f32.powf(-4.0 * random.next());
+            [at, at + along, at + along * random.next() + random.vector() * width]
+        })
+        .collect();
+    let count = slivers.len() as u32;
+    let corners = |id: u32| slivers[id as usize];
+    let boxes = WideBvh::build(count, corners, &CancelToken::new()).expect("nobody cancels");
+    let planes = KdTree::build(count, corners, &CancelToken::new()).expect("nobody cancels");
+    let trees = Instructions::ALL.map(|instructions| boxes.clone().with(instructions));
+    let (mut before, mut behind, mut missed, mut wrong) = (0, 0, 0, 0);
+    for i in 0..40_000 {
+        let id = random.below(slivers.len());
+        let [a, b, c] = slivers[id];
+        let (u, v) = (0.1 + 0.6 * random.next(), 0.1 + 0.2 * random.next());
+        let (direction, distance) = (random.vector().normalize(), 10.0_f32.powf(-6.0 + 4.0 * random.next()));
+        let side = if i % 3 == 0 { -1.0 } else { 1.0 };
+        let origin = a + (b - a) * u + (c - a) * v - direction * (distance * side);
+        let ray = Ray { t_max: 2.0 * distance, ..Ray::new(origin, direction) };
+        let all = || slivers.iter().filter_map(|corners| crossing(&ray, corners));
+        let end = f64::from(ray.t_max);
+        let is_hit = all().any(|(t, least)| t > 1e-9 && t < 0.99 * end && least > 0.02);
+        let is_free = all().all(|(t, least)| t < -1e-9 || t > 1.01 * end || least < -0.02);
+        before += u32::from(is_hit);
+        behind += u32::from(is_free);
+        let (rays, mut hits) = ([ray; PACKET], [None; PACKET]);
+        let mut answers = vec![planes.any(&ray, None), planes.closest(&ray).is_some()];
+        for tree in &trees {
+            tree.closest_packet(&rays, &ends(&rays), &mut hits);
+            let any = tree.any_packet(&rays, &ends(&rays), &[]) != 0;
+            answers.extend([tree.any(&ray, None), tree.closest(&ray).is_some(), any, hits[3].is_some()]);
+        }
+        missed += u32::from(is_hit && answers.contains(&false));
+        wrong += u32::from(is_free && answers.contains(&true));
+    }
+    assert!(before > 10_000 && behind > 3_000, "{before} before, {behind} behind");
+    assert_eq!((missed, wrong), (0, 0), "missed, wrong, of {before} and {behind}");
+}
+
 #[test]
 fn all_instructions_make_the_same_picture() {
     for scene in ["mesh", "textures", "orbiter", "dof"] {

@@ -10,6 +10,7 @@ use super::polygon::triangulate;
 use crate::assets::{AssetError, Dropped, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
+use crate::math::origin::origin_near;
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// Faces between two polls of the token.
@@ -55,7 +56,7 @@ impl Faces {
 /// `face_materials` is empty or one for each face.
 #[derive(Debug, Default)]
 pub(super) struct Parsed {
-    pub(super) positions: Vec<Vec3>,
+    pub(super) positions: Vec<DVec3>,
     pub(super) normals: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
     pub(super) faces: Faces,
@@ -70,6 +71,7 @@ pub(super) struct Parsed {
 pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
     let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings, companions, pictures } =
         parsed;
+    let (origin, positions) = around_origin(positions, &faces);
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
     let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
     cutter.cut_all(source, &faces)?;
@@ -78,13 +80,27 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
         return Err(source.wrong(no_usable_face(faces.len(), dropped)));
     }
     let materials_of = triangle_materials;
-    let mut mesh = TriangleMesh { positions, normals, uvs, triangles, materials: materials_of };
+    let mut mesh = TriangleMesh { origin, positions, normals, uvs, triangles, materials: materials_of };
     drop_unused_vertices(&mut mesh);
     for uv in mesh.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
         *uv = Vec2::ZERO;
     }
     complete_normals(&mut mesh, source.watch.token)?;
     Ok(LoadedMesh { mesh, materials, dropped, warnings, companions, pictures })
+}
+
+/// Positions from an origin near those that faces use. What no `f32` can hold becomes infinite.
+fn around_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
+    let least = DVec3::splat(f64::from(f32::MIN));
+    let place = |corner: &u32| positions.get(*corner as usize).copied().unwrap_or(DVec3::NAN);
+    let held = |place: &DVec3| place.cmpge(least).all() && place.cmple(-least).all();
+    let none = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let both =
+        |(min, max): (DVec3, DVec3), (least, greatest): (DVec3, DVec3)| (min.min(least), max.max(greatest));
+    let places = faces.corners.par_iter().map(place).filter(held);
+    let (min, max) = places.fold(none, |ends, place| both(ends, (place, place))).reduce(none, both);
+    let origin = origin_near((min + max) * 0.5, (max - min).max_element() * 0.5);
+    (origin, positions.into_par_iter().map(|place| (place - origin).as_vec3()).collect())
 }
 
 fn no_usable_face(faces: usize, dropped: Dropped) -> String {
@@ -270,6 +286,10 @@ mod tests {
         faces
     }
 
+    fn exact(positions: &[Vec3]) -> Vec<DVec3> {
+        positions.iter().map(|position| position.as_dvec3()).collect()
+    }
+
     const SQUARE: [Vec3; 4] = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
 
     #[test]
@@ -285,6 +305,7 @@ mod tests {
         let list: [&[u32]; 7] =
             [&[0, 1, 4], &[0, 1, 5], &[0, 1, 6], &[0, 1, 2, 3], &[0, 1], &[1, 4, 2, 3], &[0, 0, 0, 0]];
         let face_materials = vec![0, 1, 2, 3, 4, 5, 6];
+        let positions = exact(&positions);
         let parsed = Parsed { positions, faces: faces(&list), face_materials, ..Parsed::default() };
         let loaded = assembled(parsed).expect("some faces are good");
         assert_eq!(loaded.dropped, Dropped { non_finite: 1, degenerate: 4 });
@@ -296,10 +317,25 @@ mod tests {
     #[test]
     fn the_extremes_of_f32_have_area() {
         for scale in [f32::MAX / 2.0, f32::MIN_POSITIVE / 1024.0] {
-            let positions = vec![Vec3::ZERO, Vec3::X * scale, Vec3::Y * scale];
+            let positions = exact(&[Vec3::ZERO, Vec3::X * scale, Vec3::Y * scale]);
             let parsed = Parsed { positions, faces: faces(&[&[0, 1, 2]]), ..Parsed::default() };
             assert_eq!(assembled(parsed).expect("has area").mesh.triangles.len(), 1);
         }
+    }
+
+    #[test]
+    fn what_is_far_from_the_origin_keeps_its_digits() {
+        let far = DVec3::new(1e8, -3e7, 5e5);
+        let mut positions: Vec<DVec3> = exact(&SQUARE).into_iter().map(|corner| corner + far).collect();
+        // What no face uses, or no number holds, moves nothing.
+        positions.extend([DVec3::splat(1e30), DVec3::splat(1e39)]);
+        let parsed =
+            Parsed { positions, faces: faces(&[&[0, 1, 2], &[0, 2, 3], &[0, 1, 5]]), ..Parsed::default() };
+        let loaded = assembled(parsed).expect("two are good");
+        assert_eq!(loaded.dropped, Dropped { non_finite: 1, degenerate: 0 });
+        let mesh = loaded.mesh;
+        let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3() + mesh.origin).collect();
+        assert_eq!(places, exact(&SQUARE).into_iter().map(|corner| corner + far).collect::<Vec<_>>());
     }
 
     #[test]
@@ -316,7 +352,7 @@ mod tests {
 
     #[test]
     fn no_usable_face_says_why() {
-        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::X, Vec3::splat(f32::INFINITY)];
+        let positions = exact(&[Vec3::ZERO, Vec3::X, Vec3::X, Vec3::splat(f32::INFINITY)]);
         let parsed = Parsed { positions, faces: faces(&[&[0, 1, 2], &[0, 1, 3]]), ..Parsed::default() };
         let says = assembled(parsed).expect_err("nothing left").to_string();
         assert_eq!(
@@ -330,7 +366,7 @@ mod tests {
     fn normals_are_made_unit_and_missing_ones_made() {
         let normals = vec![Vec3::Z * 1e30, Vec3::ZERO, Vec3::new(0.0, f32::NAN, 0.0), Vec3::NEG_Z * 1e-30];
         let parsed = Parsed {
-            positions: SQUARE.to_vec(),
+            positions: exact(&SQUARE),
             normals,
             uvs: vec![Vec2::ONE, Vec2::NAN, Vec2::X, Vec2::Y],
             faces: faces(&[&[0, 1, 2, 3]]),
@@ -344,7 +380,7 @@ mod tests {
     #[test]
     fn an_index_out_of_range_names_the_face() {
         let parsed = Parsed {
-            positions: SQUARE.to_vec(),
+            positions: exact(&SQUARE),
             faces: faces(&[&[0, 1, 2], &[0, 1, 4]]),
             ..Parsed::default()
         };

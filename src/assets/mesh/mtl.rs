@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::assets::read::{self, Watch};
 use crate::assets::{AssetError, FileMaterial};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 /// Most bytes of a material file.
 const FILE_LIMIT: u64 = 64 << 20;
@@ -88,9 +88,9 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
         name: found.name.clone(),
         diffuse: color(found.diffuse, plain),
         specular: color(found.specular, 0.0),
-        shininess: found.shininess.unwrap_or(0.0).max(0.0),
+        shininess: (found.shininess.unwrap_or(0.0) as f32).max(0.0),
         emission: color(found.emissive, 0.0),
-        ior: found.optical_density.unwrap_or(1.0),
+        ior: found.optical_density.unwrap_or(1.0) as f32,
         illumination_model: found.illumination_model,
         diffuse_texture,
         specular_texture: file(found.specular_texture.as_deref()),
@@ -126,8 +126,8 @@ pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Negative components are 0.
-fn color(found: Option<[f32; 3]>, otherwise: f32) -> Vec3 {
-    found.map_or(Vec3::splat(otherwise), |numbers| Vec3::from_array(numbers).max(Vec3::ZERO))
+fn color(found: Option<[f64; 3]>, otherwise: f32) -> Vec3 {
+    found.map_or(Vec3::splat(otherwise), |numbers| DVec3::from_array(numbers).as_vec3().max(Vec3::ZERO))
 }
 
 /// The file of a map, behind its options (`-bm 1.0 -s 2 2 2 a name.png`), with either slash.

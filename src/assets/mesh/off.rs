@@ -5,7 +5,7 @@
 use super::assemble::{Faces, Parsed, assemble};
 use super::text::{Cursor, shown};
 use super::{AssetError, LoadedMesh, Source};
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, DVec3, Vec2};
 
 /// Lines between two polls of the token.
 const BATCH: u64 = 1 << 13;
@@ -155,7 +155,7 @@ impl Reader<'_> {
             let divisor = if header.homogeneous { self.float("a coordinate")? } else { 1.0 };
             parsed.positions.push(position / divisor);
             if header.normals {
-                parsed.normals.push(self.triple("a normal")?);
+                parsed.normals.push(self.triple("a normal")?.as_vec3());
             }
             if header.uvs {
                 parsed.uvs.push(self.last_two()?);
@@ -165,11 +165,11 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn triple(&mut self, what: &str) -> Result<Vec3, AssetError> {
-        Ok(Vec3::new(self.float(what)?, self.float(what)?, self.float(what)?))
+    fn triple(&mut self, what: &str) -> Result<DVec3, AssetError> {
+        Ok(DVec3::new(self.float(what)?, self.float(what)?, self.float(what)?))
     }
 
-    fn float(&mut self, what: &str) -> Result<f32, AssetError> {
+    fn float(&mut self, what: &str) -> Result<f64, AssetError> {
         if !self.cursor.skip_in_line() {
             return self.wrong(format!("expected {what}, found the line's end"));
         }
@@ -181,11 +181,11 @@ impl Reader<'_> {
 
     /// Texture coordinates are the last of a line, behind a colour of any length.
     fn last_two(&mut self) -> Result<Vec2, AssetError> {
-        let mut last = Vec2::new(self.float("u")?, self.float("v")?);
+        let mut last = DVec2::new(self.float("u")?, self.float("v")?);
         while self.cursor.skip_in_line() {
-            last = Vec2::new(last.y, self.float("a number")?);
+            last = DVec2::new(last.y, self.float("a number")?);
         }
-        Ok(last)
+        Ok(last.as_vec2())
     }
 
     fn faces(&mut self, vertices: u64, count: u64, faces: &mut Faces) -> Result<(), AssetError> {
@@ -231,6 +231,7 @@ mod tests {
     use super::*;
     use crate::assets::read::Watch;
     use crate::control::{CancelToken, unwatched};
+    use crate::math::Vec3;
     use std::path::Path;
 
     fn read(text: &str) -> Result<LoadedMesh, AssetError> {

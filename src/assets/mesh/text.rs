@@ -62,8 +62,8 @@ impl<'a> Cursor<'a> {
     }
 
     /// The number that starts here, and past it. Overflow is infinite, `nan` and `inf` are numbers.
-    pub(super) fn float(&mut self) -> Option<f32> {
-        let (value, length) = parse_partial::<f32, _>(&self.bytes[self.at..]).ok()?;
+    pub(super) fn float(&mut self) -> Option<f64> {
+        let (value, length) = parse_partial::<f64, _>(&self.bytes[self.at..]).ok()?;
         self.past(length).then_some(value)
     }
 
@@ -119,8 +119,8 @@ mod tests {
         assert_eq!(float("1.5e-3 "), Some(1.5e-3));
         assert_eq!(float("-.5#"), Some(-0.5));
         assert_eq!(float("+2"), Some(2.0));
-        assert_eq!(float("1e999"), Some(f32::INFINITY));
-        assert!(float("nan").is_some_and(f32::is_nan));
+        assert_eq!(float("1e999"), Some(f64::INFINITY));
+        assert!(float("nan").is_some_and(f64::is_nan));
         assert_eq!(float("1.5x"), None);
         assert_eq!(float(""), None);
         let integer = |text: &'static str| Cursor::new(text.as_bytes(), 0).integer();

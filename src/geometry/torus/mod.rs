@@ -186,7 +186,7 @@ mod tests {
         let hit = ring().intersect(&ray).expect("aimed at it");
         let surface = ring().surface(&ray, &hit);
         let pi = std::f32::consts::PI;
-        assert_eq!(surface.uv, Vec2::splat(0.5));
+        assert_eq!(surface.uv.as_vec2(), Vec2::splat(0.5));
         assert!((surface.dpdu - Vec3::NEG_Z * (5.0 * pi)).length() < 1e-5);
         assert!((surface.dpdv - Vec3::Y * pi).length() < 1e-5);
         let (point, normal) = ring().at(0.5, 0.75);

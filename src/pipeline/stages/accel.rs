@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::super::cache::{Memo, Pool};
 use super::meshes::Meshes;
 use super::{Reading, Staged, Stop, keys};
+use crate::math::DVec3;
 use crate::scene::Loaded;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};
@@ -38,23 +39,23 @@ pub(in crate::pipeline) struct Built {
     pub(in crate::pipeline) geometry: Arc<Geometry>,
 }
 
-/// Build what is missing. `scene` has the overrides in it.
+/// Build what is missing, in coordinates that start at `origin`. `scene` has the overrides in it.
 ///
 /// # Errors
 /// Cancelled.
 pub(in crate::pipeline) fn accel(
     scene: &Scene,
-    of: &Referents<'_>,
+    (of, origin): (&Referents<'_>, DVec3),
     meshes: &Meshes,
     cache: &mut AccelCache,
     reading: &Reading<'_>,
 ) -> Result<Staged<Built>, Stop> {
-    let key = keys::geometry(scene, of);
+    let key = keys::geometry(scene, of, origin);
     let (meshes, kept) = trees(scene, meshes, cache, reading)?;
     if let Some(geometry) = cache.geometry.get(key).cloned() {
         return Ok(Staged::reused(Built { meshes, geometry }, "no shape changed"));
     }
-    let build = || Geometry::of_scene(scene, &meshes, reading.token);
+    let build = || Geometry::of_scene(scene, &meshes, origin, reading.token);
     let geometry = Arc::new(reading.pool.install(build)?);
     cache.geometry.set(key, geometry.clone());
     let built = meshes.len() - kept;

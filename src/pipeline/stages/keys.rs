@@ -3,6 +3,7 @@
 
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
+use crate::math::DVec3;
 use crate::scene::description::{Accel, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
@@ -21,8 +22,13 @@ pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
 }
 
 /// What trees are built over, and which.
-pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>) -> Key {
-    in_trees(&shapes(scene, of), scene.render.accel)
+pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
+    in_trees(&from(&shapes(scene, of), origin), scene.render.accel)
+}
+
+/// These things in coordinates that start somewhere.
+fn from(of: &Key, origin: DVec3) -> Key {
+    Fingerprint::new("from").key(of).dvec3(origin).finish()
 }
 
 /// What is made of these things with trees of a kind.
@@ -39,7 +45,11 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
 }
 
 /// What gives light, where it is, and which objects it is.
-pub(in crate::pipeline) fn lights(scene: &Scene, of: &Referents<'_>) -> Key {
+pub(in crate::pipeline) fn lights(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
+    from(&described_lights(scene, of), origin)
+}
+
+fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("lights");
     for light in &scene.lights {
         key.add(light, of);
@@ -62,7 +72,7 @@ pub(in crate::pipeline) fn lights(scene: &Scene, of: &Referents<'_>) -> Key {
 /// Everything that a world is made of but the kind of its trees: all kinds give the same picture bit for bit.
 pub(in crate::pipeline) fn world(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
     let mut key = Fingerprint::new("world");
-    key.key(&shapes(scene, of)).key(&lights(scene, of)).add(&scene.camera, of);
+    key.key(&shapes(scene, of)).key(&described_lights(scene, of)).add(&scene.camera, of);
     for object in &scene.objects {
         match object.material {
             Some(index) => key.index(1).add(&scene.materials[index], of),
@@ -98,7 +108,7 @@ mod tests {
     fn keys(text: &str) -> (Key, Key, Key) {
         let scene = loaded_of(text).scene;
         let of = referents(&scene, &[], None);
-        (geometry(&scene, &of), lights(&scene, &of), world(&scene, &of, &[]))
+        (geometry(&scene, &of, DVec3::ZERO), lights(&scene, &of, DVec3::ZERO), world(&scene, &of, &[]))
     }
 
     #[test]

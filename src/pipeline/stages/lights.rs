@@ -16,7 +16,7 @@ pub(in crate::pipeline) fn lights(
     geometry: &Geometry,
     memo: &mut Memo<Arc<Lights>>,
 ) -> Staged<Arc<Lights>> {
-    let key = keys::lights(scene, of);
+    let key = keys::lights(scene, of, geometry.origin());
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
         return Staged::reused(lights.clone(), "no light changed");
     }

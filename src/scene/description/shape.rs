@@ -141,21 +141,28 @@ pub enum Lowered<'a> {
 }
 
 impl Shape {
-    /// Made ready.
-    pub fn lowered(&self) -> Lowered<'_> {
+    /// Made ready, in coordinates that start at `origin`.
+    pub fn lowered(&self, origin: DVec3) -> Lowered<'_> {
+        let at = |place: DVec3| place - origin;
         Lowered::Shape(match *self {
-            Self::Sphere { center, radius } => geometry::Shape::Sphere(Sphere { center, radius }),
-            Self::Quad { corner, u, v } => geometry::Shape::Quad(Parallelogram::new(corner, u, v)),
-            Self::Plane { point, normal } => geometry::Shape::Plane(Plane::new(point, normal)),
-            Self::Box { center, size, rotate } => geometry::Shape::Box(Cuboid::new(center, size, rotate)),
-            Self::Triangle { a, b, c } => geometry::Shape::Triangle(Triangle { a, b, c }),
-            Self::Disk { center, normal, radius } => geometry::Shape::Disk(Disk::new(center, normal, radius)),
-            Self::Cylinder { a, b, radius, caps } => {
-                geometry::Shape::Cylinder(Cylinder::new(a, b, radius, caps))
+            Self::Sphere { center, radius } => geometry::Shape::Sphere(Sphere { center: at(center), radius }),
+            Self::Quad { corner, u, v } => geometry::Shape::Quad(Parallelogram::new(at(corner), u, v)),
+            Self::Plane { point, normal } => geometry::Shape::Plane(Plane::new(at(point), normal)),
+            Self::Box { center, size, rotate } => geometry::Shape::Box(Cuboid::new(at(center), size, rotate)),
+            Self::Triangle { a, b, c } => {
+                geometry::Shape::Triangle(Triangle { a: at(a), b: at(b), c: at(c) })
             }
-            Self::Cone { base, tip, radius, cap } => geometry::Shape::Cone(Cone::new(base, tip, radius, cap)),
+            Self::Disk { center, normal, radius } => {
+                geometry::Shape::Disk(Disk::new(at(center), normal, radius))
+            }
+            Self::Cylinder { a, b, radius, caps } => {
+                geometry::Shape::Cylinder(Cylinder::new(at(a), at(b), radius, caps))
+            }
+            Self::Cone { base, tip, radius, cap } => {
+                geometry::Shape::Cone(Cone::new(at(base), at(tip), radius, cap))
+            }
             Self::Torus { center, axis, radius, tube } => {
-                geometry::Shape::Torus(Torus::new(center, axis, radius, tube))
+                geometry::Shape::Torus(Torus::new(at(center), axis, radius, tube))
             }
             Self::Mesh(ref mesh) => return Lowered::Mesh(mesh),
         })

@@ -2,6 +2,8 @@
 
 mod camera;
 mod direct;
+mod facets;
+mod far;
 mod glass;
 mod mirror;
 mod robust;

@@ -142,7 +142,7 @@ fn tangents_are_the_derivatives_of_the_texture_coordinates() {
                 assert!(here.dpdu.cross(here.dpdv).dot(here.normal) > 0.0, "{shape:?} {here:?}");
                 for _ in 0..2 {
                     let Some((other, there)) = seen(to + random.direction() * 2e-3) else { continue };
-                    let (moved, turned) = (there.point - here.point, there.uv - here.uv);
+                    let (moved, turned) = (there.point - here.point, (there.uv - here.uv).as_vec2());
                     if other != part || turned.abs().max_element() > 0.3 || moved.length() > 0.02 {
                         continue;
                     }

@@ -14,7 +14,7 @@ use glimt::scene::description::{
     Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Located, Material, MaterialKind, Mesh, Object,
     Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
 };
-use glimt::world::{Geometry, MeshTree, Parts, World, lights, textures_needed};
+use glimt::world::{Geometry, MeshTree, Parts, World, lights, origin, textures_needed};
 
 use super::v;
 
@@ -135,8 +135,12 @@ impl Build {
     }
 
     /// An instance without smoothing: (scale, rotate, translate).
-    pub fn mesh(mut self, mesh: TriangleMesh, placed: [DVec3; 3], material: Material) -> Self {
-        let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
+    pub fn mesh(self, mesh: TriangleMesh, placed: [DVec3; 3], material: Material) -> Self {
+        self.loaded(LoadedMesh { mesh, ..LoadedMesh::default() }, placed, material)
+    }
+
+    /// The same of what was read from a file.
+    pub fn loaded(mut self, loaded: LoadedMesh, placed: [DVec3; 3], material: Material) -> Self {
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("nobody cancels");
         self.parts.meshes.push(Arc::new(tree));
@@ -144,6 +148,15 @@ impl Build {
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
         self.shape(Shape::Mesh(Mesh { file, scale, rotate, translate, smooth: false }), material)
+    }
+
+    /// The last mesh, smooth.
+    pub fn smooth(self) -> Self {
+        self.with(|scene| {
+            if let Some(Shape::Mesh(mesh)) = scene.objects.last_mut().map(|object| &mut object.shape) {
+                mesh.smooth = true;
+            }
+        })
     }
 
     /// An instance of a mesh file with materials of its own, without smoothing.
@@ -182,7 +195,8 @@ impl Build {
             let texels = &self.texels[needed.declared.expect("declared in the scene")];
             parts.textures.insert(needed.source, Arc::clone(texels));
         }
-        let geometry = Geometry::of_scene(&self.scene, &parts.meshes, &CancelToken::new());
+        let origin = origin(&self.scene.camera, None);
+        let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("nobody cancels"));
         let lights = lights(&self.scene, &geometry);
         World::new(&self.scene, &parts, geometry, lights)

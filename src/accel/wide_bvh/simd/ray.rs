@@ -26,7 +26,6 @@ pub struct Lines {
     origin: [F4; 3],
     shear: [F4; 3],
     axes: [usize; 3],
-    slender: F4,
 }
 
 /// The axes of a sheared ray by which of x > y, x > z, y > z hold for the sizes of its direction, and which of x, y, z
@@ -163,7 +162,6 @@ impl Lines {
             origin: in_four(_mm_permutevar_ps(origin, places)),
             shear: [shear_x, shear_y, F4(scale)],
             axes: [axes[0] as usize, axes[1] as usize, axes[2] as usize],
-            slender: triangle::slender(F4(farthest)),
         }
     }
 
@@ -192,7 +190,7 @@ impl Lines {
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
         let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
-        triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max), Some(self.slender))
+        triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max), true)
     }
 
     /// The corners of which `row` is the first.

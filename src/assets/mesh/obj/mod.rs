@@ -11,7 +11,7 @@ use super::assemble::{Parsed, assemble};
 use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;
 use crate::assets::contain::contain;
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, DVec3, Vec2, Vec3};
 use fault::first_fault;
 use input::{Chunks, Survey};
 use libraries::{Found, Libraries};
@@ -62,12 +62,13 @@ fn join(models: &[tobj::Model], parsed: &mut Parsed) {
         let mesh = &model.mesh;
         let base = parsed.positions.len() as u32;
         let end = parsed.positions.len() + vertices(model);
-        parsed.positions.extend(mesh.positions.chunks_exact(3).map(Vec3::from_slice));
+        parsed.positions.extend(mesh.positions.chunks_exact(3).map(DVec3::from_slice));
         if any_uvs && whole(mesh.texcoords.len(), 2 * vertices(model), model, "texture coordinates", parsed) {
-            parsed.uvs.extend(mesh.texcoords.chunks_exact(2).map(Vec2::from_slice));
+            parsed.uvs.extend(mesh.texcoords.chunks_exact(2).map(|uv| DVec2::from_slice(uv).as_vec2()));
         }
         if any_normals && whole(mesh.normals.len(), 3 * vertices(model), model, "normals", parsed) {
-            parsed.normals.extend(mesh.normals.chunks_exact(3).map(Vec3::from_slice));
+            let normals = mesh.normals.chunks_exact(3).map(|normal| DVec3::from_slice(normal).as_vec3());
+            parsed.normals.extend(normals);
         }
         parsed.uvs.resize(if any_uvs { end } else { 0 }, Vec2::ZERO);
         parsed.normals.resize(if any_normals { end } else { 0 }, Vec3::ZERO);

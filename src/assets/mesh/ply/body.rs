@@ -5,7 +5,7 @@ use super::header::Scalar;
 
 /// Numbers in the order of the file. Errors are in words, without the place.
 pub(super) trait Numbers {
-    fn float(&mut self, scalar: Scalar) -> Result<f32, String>;
+    fn float(&mut self, scalar: Scalar) -> Result<f64, String>;
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
 
@@ -26,7 +26,7 @@ impl Ascii<'_> {
 }
 
 impl Numbers for Ascii<'_> {
-    fn float(&mut self, _: Scalar) -> Result<f32, String> {
+    fn float(&mut self, _: Scalar) -> Result<f64, String> {
         self.seek_word()?;
         self.0.float().ok_or_else(|| format!("expected a number, found {}", shown(self.0.word())))
     }
@@ -74,11 +74,11 @@ impl<const BIG_ENDIAN: bool> Binary<'_, BIG_ENDIAN> {
 
 impl<const BIG_ENDIAN: bool> Numbers for Binary<'_, BIG_ENDIAN> {
     #[inline]
-    fn float(&mut self, scalar: Scalar) -> Result<f32, String> {
+    fn float(&mut self, scalar: Scalar) -> Result<f64, String> {
         match scalar {
-            Scalar::F32 => Ok(f32::from_le_bytes(self.take()?)),
-            Scalar::F64 => Ok(f64::from_le_bytes(self.take()?) as f32),
-            _ => Ok(self.integer(scalar)? as f32),
+            Scalar::F32 => Ok(f64::from(f32::from_le_bytes(self.take()?))),
+            Scalar::F64 => Ok(f64::from_le_bytes(self.take()?)),
+            _ => Ok(self.integer(scalar)? as f64),
         }
     }
 

@@ -7,7 +7,7 @@ mod header;
 use super::assemble::{Parsed, assemble};
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, Source};
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec2, DVec3};
 use body::{Ascii, Binary, Numbers};
 use header::{Element, Encoding, Header, Kind, Scalar};
 
@@ -166,12 +166,12 @@ fn read_vertices(
             }
         }
         let [x, y, z, nx, ny, nz, u, v] = values;
-        parsed.positions.push(Vec3::new(x, y, z));
+        parsed.positions.push(DVec3::new(x, y, z));
         if has_normals {
-            parsed.normals.push(Vec3::new(nx, ny, nz));
+            parsed.normals.push(DVec3::new(nx, ny, nz).as_vec3());
         }
         if has_uvs {
-            parsed.uvs.push(Vec2::new(u, v));
+            parsed.uvs.push(DVec2::new(u, v).as_vec2());
         }
         Ok(())
     })

@@ -3,6 +3,7 @@ use std::path::Path;
 use super::*;
 use crate::assets::read::Watch;
 use crate::control::{CancelToken, unwatched};
+use crate::math::{Vec2, Vec3};
 
 fn read_bytes(bytes: &[u8]) -> Result<LoadedMesh, AssetError> {
     let token = CancelToken::new();

@@ -104,7 +104,7 @@ impl<V: Lanes> Packet<V> {
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
         let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
-        triangle::hits(&[a, b, c], self.shear[2], t_max, None)
+        triangle::hits(&[a, b, c], self.shear[2], t_max, false)
     }
 
     /// A corner as each ray sees it; `row` is its first.

@@ -1,0 +1,55 @@
+//! Where coordinates start that single precision is to hold.
+
+use super::DVec3;
+
+/// Steps of origins in sizes of what is around them: so far off, single precision errs by a millionth of that size.
+const STEP: f64 = 64.0;
+
+/// Sizes like 1, 2 and 5 are not near the next power of two, where the step changes.
+const OFF_POWERS: f64 = 1.37;
+
+/// An origin for what is of a size around a place: 0 near 0, and far from it on a grid whose step is a power of two, so that
+/// nothing is rounded where numbers are moved there and small changes of the place change nothing.
+pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
+    let step = STEP * power_of_two_below(size * OFF_POWERS);
+    // Adding 0 makes −0 and 0 one.
+    let origin = (place / step).round() * step + DVec3::ZERO;
+    if step > 0.0 && origin.is_finite() { origin } else { DVec3::ZERO }
+}
+
+/// 0 where there is none.
+fn power_of_two_below(size: f64) -> f64 {
+    f64::from_bits(size.to_bits() & f64::INFINITY.to_bits())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_zero_it_is_zero_and_elsewhere_within_half_a_step() {
+        assert_eq!(origin_near(DVec3::new(20.0, -20.0, 0.0), 1.0), DVec3::ZERO);
+        let far = DVec3::new(1e8, -3e5, 7.0);
+        for size in [0.1, 1.0, 5.0, 1e3] {
+            let origin = origin_near(far, size);
+            assert!((far - origin).abs().max_element() <= 0.5 * STEP * OFF_POWERS * size, "{size}: {origin}");
+            // Doubled numbers have the doubled origin.
+            assert_eq!(origin_near(far * 2.0, size * 2.0), origin * 2.0);
+        }
+        assert_eq!(origin_near(far, 5.0), origin_near(far + DVec3::ONE, 5.0 * (1.0 - 1e-12)));
+    }
+
+    #[test]
+    fn what_has_no_size_or_place_starts_at_zero() {
+        for (place, size) in [
+            (1e8, 0.0),
+            (1e8, f64::NAN),
+            (f64::NAN, 1.0),
+            (f64::INFINITY, 1.0),
+            (1.0, 1e-310),
+            (1e308, 1e-300),
+        ] {
+            assert_eq!(origin_near(DVec3::splat(place), size), DVec3::ZERO, "{place} {size}");
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Light at the facets of smooth meshes: none inside what is closed, none missing on what bulges.
+
+use std::f64::consts::PI;
+
+use glimt::geometry::Ray;
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::{Falloff, NormalMap, Shadows, TextureFilter, Wrap};
+
+use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
+use super::{Random, v};
+
+/// How many pixels of a picture are lit, and by how much at most.
+fn lit(build: &Build) -> (usize, f64) {
+    let picture = build.picture(1, 0);
+    let most = picture.iter().map(|color| color.max_element()).fold(0.0, f64::max);
+    (picture.iter().filter(|color| color.max_element() > 0.0).count(), most)
+}
+
+/// The box between two corners, by eight vertices and twelve triangles that face outwards.
+fn cube(least: DVec3, greatest: DVec3) -> TriangleMesh {
+    let corner = |i: usize| {
+        let pick = |axis: usize| if i & (1 << axis) == 0 { least[axis] } else { greatest[axis] };
+        v(pick(0), pick(1), pick(2)).as_vec3()
+    };
+    let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = squares.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriangleMesh { positions: (0..8).map(corner).collect(), triangles, ..TriangleMesh::default() }
+}
+
+#[test]
+fn a_smooth_cube_that_is_lit_from_outside_is_dark_inside() {
+    for light in [v(3.0, 4.0, 2.0), v(-2.0, 0.1, 0.3), v(0.3, 1.2, -5.0)] {
+        let build = scene()
+            .mesh(cube(DVec3::splat(-1.0), DVec3::ONE), AS_IT_IS, matte(0.8))
+            .smooth()
+            .point_light(light, 100.0, Falloff::Square)
+            .pictured(v(0.3, 0.2, 0.9), v(-0.4, -0.3, -1.0), 90.0, 64, 64);
+        assert_eq!(lit(&build).0, 0, "the light is at {light}, the brightest pixel is {}", lit(&build).1);
+    }
+}
+
+#[test]
+fn no_light_of_outside_reaches_a_smooth_ball_in_a_close_shell() {
+    // The middle of a facet of the ball, the gap between it and the shell, and the light.
+    for gap in [0.02, 0.002] {
+        let ball = lat_long_sphere(7, 12, 1.0, DVec3::ZERO);
+        let out = v((PI / 12.0).cos(), 0.0, (PI / 12.0).sin());
+        let build = scene()
+            .mesh(ball, AS_IT_IS, matte(0.8))
+            .smooth()
+            .sphere(DVec3::ZERO, 1.0 + gap, matte(0.8))
+            .point_light(v(2.0, 3.0, 1.5), 100.0, Falloff::Square)
+            .pictured(out * (1.0 + 0.9 * gap), out * 0.5 + v(0.0, 0.2, 0.0), 120.0, 64, 64);
+        assert_eq!(lit(&build).0, 0, "a gap of {gap}, the brightest pixel is {}", lit(&build).1);
+    }
+}
+
+/// A smooth ball of 200 triangles, with its own normals.
+#[test]
+fn a_coarse_smooth_ball_is_shaded_like_a_sphere() {
+    let mut ball = lat_long_sphere(6, 20, 1.0, DVec3::ZERO);
+    assert_eq!(ball.triangles.len(), 200);
+    ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
+    for to_light in [DVec3::X, v(0.2, 0.9, -0.5)] {
+        let to_light = to_light.normalize();
+        let mut seen = 0;
+        for place in 0..3000 {
+            let (azimuth, height) = (f64::from(place) * 2.399_963, f64::from(place) / 1500.0 - 0.999_5);
+            let ring = (1.0 - height * height).sqrt();
+            let normal = v(ring * azimuth.cos(), height, ring * azimuth.sin());
+            let cosine = normal.dot(to_light);
+            if cosine < 0.2 {
+                continue;
+            }
+            let value = scene()
+                .mesh(ball.clone(), AS_IT_IS, matte(1.0))
+                .smooth()
+                .point_light(to_light * 1e4, 1.0, Falloff::None)
+                .seen(normal * 3.0, DVec3::ZERO)
+                .value();
+            let ratio = value * PI / cosine;
+            assert!((0.9..1.1).contains(&ratio), "{to_light} {normal}, cosine {cosine}: {ratio}");
+            seen += 1;
+        }
+        assert!(seen > 1000);
+    }
+}
+
+/// A closed surface around the middle whose radius is anything from `1 − rough` to `1 + rough`.
+fn blob(random: &mut Random, rough: f64) -> TriangleMesh {
+    let (rings, steps) = (3 + (random.unit() * 6.0) as u32, 3 + (random.unit() * 8.0) as u32);
+    let mut mesh = match (random.unit() * 5.0) as u32 {
+        0 => cube(DVec3::splat(-0.7), DVec3::splat(0.7)),
+        1 => lat_long_sphere(2, 4, 1.0, DVec3::ZERO),
+        _ => lat_long_sphere(rings, steps, 1.0, DVec3::ZERO),
+    };
+    for position in &mut mesh.positions {
+        *position *= (1.0 + rough * random.signed()) as f32;
+    }
+    mesh
+}
+
+/// The same at another size, seen from the inside or the outside.
+fn layer(mesh: &TriangleMesh, size: f64, turned: bool) -> TriangleMesh {
+    let mut layer = mesh.clone();
+    layer.positions.iter_mut().for_each(|p| *p *= size as f32);
+    if turned {
+        layer.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    }
+    layer
+}
+
+fn joined(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(&other.positions);
+    mesh.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
+    mesh
+}
+
+/// Distance from the middle to what is nearest that way.
+fn radius_of(mesh: &TriangleMesh, direction: DVec3) -> f64 {
+    let world = scene().mesh(mesh.clone(), AS_IT_IS, matte(0.5)).world();
+    let hit = world.geometry.closest(&Ray::new(Vec3::ZERO, direction.as_vec3()));
+    f64::from(hit.expect("the middle is inside").shape.t)
+}
+
+/// Something closed and opaque with an eye inside and lights outside, of kind `number`.
+fn closed(number: u32, random: &mut Random) -> Build {
+    let rough = [0.0, 0.2, 0.6][number as usize % 3];
+    let mesh = blob(random, rough);
+    let towards = random.direction();
+    let gap = 10.0_f64.powf(-1.0 - 3.0 * random.unit());
+    // A single wall; a shell of two; in between two shells, near the outer or the inner one.
+    let (walls, eye) = match number % 5 {
+        0 => (vec![mesh], towards * 0.1 * random.unit()),
+        1 => (
+            vec![joined(layer(&mesh, 1.0 + gap, false), &layer(&mesh, 1.0, true))],
+            towards * 0.1 * random.unit(),
+        ),
+        2 => (vec![layer(&mesh, 1.0, random.unit() < 0.5)], towards * 0.3 * radius_of(&mesh, towards)),
+        _ => {
+            let at = radius_of(&mesh, towards) * (1.0 + gap * (0.1 + 0.8 * random.unit()));
+            (vec![layer(&mesh, 1.0 + gap, random.unit() < 0.5), mesh], towards * at)
+        }
+    };
+    let mut build = scene();
+    let is_smooth = number % 8 != 7;
+    let bumps = (number % 4 == 3).then(|| {
+        let normals: Vec<Vec3> = (0..16)
+            .map(|_| (v(random.signed(), random.signed(), random.unit()) * 0.5 + 0.5).as_vec3())
+            .collect();
+        let rows: Vec<&[Vec3]> = normals.chunks(4).collect();
+        build.texture(&rows, TextureFilter::Bilinear, Wrap::Repeat, Vec2::splat(2.0))
+    });
+    let placed = match number % 7 {
+        0 => [v(1.0, 1.3, 0.8), v(10.0, 70.0, -20.0), v(3.0, -2.0, 5.0)],
+        1 => [v(-1.0, 1.0, 1.0), DVec3::ZERO, v(0.0, 0.3, 0.0)],
+        _ => AS_IT_IS,
+    };
+    let transform =
+        glimt::math::transform::Transform::scale_rotate_translate(placed[0], placed[1], placed[2]);
+    for mut wall in walls {
+        if number % 6 == 5 {
+            let any = |p: &Vec3| (p.normalize() + random.direction().as_vec3() * 0.7).normalize();
+            wall.normals = wall.positions.iter().map(any).collect();
+        }
+        let mut material = matte(0.8);
+        material.normal_map = bumps.map(|texture| NormalMap { texture, strength: 2.0 });
+        build = build.mesh(wall, placed, material);
+        if is_smooth {
+            build = build.smooth();
+        }
+    }
+    let outside = |direction: DVec3| transform.point(direction * 4.0);
+    for _ in 0..3 {
+        build = build.point_light(outside(random.direction()), 50.0, Falloff::Square);
+    }
+    let lamp = outside(random.direction());
+    build = match number % 2 {
+        0 => build.sphere(lamp, 0.5, emitter(20.0)),
+        _ => build.cuboid(lamp, v(0.4, 0.6, 0.5), v(10.0, 20.0, 30.0), emitter(20.0)),
+    };
+    let at = transform.point(eye);
+    build.shadows(Shadows::Soft, 2).depth(1).pictured(at, at + random.direction(), 110.0, 12, 12)
+}
+
+/// A thousand closed opaque meshes, smooth and flat, with bent normals, single walls and shells, round and rough, lit from
+/// outside by points and lamps: no pixel is lit inside.
+#[test]
+fn no_light_reaches_the_inside_of_a_closed_opaque_mesh() {
+    let mut random = Random(77);
+    let mut leaky = Vec::new();
+    for number in 0..1000 {
+        let build = closed(number, &mut random);
+        let (count, most) = lit(&build);
+        if count > 0 {
+            leaky.push((number, count, most));
+        }
+    }
+    let pixels: usize = leaky.iter().map(|(_, count, _)| count).sum();
+    assert!(
+        leaky.is_empty(),
+        "{pixels} pixels in {} meshes, first {:?}",
+        leaky.len(),
+        &leaky[..leaky.len().min(8)]
+    );
+}
