@@ -2,6 +2,7 @@
 
 mod assemble;
 pub mod camera;
+pub mod contact;
 mod emitters;
 pub mod geometry;
 mod lower;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 
 pub use crate::accel::{Loops, PACKET};
 pub use camera::Camera;
+pub use contact::{Meeting, Near, NearTriangles, Sides};
 pub use emitters::lights;
 pub use geometry::{Geometry, Hit};
 pub use lower::file_emission;
@@ -53,6 +55,8 @@ pub struct World {
     object_materials: Vec<ObjectMaterial>,
     /// Lights of every kind.
     pub lights: Arc<Lights>,
+    /// The closed shapes of glass that the lens may be in, with their materials.
+    glass_at_eye: Vec<(u32, u32)>,
 }
 
 /// How an object finds its material.

@@ -11,6 +11,7 @@ mod round_properties;
 mod scenes;
 mod shading;
 mod speckle;
+mod touching;
 
 use glimt::math::DVec3;
 
