@@ -3,6 +3,7 @@
 mod camera;
 mod direct;
 mod glass;
+mod hard;
 mod mirror;
 mod robust;
 mod round;
