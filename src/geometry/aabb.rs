@@ -43,6 +43,16 @@ impl Aabb {
         !self.min.cmple(self.max).all()
     }
 
+    /// Whether a point is in both.
+    pub fn meets(&self, other: &Self) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+
+    /// So much larger on every side.
+    pub fn grown(self, margin: Vec3) -> Self {
+        Self { min: self.min - margin, max: self.max + margin }
+    }
+
     /// Max − min; negative or NaN where empty.
     pub fn extent(&self) -> Vec3 {
         self.max - self.min

@@ -141,6 +141,11 @@ impl Cone {
         ring_shown(side, cosine * across(along), -sine * along) + cap * along.max(0.0)
     }
 
+    /// Whether it is closed.
+    pub fn is_capped(&self) -> bool {
+        self.capped
+    }
+
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let p = self.frame.local(point);

@@ -125,6 +125,11 @@ impl Cylinder {
         ring_shown(side, across(along), 0.0) + cap * along.abs()
     }
 
+    /// Whether it is closed.
+    pub fn is_capped(&self) -> bool {
+        self.capped
+    }
+
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let p = self.frame.local(point);

@@ -161,6 +161,18 @@ impl Shape {
         of_any!(self, it => it.contains(point))
     }
 
+    /// Whether a point is inside, or of a plane behind it; none where the shape encloses nothing.
+    pub fn encloses(&self, point: DVec3) -> Option<bool> {
+        let is_closed = match self {
+            Self::Sphere(_) | Self::Box(_) | Self::Torus(_) => true,
+            Self::Cylinder(cylinder) => cylinder.is_capped(),
+            Self::Cone(cone) => cone.is_capped(),
+            Self::Plane(plane) => return Some(plane.is_behind(point)),
+            Self::Quad(_) | Self::Triangle(_) | Self::Disk(_) => false,
+        };
+        is_closed.then(|| self.contains(point))
+    }
+
     /// The area whose front faces a unit direction, times the cosines; of a torus the mean over all directions.
     pub fn shown(&self, direction: DVec3) -> f64 {
         of_any!(self, it => it.shown(direction))

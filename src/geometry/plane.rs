@@ -80,6 +80,11 @@ impl Plane {
         false
     }
 
+    /// Whether a point is behind it.
+    pub fn is_behind(&self, point: DVec3) -> bool {
+        self.normal.dot(point - self.point) < 0.0
+    }
+
     /// The area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }

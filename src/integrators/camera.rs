@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::medium::Medium;
+use super::medium::{Inside, Medium};
 use super::queues::PathRay;
 use super::shot::Shot;
 use crate::math::{DVec2, Vec2, Vec3};
@@ -23,6 +23,9 @@ impl Shot<'_> {
         let lens = if self.settings.dof { warp::disk(Vec2::new(lx, ly)) } else { Vec2::ZERO };
         let from_corner = DVec2::new(f64::from(x), f64::from(y)) + in_pixel;
         let ray = self.world.camera.ray(self.settings.from_middle(from_corner), lens);
-        PathRay { ray, throughput: Vec3::splat(sample.weight), slot, path: 1, medium: Medium::default() }
+        let around =
+            self.world.glass_around(ray.origin).map(|(object, material)| Inside { object, material });
+        let medium = around.fold(Medium::default(), Medium::entered);
+        PathRay { ray, throughput: Vec3::splat(sample.weight), slot, path: 1, medium }
     }
 }

@@ -5,7 +5,8 @@ use super::shot::Shot;
 use super::sink::{Reflected, Sink};
 use super::vertices::{LitVertex, Outlook};
 use super::view::Measure;
-use crate::lights::{LightSamples, SeenLight};
+use crate::geometry::Ray;
+use crate::lights::{Light, LightSamples, SeenLight};
 use crate::math::Vec3;
 use crate::math::lanes::lane;
 use crate::sampling::{Decision, Repetitions};
@@ -25,23 +26,18 @@ pub struct DirectLight<'a, 's> {
 }
 
 impl DirectLight<'_, '_> {
-    /// Light a vertex: contributions that nothing can stop are added, the others wait for their shadow rays.
+    /// Light a vertex: contributions wait for their shadow rays.
     pub fn shade(&mut self, vertex: &LitVertex<'_>) {
         let (shot, outlook) = (self.shot, vertex.vertex.outlook(self.shot));
         let point = outlook.point;
         let mut arrivals = Arrivals::new(self, vertex, outlook);
         for (number, light) in shot.world.lights.iter() {
-            if shot.settings.render.shadows == Shadows::Hard {
-                if let Some(sample) = light.middle(point) {
-                    arrivals.push(&sample.into(), 1.0);
-                }
-                continue;
-            }
             match light.seen_from(point) {
                 Some(SeenLight::Only(sample)) => arrivals.push(&sample.into(), 1.0),
                 Some(seen) => arrivals.push_samples(&seen, number),
                 None => {}
             }
+            arrivals.end(light);
         }
         arrivals.finish();
     }
@@ -74,12 +70,14 @@ struct Arrivals<'a, 'l, 's, 'v> {
     first: usize,
     /// Sum of all that could arrive.
     total: f32,
+    /// What could arrive of the light at hand where one ray decides for all of it.
+    of_light: Vec3,
 }
 
 impl<'a, 'l, 's, 'v> Arrivals<'a, 'l, 's, 'v> {
     fn new(light: &'a mut DirectLight<'l, 's>, vertex: &'a LitVertex<'v>, outlook: Outlook) -> Self {
         let first = light.shadows.len();
-        Self { light, vertex, outlook, first, total: 0.0 }
+        Self { light, vertex, outlook, first, total: 0.0, of_light: Vec3::ZERO }
     }
 
     /// As many samples of a light as the settings ask for.
@@ -127,16 +125,27 @@ impl<'a, 'l, 's, 'v> Arrivals<'a, 'l, 's, 'v> {
     fn arrive(&mut self, value: Vec3, samples: &LightSamples, i: usize) {
         let (contribution, slot) = (value * self.vertex.path.throughput, self.vertex.path.slot);
         self.total += value.x;
-        if self.outlook.hides(lane(&samples.directions, i)) {
-            return;
-        }
-        let can_be_stopped = self.light.shot.settings.render.shadows != Shadows::Off;
-        match self.light.sink.measure {
-            Measure::Radiance(_) if !can_be_stopped => self.light.sink.add_reflected(slot, contribution),
-            Measure::Radiance(_) | Measure::ArrivingShare => {
+        match self.light.shot.settings.render.shadows {
+            Shadows::Soft if self.outlook.hides(lane(&samples.directions, i)) => {}
+            Shadows::Soft => {
                 let ray = samples.ray(self.outlook.point, i);
                 self.light.shadows.push(ray, samples.source, Arrival { contribution, slot });
             }
+            Shadows::Hard | Shadows::Off => self.of_light += contribution,
+        }
+    }
+
+    /// No more of a light: what waits for one ray goes to its middle.
+    fn end(&mut self, light: &Light) {
+        let contribution = std::mem::take(&mut self.of_light);
+        if contribution != Vec3::ZERO {
+            let (middle, source) = light.middle();
+            if self.outlook.hides(middle - self.outlook.point) {
+                return;
+            }
+            let ray = Ray::segment(self.outlook.point, middle);
+            let slot = self.vertex.path.slot;
+            self.light.shadows.push(ray, source, Arrival { contribution, slot });
         }
     }
 

@@ -5,7 +5,7 @@ use crate::math::Vec3;
 use crate::world::World;
 
 /// A glass that a ray is in: the parts of one object may be of several.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Inside {
     /// The object.
     pub object: u32,
@@ -13,7 +13,8 @@ pub struct Inside {
     pub material: u32,
 }
 
-/// The glass around a ray, the innermost last. Glass nested deeper than the list is long forgets the outermost.
+/// The glass around a ray, in the order of the file, the last of which counts. Of more than the list is long the first are
+/// forgotten.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Medium {
     inside: [Inside; 4],
@@ -21,48 +22,61 @@ pub struct Medium {
 }
 
 impl Medium {
-    /// The innermost glass.
-    pub fn innermost(&self) -> Option<Inside> {
-        self.count.checked_sub(1).map(|last| self.inside[usize::from(last)])
+    fn known(&self) -> &[Inside] {
+        &self.inside[..usize::from(self.count)]
+    }
+
+    /// The glass that counts.
+    pub fn glass(&self) -> Option<Inside> {
+        self.known().last().copied()
     }
 
     /// After entering a glass.
     pub fn entered(mut self, glass: Inside) -> Self {
         if usize::from(self.count) == self.inside.len() {
+            if glass < self.inside[0] {
+                return self;
+            }
             self.inside.rotate_left(1);
             self.count -= 1;
         }
+        let place = self.known().partition_point(|own| *own <= glass);
         self.inside[usize::from(self.count)] = glass;
         self.count += 1;
+        self.inside[place..usize::from(self.count)].rotate_right(1);
         self
     }
 
     /// After leaving a glass; none where the ray was in none of that object, as far as it knows. A surface of several
-    /// glasses may be entered by one and left by another: then the object's innermost is left.
-    pub fn left(mut self, glass: Inside) -> Option<Self> {
-        let known = &self.inside[..usize::from(self.count)];
-        let same = known.iter().rposition(|&own| own == glass);
-        let place = same.or_else(|| known.iter().rposition(|own| own.object == glass.object))?;
+    /// glasses may be entered by one and left by another: then the object's last is left.
+    pub fn left(self, glass: Inside) -> Option<Self> {
+        let same = self.known().iter().rposition(|&own| own == glass);
+        same.or_else(|| self.known().iter().rposition(|own| own.object == glass.object))
+            .map(|place| self.without(place))
+    }
+
+    fn without(mut self, place: usize) -> Self {
         self.inside[place..usize::from(self.count)].rotate_left(1);
         self.count -= 1;
         self.inside[usize::from(self.count)] = Inside::default();
-        Some(self)
+        self
+    }
+
+    /// Without the glasses that do not hold.
+    pub fn retained(self, holds: impl Fn(Inside) -> bool) -> Self {
+        self.known().iter().copied().filter(|&glass| holds(glass)).fold(Self::default(), Self::entered)
     }
 }
 
-/// What glass leaves of radiance along a ray to its hit at `distance`: the innermost glass that it is in, or, for a ray that
-/// started inside without knowing, the glass whose back it hits.
-pub fn absorption(world: &World, medium: Medium, back_of: Option<&Glass>, distance: f32) -> Vec3 {
-    let glass = match medium.innermost() {
-        Some(inside) => glass_of(world, inside),
-        None => back_of,
-    };
+/// What glass leaves of radiance along a ray to its hit at `distance`.
+pub fn absorption(world: &World, medium: Medium, distance: f32) -> Vec3 {
+    let glass = medium.glass().and_then(|inside| glass_of(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
 /// Index of refraction of what a ray is in.
 pub fn ior(world: &World, medium: Medium) -> f32 {
-    medium.innermost().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
+    medium.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
 
 fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
@@ -78,21 +92,24 @@ mod tests {
     }
 
     #[test]
-    fn nested_and_overlapping_glass() {
+    fn of_nested_and_overlapping_glass_the_last_counts() {
         let (seven, nine) = (part(7, 0), part(9, 1));
         let air = Medium::default();
-        let in_both = air.entered(seven).entered(nine);
-        assert_eq!(in_both.innermost(), Some(nine));
-        assert_eq!(in_both.left(seven), Some(air.entered(nine)));
-        assert_eq!(in_both.left(nine), Some(air.entered(seven)));
-        assert_eq!(
-            in_both.left(nine).and_then(|one| one.left(seven)).and_then(|none| none.innermost()),
-            None
-        );
+        for in_both in [air.entered(seven).entered(nine), air.entered(nine).entered(seven)] {
+            assert_eq!(in_both.glass(), Some(nine));
+            assert_eq!(in_both.left(seven), Some(air.entered(nine)));
+            assert_eq!(in_both.left(nine), Some(air.entered(seven)));
+            assert_eq!(in_both.left(nine).and_then(|one| one.left(seven)), Some(air));
+        }
         assert_eq!(air.left(part(3, 0)), None);
-        let deep = (0..6).fold(air, |medium, object| medium.entered(part(object, 0)));
-        assert_eq!(deep.innermost(), Some(part(5, 0)));
-        assert_eq!(deep.left(part(0, 0)), None);
+        for deep in [
+            (0..6).fold(air, |medium, object| medium.entered(part(object, 0))),
+            (0..6).rev().fold(air, |medium, object| medium.entered(part(object, 0))),
+        ] {
+            assert_eq!(deep.glass(), Some(part(5, 0)));
+            assert_eq!(deep.left(part(0, 0)), None);
+            assert_eq!(deep.left(part(5, 0)).and_then(|medium| medium.glass()), Some(part(4, 0)));
+        }
     }
 
     #[test]
@@ -101,5 +118,16 @@ mod tests {
         assert_eq!(both.left(part(1, 0)), Some(Medium::default().entered(part(1, 5))));
         // Entered by material 0, left by material 2.
         assert_eq!(Medium::default().entered(part(1, 0)).left(part(1, 2)), Some(Medium::default()));
+        // Twice in one.
+        let twice = Medium::default().entered(part(1, 0)).entered(part(1, 0));
+        assert_eq!(twice.left(part(1, 0)), Some(Medium::default().entered(part(1, 0))));
+    }
+
+    #[test]
+    fn what_is_retained_keeps_its_order() {
+        let both = Medium::default().entered(part(3, 0)).entered(part(1, 5)).entered(part(2, 0));
+        let odd = Medium::default().entered(part(1, 5)).entered(part(3, 0));
+        assert_eq!(both.retained(|glass| glass.object != 2), odd);
+        assert_eq!(both.retained(|_| false), Medium::default());
     }
 }

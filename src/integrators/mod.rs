@@ -2,11 +2,12 @@
 //! the queue of the next bounces.
 //!
 //! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues`, their way to hits
-//! (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), the ways on at mirrors and glass
-//! (`specular`), `light` at a vertex, and the `sink` that takes what the view shows. Above them `whitted` and `views`.
+//! (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what touches it (`crossing`), the ways on at mirrors
+//! and glass (`specular`), `light` at a vertex, and the `sink` that takes what the view shows. Above them `whitted` and `views`.
 
 mod camera;
 mod counters;
+mod crossing;
 mod light;
 mod medium;
 mod queues;

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use super::crossing::CrossingMemory;
 use super::medium::Medium;
 use crate::geometry::Ray;
 use crate::lights::{LightSamples, Source};
@@ -92,6 +93,8 @@ pub struct Queues {
     pub samples: Vec<LightSamples>,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
+    /// What is near to a hit of glass.
+    pub crossing: CrossingMemory,
 }
 
 impl Queues {

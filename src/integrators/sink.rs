@@ -75,11 +75,6 @@ impl Sink<'_> {
         }
     }
 
-    /// What lamps send, where nothing can stop it.
-    pub fn add_reflected(&mut self, slot: u32, contribution: Vec3) {
-        self.radiance[slot as usize] += contribution;
-    }
-
     /// What a shadow ray brings.
     pub fn add_arrived(&mut self, slot: u32, contribution: Vec3) {
         self.arrived[slot as usize] += contribution;

@@ -1,9 +1,8 @@
 //! The ways on at mirrors and glass.
 
-use super::medium::ior;
+use super::medium::{Medium, ior};
 use super::queues::PathRay;
 use super::vertices::{Shading, Vertex};
-use crate::materials::Glass;
 use crate::materials::fresnel::{dielectric, refract};
 use crate::materials::mirror::reflect;
 use crate::math::Vec3;
@@ -37,30 +36,21 @@ pub struct Interface {
     pub refracted: Option<PathRay>,
 }
 
-/// A ray at the surface of a glass.
+/// A ray that goes from one medium to another; it is in the first.
 pub fn interface(
     world: &World,
     path: &PathRay,
     vertex: &Vertex<'_>,
     shading: &Shading,
-    glass: &Glass,
+    far: Medium,
 ) -> Interface {
-    let (near, far, medium) = if vertex.is_front {
-        (ior(world, path.medium), glass.ior, path.medium.entered(vertex.part))
-    } else {
-        match path.medium.left(vertex.part) {
-            Some(left) => (ior(world, path.medium), ior(world, left), left),
-            None => (glass.ior, ior(world, path.medium), path.medium),
-        }
-    };
-    let eta = far / near;
+    let eta = ior(world, far) / ior(world, path.medium);
     let (reflectance, direction) = boundary(vertex, shading, path.ray.direction, eta);
+    // What is carried is basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.leaving(direction),
-        // Radiance over the square of the index is what refraction conserves.
-        throughput: path.throughput / (eta * eta),
         path: path.next_path(REFRACTED),
-        medium,
+        medium: far,
         ..*path
     });
     Interface { reflectance, refracted }

@@ -26,7 +26,7 @@ impl Shot<'_> {
         Ok(())
     }
 
-    /// Give the sink what arrives by the shadow rays in a queue, in their order, and empty it; how many there were.
+    /// Give the sink what arrives by the shadow rays in a queue, in their order, and empty it; how many were traced.
     pub fn trace_shadows(&self, queue: &mut ShadowQueue, sink: &mut Sink<'_>) -> Result<u64, Cancelled> {
         let is_traced = self.settings.render.shadows != Shadows::Off;
         let ShadowQueue { rays, sources, arrivals } = &*queue;
@@ -43,7 +43,7 @@ impl Shot<'_> {
                 }
             }
         }
-        let count = queue.len() as u64;
+        let count = if is_traced { queue.len() as u64 } else { 0 };
         queue.clear();
         Ok(count)
     }

@@ -2,7 +2,6 @@
 //! and the BSDF.
 
 use super::RayCounters;
-use super::medium::Inside;
 use super::queues::PathRay;
 use super::shot::Shot;
 use crate::geometry::ray::offset_origin;
@@ -13,7 +12,7 @@ use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::lanes::{Lanes, Lanes3, dot, lane};
 use crate::scene::description::Shadows;
-use crate::world::Hit;
+use crate::world::{Hit, Sides};
 
 /// Where a path meets a surface.
 pub struct Vertex<'a> {
@@ -21,8 +20,8 @@ pub struct Vertex<'a> {
     pub surface: SurfacePoint,
     /// Its material.
     pub material: &'a Material,
-    /// The part of an object that it is, should that be glass.
-    pub part: Inside,
+    /// Where rays that leave start, should that be known better than by the error of the surface.
+    sides: Option<Sides>,
     /// Whether the path comes to the front.
     pub is_front: bool,
     /// Unit direction that the path comes from.
@@ -36,19 +35,33 @@ pub struct Vertex<'a> {
 impl<'a> Vertex<'a> {
     /// Where a ray hits.
     pub fn new(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
-        let surface = shot.world.geometry.surface(&path.ray, hit);
+        Self::met(shot, path, &path.ray, hit)
+    }
+
+    /// What touches the surface that a ray hits, as the way between the sides of both meets it.
+    pub fn touching(shot: &Shot<'a>, path: &PathRay, sides: Sides, hit: &Hit) -> Self {
+        Self { sides: Some(sides), ..Self::met(shot, path, &sides.ray(), hit) }
+    }
+
+    fn met(shot: &Shot<'a>, path: &PathRay, by: &Ray, hit: &Hit) -> Self {
+        let surface = shot.world.geometry.surface(by, hit);
         let index = shot.world.material_index(hit);
         let to_eye = -path.ray.direction;
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         Self {
             material: &shot.world.materials[index],
-            part: Inside { object: hit.object, material: index as u32 },
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             to_eye,
             normal: surface.normal * side,
             side,
             surface,
+            sides: None,
         }
+    }
+
+    /// The same, with rays that leave from these.
+    pub fn between(self, sides: Sides) -> Self {
+        Self { sides: Some(sides), ..self }
     }
 
     /// The interpolated normal, bent by a normal map, on the front side.
@@ -70,13 +83,21 @@ impl<'a> Vertex<'a> {
     /// A ray that starts here.
     pub fn leaving(&self, direction: Vec3) -> Ray {
         let SurfacePoint { point, error, normal, .. } = self.surface;
-        Ray::new(offset_origin(point, error, normal, direction), direction)
+        let origin = match self.sides {
+            Some(sides) if direction.dot(self.normal) < 0.0 => sides.beyond,
+            Some(sides) => sides.before,
+            None => offset_origin(point, error, normal, direction),
+        };
+        Ray::new(origin, direction)
     }
 
     /// Where light is looked for. A facet of a smooth mesh looks from a point above it, so that its neighbours do not shadow
     /// what the normals say is lit, if nothing is on the way there: what arrives at that point reaches the facet around no
     /// corner of a closed surface. Else it looks from the facet itself, and sees nothing behind that.
     pub fn outlook(&self, shot: &Shot<'_>) -> Outlook {
+        if let Some(sides) = self.sides {
+            return Outlook { point: sides.before, horizon: None };
+        }
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = shot.settings.render.shadows != Shadows::Off;

@@ -9,7 +9,7 @@ choice! {
         Beauty = "beauty",
         /// Shading normals, (n + 1)/2.
         Normal = "normal",
-        /// Distance along the view axis; near is bright.
+        /// Distance along the view axis, 0 where there is nothing; shown stretched to what is seen, near is bright.
         Depth = "depth",
         /// Barycentric coordinates: a red, b green, c blue.
         Barycentric = "barycentric",
@@ -23,6 +23,8 @@ choice! {
         Diffuse = "diffuse",
         /// Specular part of Phong.
         Specular = "specular",
+        /// What surfaces send out, and what is behind everything.
+        Emission = "emission",
         /// Fraction of the lights' radiance that arrives.
         Shadow = "shadow",
     }
@@ -37,6 +39,7 @@ impl View {
             Self::Ambient => of(Parts { ambient: true, ..Parts::NONE }),
             Self::Diffuse => of(Parts { diffuse: true, ..Parts::NONE }),
             Self::Specular => of(Parts { specular: true, ..Parts::NONE }),
+            Self::Emission => of(Parts { emitted: true, ..Parts::NONE }),
             Self::Shadow => Shown::Light(Measure::ArrivingShare),
             Self::Normal => Shown::FirstHit(FirstHit::Normal),
             Self::Depth => Shown::FirstHit(FirstHit::Depth),
@@ -52,7 +55,7 @@ impl View {
 pub enum Shown {
     /// A measure of light.
     Light(Measure),
-    /// A number about the first hit, to be displayed as it is: no exposure or tone curve applies.
+    /// A number about the first hit: no exposure or tone curve applies. But for distances it is displayed as it is.
     FirstHit(FirstHit),
 }
 

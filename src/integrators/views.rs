@@ -1,4 +1,4 @@
-//! Pictures of numbers at the first hit. Their values are meant as display values in [0, 1], not as radiance.
+//! Pictures of numbers at the first hit. But for distances their values are meant as display values in [0, 1], not as radiance.
 
 use super::queues::Queues;
 use super::shot::Shot;
@@ -23,7 +23,7 @@ pub fn shade(
         let surface = &vertex.surface;
         let value = match number {
             FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
-            FirstHit::Depth => Vec3::splat(nearness(shot, surface)),
+            FirstHit::Depth => Vec3::splat(distance(shot, surface)),
             FirstHit::Barycentric => surface.barycentric,
             FirstHit::Uv => fraction(surface.uv).as_vec2().extend(0.0),
             FirstHit::Albedo => vertex.material.bsdf.albedo(surface.uv, &mut counters.texture_lookups),
@@ -33,11 +33,9 @@ pub fn shade(
     Ok(())
 }
 
-/// 1 at the eye, ½ at the distance in focus, towards 0 far away.
-fn nearness(shot: &Shot<'_>, surface: &SurfacePoint) -> f32 {
-    let camera = &shot.world.camera;
-    let depth = camera.depth_of(surface.point.as_dvec3()).max(0.0);
-    (camera.focus / (camera.focus + depth)) as f32
+/// Distance along the view axis.
+fn distance(shot: &Shot<'_>, surface: &SurfacePoint) -> f32 {
+    shot.world.camera.depth_of(surface.point.as_dvec3()).max(0.0) as f32
 }
 
 fn fraction(uv: DVec2) -> DVec2 {

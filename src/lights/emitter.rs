@@ -7,8 +7,8 @@ use super::triangles::TriangleEmitter;
 use super::{LightSample, LightSamples, Met, Source};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
-use crate::math::Vec3;
 use crate::math::lanes::Lanes;
+use crate::math::{DVec3, Vec3};
 
 /// A shape that sends the same radiance everywhere from its front side.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,14 +99,13 @@ impl AreaLight {
         }
     }
 
-    /// All of it as if it came from the middle.
-    pub fn middle(&self, point: Vec3) -> Option<LightSample> {
-        let source = Source::Object(self.object);
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
         match &self.shape {
-            Emitter::Sphere(sphere) => sphere.middle(point, self.radiance, source),
-            Emitter::Quad(quad) => quad.middle(point, self.radiance, source),
-            Emitter::Triangles(triangles) => triangles.middle(point, self.radiance, self.object),
-            Emitter::Surface(surface) => surface.middle(point, self.radiance, self.object),
+            Emitter::Sphere(sphere) => sphere.center,
+            Emitter::Quad(quad) => quad.middle(),
+            Emitter::Triangles(triangles) => triangles.middle(),
+            Emitter::Surface(surface) => surface.middle(),
         }
     }
 }

@@ -151,11 +151,11 @@ impl Light {
         }
     }
 
-    /// The middle of the light with all that it sends, as if it came from there.
-    pub fn middle(&self, point: Vec3) -> Option<LightSample> {
+    /// The middle of the light, and what a ray to there need not hit: the light itself.
+    pub fn middle(&self) -> (Vec3, Source) {
         match self {
-            Self::Point(light) => light.sample(point),
-            Self::Area(light) => light.middle(point),
+            Self::Point(light) => (light.position.as_vec3(), Source::Nothing),
+            Self::Area(light) => (light.middle().as_vec3(), Source::Object(light.object)),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::{End, Ends, LightSample, LightSamples, Met, Source};
+use super::{Ends, LightSamples, Met, Source};
 use crate::math::lanes::{LANES, Lanes, Lanes3, dot, lane, map, sin_cos, zip};
 use crate::math::{DVec3, Vec3};
 
@@ -65,10 +65,9 @@ impl QuadEmitter {
         })
     }
 
-    /// All of it as if it came from the middle.
-    pub fn middle(&self, point: Vec3, radiance: Vec3, source: Source) -> Option<LightSample> {
-        let offset = (self.corner - point.as_dvec3()).as_vec3() + (self.u + self.v) * 0.5;
-        (offset.dot(self.normal) < 0.0).then(|| self.by_area(point, offset, radiance, source))
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.corner + ((self.u + self.v) * 0.5).as_dvec3()
     }
 
     /// [`Light::pdf`](super::Light::pdf).
@@ -78,13 +77,6 @@ impl QuadEmitter {
             Some(spherical) => 1.0 / spherical.solid_angle,
             None => met.pdf_by_area(f64::from(self.area)),
         }
-    }
-
-    fn by_area(&self, point: Vec3, offset: Vec3, radiance: Vec3, source: Source) -> LightSample {
-        let distance_squared = offset.length_squared();
-        let direction = offset / distance_squared.sqrt();
-        let solid_angle = self.area * -direction.dot(self.normal) / distance_squared;
-        LightSample { end: End::At(point + offset), direction, weight: radiance * solid_angle, source }
     }
 }
 

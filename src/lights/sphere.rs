@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::{End, Ends, LightSample, LightSamples, Source};
+use super::{Ends, LightSamples, Source};
 use crate::math::frame::Frame;
 use crate::math::lanes::{LANES, Lanes, map, zip};
 use crate::math::{DVec3, Vec3};
@@ -22,17 +22,6 @@ impl SphereEmitter {
     pub fn seen_from(&self, point: Vec3) -> Option<SeenSphere> {
         let (axis, distance, sin2_max) = self.cone(point)?;
         Some(SeenSphere { point, frame: Frame::from_normal(axis), distance, sin2_max })
-    }
-
-    /// As from the centre: πR²/d² is what a whole visible sphere gives a surface that faces it.
-    pub fn middle(&self, point: Vec3, radiance: Vec3, source: Source) -> Option<LightSample> {
-        let (direction, _, sin2_max) = self.cone(point)?;
-        Some(LightSample {
-            end: End::At(self.center.as_vec3()),
-            direction,
-            weight: radiance * (PI * sin2_max),
-            source,
-        })
     }
 
     /// [`Light::pdf`](super::Light::pdf): the same in all directions that meet it.

@@ -46,19 +46,9 @@ impl SurfaceEmitter {
         self.by_area.total()
     }
 
-    /// As if all came from the middle: what the shape shows to the point.
-    pub fn middle(&self, point: Vec3, radiance: Vec3, object: u32) -> Option<LightSample> {
-        let (from, middle) = (point.as_dvec3(), self.shape.middle());
-        let offset = middle - from;
-        let distance_squared = offset.length_squared();
-        let direction = offset / distance_squared.sqrt();
-        let shown = self.shape.shown(-direction);
-        (!self.shape.contains(from) && shown > 0.0).then(|| LightSample {
-            end: End::At(middle.as_vec3()),
-            direction: direction.as_vec3(),
-            weight: radiance * (shown / distance_squared) as f32,
-            source: Source::Object(object),
-        })
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.shape.middle()
     }
 }
 

@@ -59,20 +59,8 @@ impl TriangleEmitter {
         })
     }
 
-    /// As if all came from the centre of area: of the flat part what it shows to the point, of the rest a quarter, which
-    /// is the mean projection of a convex body (Cauchy).
-    pub fn middle(&self, point: Vec3, radiance: Vec3, object: u32) -> Option<LightSample> {
-        let offset = self.center - point.as_dvec3();
-        let distance_squared = offset.length_squared();
-        let direction = offset / distance_squared.sqrt();
-        let flat = (-self.vector_area.dot(direction)).max(0.0);
-        let round = (self.by_area.total() - self.vector_area.length()).max(0.0) / 4.0;
-        let seen = flat + if round > 1e-9 * self.by_area.total() { round } else { 0.0 };
-        (seen > 0.0).then(|| LightSample {
-            end: End::At(self.center.as_vec3()),
-            direction: direction.as_vec3(),
-            weight: radiance * (seen / distance_squared) as f32,
-            source: Source::Object(object),
-        })
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.center
     }
 }

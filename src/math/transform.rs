@@ -43,6 +43,12 @@ impl Transform {
         self.linear * v
     }
 
+    /// Bounds on the components of directions to the outside, from those inside.
+    pub fn reach(&self, reach: DVec3) -> DVec3 {
+        let DMat3 { x_axis, y_axis, z_axis } = self.linear;
+        x_axis.abs() * reach.x + y_axis.abs() * reach.y + z_axis.abs() * reach.z
+    }
+
     /// A normal to the outside, by the inverse transpose; not normalised.
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.inverse_linear.transpose() * n

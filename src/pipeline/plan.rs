@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::settings::{Effective, Overrides, View};
 use super::targets::NamedBy;
 use crate::film::Rect;
-use crate::film::tone::ToneMapping;
-use crate::integrators::{Measure, RenderSettings, Shown};
+use crate::film::tone::{Distances, ToneMapping};
+use crate::integrators::{FirstHit, Measure, RenderSettings, Shown};
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -123,7 +123,12 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
         Shown::Light(Measure::Radiance(_)) => {
             ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
         }
-        Shown::FirstHit(_) => ToneMapping::DATA,
+        Shown::FirstHit(FirstHit::Depth) => {
+            ToneMapping { distances: Distances::Unknown, ..ToneMapping::DATA }
+        }
+        Shown::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
+            ToneMapping::DATA
+        }
         // It is linear, but no exposure makes it more than it is.
         Shown::Light(Measure::ArrivingShare) => ToneMapping::default(),
     }

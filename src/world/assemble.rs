@@ -12,7 +12,8 @@ impl World {
     pub fn new(scene: &Scene, parts: &Parts, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
         let (materials, object_materials) = lower_materials(scene, parts);
         let camera = Camera::new(&scene.camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
-        Self { camera, geometry, materials, object_materials, lights }
+        let world = Self { camera, geometry, materials, object_materials, lights, glass_at_eye: Vec::new() };
+        Self { glass_at_eye: world.find_glass_at_eye(), ..world }
     }
 }
 

@@ -30,6 +30,8 @@ pub struct Geometry {
     tree: Bvh,
     /// Objects that are not in the tree.
     unbounded: Vec<u32>,
+    /// What the triangles of any mesh may be off, and room for the tests of rays there.
+    mesh_rounding: f32,
     instructions: Instructions,
 }
 
@@ -58,7 +60,9 @@ impl Geometry {
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
         let (tree, instructions) = (Bvh::build(&boxes, token)?, Instructions::best());
-        Ok(Self { objects, origin: DVec3::ZERO, tree, unbounded, instructions })
+        let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
+        let mesh_rounding = rounding.fold(0.0, f32::max);
+        Ok(Self { objects, origin: DVec3::ZERO, tree, unbounded, mesh_rounding, instructions })
     }
 
     /// The objects, known by their index.
@@ -79,6 +83,11 @@ impl Geometry {
     /// The objects that have none.
     pub(super) fn unbounded(&self) -> &[u32] {
         &self.unbounded
+    }
+
+    /// What the triangles of any mesh may be off, and room for the tests of rays there.
+    pub(super) fn mesh_rounding(&self) -> f32 {
+        self.mesh_rounding
     }
 
     /// The same, with packets traced by other instructions.

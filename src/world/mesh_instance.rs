@@ -78,11 +78,8 @@ impl MeshInstance {
     }
 
     /// Rounding of the point, of the next ray's origin in the mesh's coordinates, and of what it is computed from.
-    fn error(&self, point: Vec3, local: DVec3) -> Vec3 {
-        let linear = self.transform.linear;
-        let reach = linear.x_axis.abs() * local.x.abs()
-            + linear.y_axis.abs() * local.y.abs()
-            + linear.z_axis.abs() * local.z.abs();
+    pub(super) fn error(&self, point: Vec3, local: DVec3) -> Vec3 {
+        let reach = self.transform.reach(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.transform.translation.abs().as_vec3();
         parts * (2.0 * f32::EPSILON) + Vec3::splat(f32::MIN_POSITIVE)
     }

@@ -102,6 +102,14 @@ impl MeshTree {
         }
     }
 
+    /// Visit every triangle that has a point in a box, and maybe others near it; some maybe more than once.
+    pub fn meeting(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
+        match &self.tree {
+            Tree::Boxes(tree) => tree.meeting(bounds, visit),
+            Tree::Planes(tree) => tree.meeting(bounds, visit),
+        }
+    }
+
     /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays up to their ends.
     pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
         match &self.tree {

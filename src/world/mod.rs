@@ -2,6 +2,7 @@
 
 mod assemble;
 pub mod camera;
+pub mod contact;
 mod emitters;
 pub mod geometry;
 mod lower;
@@ -17,6 +18,7 @@ use std::sync::Arc;
 
 pub use crate::accel::{Loops, PACKET};
 pub use camera::Camera;
+pub use contact::{Meeting, Near, NearTriangles, Sides};
 pub use emitters::lights;
 pub use geometry::{Geometry, Hit};
 pub use lower::file_emission;
@@ -55,6 +57,8 @@ pub struct World {
     object_materials: Vec<ObjectMaterial>,
     /// Lights of every kind.
     pub lights: Arc<Lights>,
+    /// The closed shapes of glass that the lens may be in, with their materials.
+    glass_at_eye: Vec<(u32, u32)>,
 }
 
 /// How an object finds its material.

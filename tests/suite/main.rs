@@ -15,3 +15,4 @@ mod once;
 mod options;
 mod output;
 mod terminal;
+mod views;

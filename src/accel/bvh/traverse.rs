@@ -1,8 +1,8 @@
 //! Ordered traversal for the closest hit, and for any.
 
 use super::{Bvh, Child, DEEP_STACK, SHALLOW_STACK};
-use crate::geometry::Ray;
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
+use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
     /// Visit the leaves that the ray may meet, near ones first. `test(id, t_max)` tests one primitive and returns the new end of
@@ -85,6 +85,28 @@ impl Bvh {
         }
     }
 
+    /// Visit every box that has a point in common with another one.
+    pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
+        let mut stack = [Child::NONE; DEEP_STACK];
+        let mut size = usize::from(!self.nodes.is_empty());
+        while size > 0 {
+            size -= 1;
+            let current = stack[size];
+            if current.count > 0 {
+                let places = current.first as usize..(current.first + current.count) as usize;
+                self.order[places].iter().for_each(|&id| visit(id));
+                continue;
+            }
+            let node = &self.nodes[current.first as usize];
+            for side in 0..2 {
+                if node.bounds[side].meets(other) {
+                    stack[size] = node.child[side];
+                    size += 1;
+                }
+            }
+        }
+    }
+
     #[inline]
     fn any_within<const STACK_SIZE: usize>(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
         let slabs = SlabRay::new(ray.origin, ray.direction);
@@ -120,7 +142,6 @@ impl Bvh {
 mod tests {
     use super::*;
     use crate::control::CancelToken;
-    use crate::geometry::Aabb;
     use crate::math::Vec3;
 
     /// Boxes as shapes: the hit is where the ray enters.
@@ -162,6 +183,18 @@ mod tests {
                 slabs.enter(boxes[id as usize].min, boxes[id as usize].max, ray.t_max).is_some()
             });
             assert_eq!(any, best.is_some());
+        }
+        for center in boxes.iter().map(|own| own.min + Vec3::splat(0.25)) {
+            let other = Aabb { min: center, max: center }.grown(Vec3::new(0.1, 0.8, 0.5));
+            let mut found = vec![0; boxes.len()];
+            tree.meeting(&other, |id| found[id as usize] += 1);
+            assert!(
+                found
+                    .iter()
+                    .zip(&boxes)
+                    .all(|(&times, own)| times <= 1 && (!own.meets(&other) || times == 1))
+            );
+            assert!(found.iter().sum::<i32>() < 100, "{found:?}");
         }
     }
 

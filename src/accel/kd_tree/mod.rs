@@ -68,6 +68,32 @@ impl KdTree {
         visits
     }
 
+    /// Visit every triangle that has a point in a box, and maybe others near it; one in several leaves maybe more than once.
+    pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
+        let mut pending = [0_u32; traverse::STACK_SIZE];
+        let mut size = usize::from(!self.nodes.is_empty() && self.bounds.meets(other));
+        while size > 0 {
+            size -= 1;
+            let mut place = pending[size];
+            loop {
+                match self.nodes[place as usize].kind() {
+                    Kind::Leaf { first, count } => {
+                        let own = &self.references[first as usize..][..count as usize];
+                        own.iter().for_each(|&own| visit(self.triangles[own as usize].id));
+                        break;
+                    }
+                    Kind::Inner { axis, at, right } if other.min[axis] > at => place = right,
+                    Kind::Inner { axis, at, .. } if other.max[axis] < at => place += 1,
+                    Kind::Inner { right, .. } => {
+                        pending[size] = right;
+                        size += 1;
+                        place += 1;
+                    }
+                }
+            }
+        }
+    }
+
     /// Every node with its cell, parents first.
     fn walk(&self, mut visit: impl FnMut(Aabb, Kind)) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(0_u32, self.bounds)] };

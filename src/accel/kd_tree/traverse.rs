@@ -13,7 +13,7 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 const PAD: f32 = 32.0 * f32::EPSILON;
 
 /// Deepest stack: the depth limit for as many triangles as there are numbers, and one more.
-const STACK_SIZE: usize = 64;
+pub(super) const STACK_SIZE: usize = 64;
 
 /// A ray made ready for planes, in steps of a direction whose greatest component is between 1 and 2.
 struct PlaneRay {

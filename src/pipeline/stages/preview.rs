@@ -56,7 +56,7 @@ impl Screen<'_> {
     fn say(&self, canvas: &Canvas) {
         if let Some(previewer) = &canvas.previewer {
             let image = previewer.picture(canvas.base.as_ref());
-            self.sink.preview(develop(&image, &self.plan.tone));
+            self.sink.preview(develop(&image, &self.plan.tone.of_picture(&image)));
         }
     }
 }

@@ -173,7 +173,7 @@ fn write_one(
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let options = EncodeOptions {
-        tone: plan.tone,
+        tone: plan.tone.of_picture(image),
         bit_depth: BitDepth::try_from(plan.bit_depth)?,
         metadata: metadata(canvas, plan),
     };

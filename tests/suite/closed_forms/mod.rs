@@ -5,6 +5,7 @@ mod direct;
 mod facets;
 mod far;
 mod glass;
+mod hard;
 mod mirror;
 mod robust;
 mod round;
@@ -13,6 +14,7 @@ mod round_properties;
 mod scenes;
 mod shading;
 mod speckle;
+mod touching;
 
 use glimt::math::DVec3;
 

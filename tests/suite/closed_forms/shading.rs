@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use glimt::choice::Choice;
 use glimt::integrators::View;
 use glimt::materials::Bsdf;
 use glimt::math::{DVec3, Vec2, Vec3};
@@ -9,7 +10,7 @@ use glimt::scene::description::{
     ColorSource, Falloff, Material, MaterialKind, Mesh, Shadows, Shape, TextureFilter, Wrap,
 };
 
-use super::scenes::{Build, emitter, lat_long_sphere, matte, phong, scene};
+use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{assert_close, v};
 
 /// A square of a material at the origin, facing up, under a light of E = 3·cos 20° from 20° beside the normal, seen from
@@ -210,5 +211,43 @@ fn facets_do_not_show_at_the_edge_of_the_light() {
             seen += 1;
         }
         assert!(seen > 500);
+    }
+}
+
+#[test]
+fn the_parts_of_every_pixel_add_up_through_mirrors_and_glass_too() {
+    let build = scene()
+        .quad(v(-5.0, -1.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -20.0), phong(0.5, 0.4, 20.0, 0.0))
+        .sphere(v(-1.2, 0.0, -6.0), 1.0, mirror(0.9))
+        .sphere(v(1.2, 0.0, -6.0), 1.0, glass(1.5))
+        .cuboid(v(0.0, -0.75, -4.0), v(0.6, 0.5, 0.6), DVec3::ZERO, glass(1.5))
+        .quad(v(-1.0, 3.0, -7.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(4.0))
+        .point_light(v(3.0, 4.0, 0.0), 20.0, Falloff::Square)
+        .background(0.3)
+        .with(|scene| scene.render.ambient = Vec3::new(0.2, 0.1, 0.3))
+        .pictured(v(0.0, 1.0, 1.0), v(0.0, 0.0, -6.0), 40.0, 24, 16);
+    let picture = |name: &str| {
+        let view = View::named(name).unwrap_or_else(|| panic!("there is no view {name}"));
+        build.clone().viewed(view).picture(8, 3)
+    };
+    let parts = ["ambient", "diffuse", "specular", "emission"].map(picture);
+    for (pixel, beauty) in picture("beauty").into_iter().enumerate() {
+        let sum: DVec3 = parts.iter().map(|part| part[pixel]).sum();
+        let off = (sum - beauty).abs().max_element();
+        assert!(off <= 1e-5 * beauty.max_element().max(1.0), "{pixel}: {sum} {beauty}");
+    }
+    for (part, name) in parts.iter().zip(["ambient", "diffuse", "specular", "emission"]) {
+        assert!(part.iter().any(|color| color.max_element() > 0.01), "{name} has something to show");
+    }
+    // Through the mirror and the glass, too, each is what it is there.
+    let through = |at: DVec3, name: &str| {
+        let view = View::named(name).unwrap_or_else(|| panic!("there is no view {name}"));
+        build.clone().seen(v(0.0, 1.0, 1.0), at).viewed(view).value()
+    };
+    for (below, above) in [(v(-1.2, -0.5, -6.0), v(-1.2, 0.7, -6.0)), (v(1.2, 0.4, -6.0), v(1.2, -0.7, -6.0))]
+    {
+        for (name, at) in [("ambient", below), ("diffuse", below), ("emission", above)] {
+            assert!(through(at, name) > 0.0, "{name} at {at}");
+        }
     }
 }

@@ -1,0 +1,82 @@
+//! What a ray crosses where it meets glass: all surfaces that touch there at once, and with them from one medium to another.
+
+use super::medium::{Inside, Medium};
+use super::queues::PathRay;
+use super::shot::Shot;
+use super::vertices::Vertex;
+use crate::world::{Hit, Meeting, Near, NearTriangles, Sides};
+
+/// What a ray crosses at a hit of glass.
+pub struct Crossing {
+    /// Where rays that leave start.
+    pub sides: Sides,
+    /// The glass on the side that the ray comes from.
+    pub near: Medium,
+    /// The glass on the other side.
+    pub far: Medium,
+    /// A surface there that nothing passes, as the ray between the sides meets it.
+    pub opaque: Option<Hit>,
+}
+
+/// Memory for what is near.
+#[derive(Default)]
+pub struct CrossingMemory {
+    triangles: NearTriangles,
+    near: Vec<Near>,
+}
+
+impl Shot<'_> {
+    /// What a ray crosses at a hit of glass.
+    pub fn crossing(
+        &self,
+        path: &PathRay,
+        vertex: &Vertex<'_>,
+        distance: f32,
+        memory: &mut CrossingMemory,
+    ) -> Crossing {
+        let CrossingMemory { triangles, near: found } = memory;
+        found.clear();
+        let lead = distance * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
+        let meeting = Meeting { surface: vertex.surface, normal: vertex.normal, lead };
+        let sides = self.world.contact(&meeting, triangles, |near| found.push(near));
+        let (near, far) = self.media(path.medium, found);
+        let opaque = found.iter().filter_map(|near| self.opaque(near));
+        let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
+        Crossing { sides, near, far, opaque }
+    }
+
+    /// The media before and beyond what is near. Before it is what the ray knows; of closed shapes, beyond it is what is there. A
+    /// ray that leaves another one was in it, whatever it knows.
+    fn media(&self, known: Medium, found: &[Near]) -> (Medium, Medium) {
+        let mut near = known;
+        let mut far = known.retained(|glass| !self.world.is_closed(glass.object));
+        let crossed = |as_front: bool| {
+            found.iter().filter_map(move |thing| match *thing {
+                Near::Surface { hit, material, is_front } if is_front == as_front => {
+                    let glass = Inside { object: hit.object, material };
+                    self.world.is_glass(material).then_some(glass)
+                }
+                Near::Surface { .. } | Near::Around { .. } => None,
+            })
+        };
+        let around = found.iter().filter_map(|thing| match *thing {
+            Near::Around { object, material } => Some(Inside { object, material }),
+            Near::Surface { .. } => None,
+        });
+        for glass in crossed(false) {
+            match far.left(glass) {
+                Some(left) => far = left,
+                None => near = near.entered(glass),
+            }
+        }
+        let far = crossed(true).chain(around).fold(far, Medium::entered);
+        (near, far)
+    }
+
+    fn opaque(&self, thing: &Near) -> Option<Hit> {
+        match *thing {
+            Near::Around { .. } => None,
+            Near::Surface { hit, material, .. } => (!self.world.is_glass(material)).then_some(hit),
+        }
+    }
+}

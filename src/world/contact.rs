@@ -1,0 +1,255 @@
+//! What lies so near to a point of a surface that no ray can tell which of them comes first.
+//!
+//! Surfaces that touch are where they are but for rounding. A ray that meets one of them meets all that are within the error
+//! of the hit: they are crossed together, on the way from a point that is certainly before all of them to one that is
+//! certainly beyond. Rays that leave start at these two, so that none is missed and none is met again.
+
+use super::{Geometry, Hit, MeshInstance, Object, World};
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint};
+use crate::math::{DVec3, Vec3};
+
+/// The points on both sides of surfaces that touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sides {
+    /// On the side that a ray comes from.
+    pub before: Vec3,
+    /// On the other side.
+    pub beyond: Vec3,
+}
+
+impl Sides {
+    /// The way from one to the other; t = 1 is its end.
+    pub fn ray(&self) -> Ray {
+        Ray { origin: self.before, direction: self.beyond - self.before, t_max: 1.0 }
+    }
+}
+
+/// A thing at or between the two points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Near {
+    /// A shape of glass that encloses the point beyond.
+    Around {
+        /// Its object.
+        object: u32,
+        /// Its material.
+        material: u32,
+    },
+    /// Any other surface, as the ray between the points meets it.
+    Surface {
+        /// Where.
+        hit: Hit,
+        /// Its material.
+        material: u32,
+        /// Whether its front is on the side of the point before.
+        is_front: bool,
+    },
+}
+
+/// Objects and triangles of them that may be near.
+pub type NearTriangles = Vec<(u32, u32)>;
+
+/// What is asked of a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// A point of one of the surfaces.
+    pub surface: SurfacePoint,
+    /// Its normal on the side that a ray comes from.
+    pub normal: Vec3,
+    /// By how much others may be before it and were not found to be: the rounding of the ray's t along the normal.
+    pub lead: f32,
+}
+
+/// The points before and beyond, and the one before without the lead.
+#[derive(Clone, Copy)]
+struct Probe {
+    sides: Sides,
+    close: Vec3,
+}
+
+impl Probe {
+    /// A part of the way that is a little more than that to the close point.
+    fn lead_end(&self) -> f32 {
+        let way = self.sides.ray().direction;
+        (self.close - self.sides.before).dot(way) / way.length_squared()
+    }
+}
+
+impl World {
+    /// The sides of all surfaces that touch at a point, and what is there, in an order that depends on the scene alone.
+    /// `triangles` is memory.
+    pub fn contact(&self, at: &Meeting, triangles: &mut NearTriangles, mut visit: impl FnMut(Near)) -> Sides {
+        let geometry = &self.geometry;
+        let (point, normal) = (at.surface.point, at.normal);
+        let error = geometry.near_triangles(at, triangles);
+        let sides = Sides {
+            before: offset_origin(point, error + normal.abs() * at.lead, normal, normal),
+            beyond: offset_origin(point, error, normal, -normal),
+        };
+        let probe = Probe { sides, close: offset_origin(point, error, normal, normal) };
+        let lead_end = probe.lead_end();
+        let mut is_led = false;
+        let mut found = |near: Near| {
+            is_led |= match near {
+                Near::Around { .. } => false,
+                Near::Surface { hit, .. } => hit.shape.t <= lead_end,
+            };
+            visit(near);
+        };
+        let mut closed_lead = false;
+        geometry.near_objects(at, |id, object| {
+            if let Object::Shape(shape) = object {
+                closed_lead |=
+                    shape.encloses(sides.before.as_dvec3()) != shape.encloses(probe.close.as_dvec3());
+                self.near_shape(shape, id, &sides).into_iter().for_each(&mut found);
+            }
+        });
+        let ends = [sides.before, sides.beyond].map(|end| end.as_dvec3());
+        for &(object, triangle) in &*triangles {
+            let mesh = geometry.objects()[object as usize].mesh();
+            if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.crossed(triangle, ends)) {
+                let hit = Hit { shape, object };
+                found(Near::Surface { hit, material: self.material_index(&hit) as u32, is_front });
+            }
+        }
+        if is_led || closed_lead { sides } else { Sides { before: probe.close, ..sides } }
+    }
+
+    fn near_shape(&self, shape: &Shape, object: u32, sides: &Sides) -> Option<Near> {
+        let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
+        if let (true, Some(is_around)) = (self.is_glass(material), shape.encloses(sides.beyond.as_dvec3())) {
+            return is_around.then_some(Near::Around { object, material });
+        }
+        let ray = sides.ray().to_f64();
+        let own = shape.intersect(&ray)?;
+        let is_front = shape.surface(&ray, &own).normal.as_dvec3().dot(ray.direction) < 0.0;
+        Some(Near::Surface { hit: Hit { shape: own, object }, material, is_front })
+    }
+
+    /// Whether a material is glass.
+    pub fn is_glass(&self, material: u32) -> bool {
+        self.materials[material as usize].bsdf.glass().is_some()
+    }
+
+    /// Whether an object says itself where its inside is; where glass is around any other one, the rays must remember.
+    pub fn is_closed(&self, object: u32) -> bool {
+        match &self.geometry.objects()[object as usize] {
+            Object::Shape(shape) => shape.encloses(DVec3::ZERO).is_some(),
+            Object::Mesh(_) => false,
+        }
+    }
+
+    /// The closed shapes of glass around a point at the eye, by their objects and materials.
+    pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
+        let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
+            Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
+            Object::Mesh(_) => false,
+        };
+        self.glass_at_eye.iter().copied().filter(is_inside)
+    }
+
+    /// The closed shapes of glass that the lens may be in, by their objects and materials.
+    pub(super) fn find_glass_at_eye(&self) -> Vec<(u32, u32)> {
+        let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
+        let lens = Aabb { min: eye, max: eye }.grown(lens + eye.abs() * f32::EPSILON);
+        let objects = (0_u32..).zip(self.geometry.objects());
+        let near = objects.filter_map(|(id, object)| {
+            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
+            let is_near = object.bounds().is_none_or(|bounds| bounds.meets(&lens));
+            (is_near && self.is_closed(id) && self.is_glass(material)).then_some((id, material))
+        });
+        near.collect()
+    }
+}
+
+impl Geometry {
+    /// How much farther than the error of a point what touches it is looked for.
+    const REACH: f32 = 16.0;
+
+    /// Visit the objects whose boxes are near to a point.
+    fn near_objects(&self, at: &Meeting, mut visit: impl FnMut(u32, &Object)) {
+        for &id in self.unbounded() {
+            visit(id, &self.objects()[id as usize]);
+        }
+        self.tree().meeting(&self.near_box(at), |id| visit(id, &self.objects()[id as usize]));
+    }
+
+    fn near_box(&self, at: &Meeting) -> Aabb {
+        let SurfacePoint { point, error, .. } = at.surface;
+        let margin = (error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead));
+        Aabb { min: point, max: point }.grown(margin)
+    }
+
+    /// Collect the triangles of meshes that may touch a point; a bound on each component's distance to what touches it.
+    fn near_triangles(&self, at: &Meeting, triangles: &mut NearTriangles) -> Vec3 {
+        triangles.clear();
+        let mut error = at.surface.error;
+        let near = self.near_box(at);
+        self.near_objects(at, |id, object| {
+            let Object::Mesh(mesh) = object else { return };
+            mesh.tree.meeting(&mesh.local_box(&near), |triangle| {
+                if Aabb::around_f64(mesh.world_corners(triangle)).meets(&near) {
+                    triangles.push((id, triangle));
+                    error = error.max(mesh.touch_error(triangle, at.surface.point));
+                }
+            });
+        });
+        // Some are visited more than once.
+        triangles.sort_unstable();
+        triangles.dedup();
+        error
+    }
+}
+
+impl MeshInstance {
+    /// A box of the world in the mesh's coordinates.
+    fn local_box(&self, bounds: &Aabb) -> Aabb {
+        let corner = |i: usize| {
+            let pick = |axis: usize| if i & (1 << axis) == 0 { bounds.min[axis] } else { bounds.max[axis] };
+            self.transform.inverse_point(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
+        };
+        Aabb::around_f64((0..8).map(corner))
+    }
+
+    /// What a triangle near a point may be off: its corners by their rounding in the file, and the tests of rays there.
+    fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
+        let corners = self.tree.loaded().mesh.corners(triangle);
+        let reach = corners.iter().fold(Vec3::ZERO, |reach, corner| reach.max(corner.abs()));
+        let of_tests = self.error(point, self.transform.inverse_point(point.as_dvec3()));
+        of_tests + self.transform.reach(reach.as_dvec3()).as_vec3() * f32::EPSILON
+    }
+
+    /// More than any triangle near it may be off.
+    pub(super) fn rounding(&self) -> f32 {
+        let local = self.tree.bounds();
+        if local.is_empty() {
+            return 0.0;
+        }
+        let reach = self.transform.reach(local.min.abs().max(local.max.abs()).as_dvec3());
+        (reach + self.transform.translation.abs()).max_element() as f32 * (16.0 * f32::EPSILON)
+    }
+
+    /// Where a triangle is crossed on the way from one point to another, and whether from its front; decided in `f64`. Of
+    /// triangles that share an edge one is crossed there.
+    fn crossed(&self, triangle: u32, [from, to]: [DVec3; 2]) -> Option<(ShapeHit, bool)> {
+        let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
+        let normal = (b - a).cross(c - a);
+        let (start, end) = (normal.dot(from - a), normal.dot(to - a));
+        if (start > 0.0) == (end > 0.0) {
+            return None;
+        }
+        let direction = to - from;
+        let facing = if start > 0.0 { -1.0 } else { 1.0 };
+        // The part of the triangle beyond an edge; its corner's weight but for a factor.
+        let beyond = |p: DVec3, q: DVec3| {
+            let weight = facing * direction.dot((p - from).cross(q - from));
+            let is_own = (p.to_array() < q.to_array()) == (facing > 0.0);
+            (weight > 0.0 || weight == 0.0 && is_own).then_some(weight)
+        };
+        let (wa, wb, wc) = (beyond(b, c)?, beyond(c, a)?, beyond(a, b)?);
+        let sum = wa + wb + wc;
+        let (t, u, v) = (start / (start - end), wb / sum, wc / sum);
+        let hit = ShapeHit { t: t as f32, primitive: triangle, u: u as f32, v: v as f32 };
+        (sum > 0.0).then_some((hit, (start > 0.0) != self.transform.mirrors()))
+    }
+}

@@ -1,0 +1,81 @@
+//! Hard shadows: one ray to the middle decides; what arrives is what arrives without shadows and with soft ones.
+
+use glimt::math::DVec3;
+use glimt::scene::description::{Falloff, Shadows, Shape};
+
+use super::glass::boxes;
+use super::scenes::{AS_IT_IS, Build, emitter, matte, receiver, scene};
+use super::{mean_and_error, v};
+
+/// Every kind of light above a receiver, at a height and of a size.
+fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
+    let at = v(0.0, height, 0.0);
+    let lit = |shape: Shape| receiver(DVec3::ZERO, 0.8).shape(shape, emitter(3.0));
+    let x = v(size, 0.0, 0.0);
+    let mut all = vec![
+        ("point", receiver(DVec3::ZERO, 0.8).point_light(at + x * 0.2, 5.0, Falloff::Square)),
+        ("sphere", lit(Shape::Sphere { center: at, radius: size })),
+        (
+            "quad",
+            lit(Shape::Quad { corner: at - v(size, 0.0, size), u: x * 2.0, v: v(0.0, 0.0, 2.0 * size) }),
+        ),
+        ("box", lit(Shape::Box { center: at, size: v(size, size, 2.0 * size), rotate: v(10.0, 30.0, 0.0) })),
+        ("triangle", lit(Shape::Triangle { a: at, b: at + x, c: at + v(0.0, 0.0, size) })),
+        ("disk", lit(Shape::Disk { center: at, normal: v(0.2, -1.0, 0.0), radius: size })),
+        ("cylinder", lit(Shape::Cylinder { a: at - x, b: at + x, radius: 0.5 * size, caps: true })),
+        ("cone", lit(Shape::Cone { base: at, tip: at - v(0.0, size, 0.0), radius: size, cap: true })),
+        ("torus", lit(Shape::Torus { center: at, axis: DVec3::Y, radius: size, tube: 0.3 * size })),
+    ];
+    let cube = receiver(DVec3::ZERO, 0.8).mesh(boxes(&[(at, size, 0)]), AS_IT_IS, emitter(3.0));
+    all.push(("mesh", cube));
+    all
+}
+
+#[test]
+fn unoccluded_light_is_the_same_with_any_shadows() {
+    // Also at a tenth of the lamp's size from it.
+    for (height, size) in [(2.0, 0.5), (1.2, 1.0), (10.0, 0.3)] {
+        for (name, build) in lights(height, size) {
+            let values = |shadows: Shadows| build.clone().shadows(shadows, 4).values(256, 16);
+            let [off, hard, soft] = [Shadows::Off, Shadows::Hard, Shadows::Soft].map(values);
+            assert!(off[0] > 0.0, "{name}");
+            assert_eq!(off, hard, "{name} at {height}");
+            let ((mean, error), (soft, soft_error)) = (mean_and_error(&off), mean_and_error(&soft));
+            let allowed = 4.0 * error.hypot(soft_error) + 1e-5 * mean;
+            assert!(
+                (mean - soft).abs() <= allowed,
+                "{name} at {height}: {mean} ± {error}, soft {soft} ± {soft_error}"
+            );
+        }
+    }
+}
+
+#[test]
+fn close_to_a_lamp_hard_shadows_leave_its_light() {
+    // A square of side 1 a tenth above: E/L = 3.042128 by the closed form of a parallel rectangle.
+    let corner = v(-0.5, 0.1, -0.5);
+    let lamp = receiver(DVec3::ZERO, 0.8).quad(corner, v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(1.0));
+    let values = lamp.shadows(Shadows::Hard, 16).values(256, 16);
+    let (mean, error) = mean_and_error(&values);
+    let exact = 3.042_128 * 0.8 / std::f64::consts::PI;
+    assert!((mean - exact).abs() < 4.0 * error + 1e-4 * exact, "{mean} ± {error} is not {exact}");
+}
+
+#[test]
+fn the_ray_to_the_middle_decides() {
+    let lamp = |build: Build| {
+        build
+            .quad(v(-1.0, 2.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(1.0))
+            .shadows(Shadows::Hard, 4)
+    };
+    let free = lamp(receiver(DVec3::ZERO, 0.8)).value();
+    let blocked = |x: f64| {
+        let screen = v(x, 1.0, -0.2);
+        lamp(receiver(DVec3::ZERO, 0.8).quad(screen, v(0.4, 0.0, 0.0), v(0.0, 0.0, 0.4), matte(0.0))).value()
+    };
+    assert!(free > 0.0);
+    // Over the middle, and beside it, where soft shadows would have a part of it.
+    assert_eq!(blocked(-0.2), 0.0);
+    assert_eq!(blocked(0.05), free);
+    assert_eq!(scene().value(), 0.0);
+}

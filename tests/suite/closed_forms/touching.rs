@@ -1,0 +1,432 @@
+//! Glass that touches or overlaps glass, and opaque things: both surfaces count, in any order of the file, at any angle.
+
+use glimt::materials::Glass;
+use glimt::math::transform::rotation_xyz;
+use glimt::math::{DMat3, DVec3, Vec3};
+use glimt::scene::description::{MaterialKind, Shape};
+
+use super::glass::boxes;
+use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, plain, scene};
+use super::{Random, assert_close, mean_and_error, v};
+
+/// Unpolarised reflectance between indices `n` and `m` of a ray whose sine in air is `sine`, by Fresnel's amplitudes.
+fn fresnel(n: f64, m: f64, sine: f64) -> f64 {
+    let cosine = |n: f64| (1.0 - (sine / n).powi(2)).sqrt();
+    let (a, b) = (cosine(n), cosine(m));
+    let across = (n * a - m * b) / (n * a + m * b);
+    let along = (m * a - n * b) / (m * a + n * b);
+    0.5 * (across * across + along * along)
+}
+
+/// What is reflected and what passes of a stack of layers in air, by adding one surface after another: between what is there and
+/// the next, light goes to and fro in a geometric series.
+fn layers(indices: &[f64], sine: f64) -> (f64, f64) {
+    let media: Vec<f64> = [1.0].iter().chain(indices).chain(&[1.0]).copied().collect();
+    // Of what is there: reflected from above, reflected from below, passed.
+    let (mut above, mut below, mut passed) = (0.0, 0.0, 1.0);
+    for pair in media.windows(2) {
+        let r = fresnel(pair[0], pair[1], sine);
+        let series = 1.0 / (1.0 - below * r);
+        above += passed * passed * r * series;
+        below = r + (1.0 - r).powi(2) * below * series;
+        passed *= (1.0 - r) * series;
+    }
+    (above, passed)
+}
+
+#[test]
+fn the_layers_of_known_value() {
+    // A slab: (1 − R)/(1 + R); n = 1.5 and 2: 1/T − 1 is the sum of R/(1 − R), 1/24 + 1/48 + 1/8.
+    let (r, t) = layers(&[1.5], 0.0);
+    assert_close("passed", t, 0.96 / 1.04);
+    assert_close("reflected", r, 0.08 / 1.04);
+    assert_close("two", layers(&[1.5, 2.0], 0.0).1, 1.0 / (1.0 + 1.0 / 24.0 + 1.0 / 48.0 + 1.0 / 8.0));
+    assert_close("45°", layers(&[1.5], 0.5_f64.sqrt()).1, 0.904_326_79);
+}
+
+/// A scene that is turned as a whole.
+#[derive(Clone, Copy)]
+struct Turned {
+    degrees: DVec3,
+    axes: DMat3,
+}
+
+impl Turned {
+    fn by(degrees: DVec3) -> Self {
+        Self { degrees, axes: rotation_xyz(degrees) }
+    }
+
+    fn any(random: &mut Random) -> Self {
+        Self::by(v(random.signed(), random.signed(), random.signed()) * 180.0)
+    }
+
+    /// A box between two corners.
+    fn cuboid(&self, low: DVec3, high: DVec3) -> Shape {
+        let center = self.axes * ((low + high) * 0.5);
+        Shape::Box { center, size: high - low, rotate: self.degrees }
+    }
+
+    /// A square in y = `height` around the axis; the front is above.
+    fn square(&self, height: f64, half: f64) -> Shape {
+        let [corner, u, v] = [v(-half, height, half), v(2.0 * half, 0.0, 0.0), v(0.0, 0.0, -2.0 * half)];
+        Shape::Quad { corner: self.axes * corner, u: self.axes * u, v: self.axes * v }
+    }
+
+    fn seen(&self, build: Build, from: DVec3, at: DVec3) -> Build {
+        build.seen(self.axes * from, self.axes * at)
+    }
+}
+
+/// Within a part of the right value, by the mean over seeds.
+#[track_caller]
+fn assert_within(what: &str, build: &Build, samples: u32, exact: f64, part: f64) {
+    let (mean, error) = mean_and_error(&build.values(samples, 16));
+    assert!(error <= 0.4 * part * exact, "{what}: {mean} ± {error} is too noisy");
+    assert!((mean - exact).abs() <= part * exact, "{what}: {mean} ± {error} is not {exact}");
+}
+
+/// Layers of glass, the first on top below y = 0, in the order of the file that `order` says.
+fn stack(turned: &Turned, layers: &[(f64, f64)], order: &[usize], half: f64) -> Build {
+    let mut tops = vec![0.0];
+    for (_, thickness) in layers {
+        tops.push(tops[tops.len() - 1] - thickness);
+    }
+    order.iter().fold(scene(), |build, &i| {
+        let shape = turned.cuboid(v(-half, tops[i + 1], -half), v(half, tops[i], half));
+        build.shape(shape, glass(layers[i].0 as f32))
+    })
+}
+
+#[test]
+fn two_boxes_that_share_a_face() {
+    let level = Turned::by(DVec3::ZERO);
+    let exact = layers(&[1.5, 2.0], 0.0).1;
+    for order in [[0, 1], [1, 0]] {
+        let both = stack(&level, &[(1.5, 1.0), (2.0, 1.0)], &order, 500.0).depth(200);
+        let both = both.seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2));
+        let white = both.clone().background(1.0);
+        assert_within(&format!("{order:?}, white all around"), &white, 16, 1.0, 1e-3);
+        let lamp = both.shape(level.square(-3.0, 5000.0), emitter(1.0));
+        assert_within(&format!("{order:?}, over a lamp"), &lamp, 512, exact, 2e-3);
+    }
+}
+
+#[test]
+fn gaps_and_overlaps_down_to_rounding() {
+    // A gap has two more surfaces, of glass and air; an overlap is of the later one.
+    let level = Turned::by(DVec3::ZERO);
+    let touching = layers(&[1.5, 2.0], 0.0).1;
+    let apart = layers(&[1.5, 1.0, 2.0], 0.0).1;
+    for gap in [1e-3, 1e-5, 1e-6, 0.0, -1e-8, -1e-7, -1e-6, -1e-3] {
+        for later in [0, 1] {
+            let top = level.cuboid(v(-500.0, 0.0, -500.0), v(500.0, 1.0, 500.0));
+            let bottom = level.cuboid(v(-500.0, -1.0, -500.0), v(500.0, -gap, 500.0));
+            let (one, other) = ((top, glass(1.5)), (bottom, glass(2.0)));
+            let order = if later == 0 { [other, one] } else { [one, other] };
+            let both = order.into_iter().fold(scene(), |build, (shape, glass)| build.shape(shape, glass));
+            let both = both.shape(level.square(-3.0, 5000.0), emitter(1.0)).depth(200);
+            let both = both.seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2));
+            let exact = if gap > 0.0 { apart } else { touching };
+            assert_within(&format!("gap {gap}, {later} later"), &both, 512, exact, 2e-3);
+        }
+    }
+    // Nearer than rounding is either of both.
+    for gap in [1e-7, 3e-8] {
+        let top = level.cuboid(v(-500.0, 0.0, -500.0), v(500.0, 1.0, 500.0));
+        let bottom = level.cuboid(v(-500.0, -1.0, -500.0), v(500.0, -gap, 500.0));
+        let both = scene().shape(top, glass(1.5)).shape(bottom, glass(2.0)).depth(200);
+        let both = both.shape(level.square(-3.0, 5000.0), emitter(1.0));
+        let (mean, _) = mean_and_error(&both.seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2)).values(512, 16));
+        let off = |exact: f64| (mean - exact).abs() / exact;
+        assert!(off(touching).min(off(apart)) < 2e-3, "gap {gap}: {mean} is not {touching} or {apart}");
+    }
+}
+
+#[test]
+fn random_stacks_of_boxes_that_share_faces() {
+    let mut random = Random(2026);
+    for round in 0..40 {
+        let turned = if round % 8 == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let count = 2 + (random.unit() * 5.0) as usize;
+        let own: Vec<(f64, f64)> =
+            (0..count).map(|_| (1.0 + 1.5 * random.unit(), 0.1 + random.unit())).collect();
+        let mut order: Vec<usize> = (0..count).collect();
+        for i in 0..count {
+            order.swap(i, i + (random.unit() * (count - i) as f64) as usize);
+        }
+        let angle = (85.0 * random.unit()).to_radians();
+        let bottom = -own.iter().map(|layer| layer.1).sum::<f64>();
+        let lamp = turned.square(bottom - 0.5, 5000.0);
+        let build = stack(&turned, &own, &order, 300.0).shape(lamp, emitter(1.0)).depth(400);
+        let at = v(random.signed(), 0.0, random.signed());
+        let build = turned.seen(build, at + v(angle.sin(), angle.cos(), 0.0) * 3.0, at);
+        // The indices as single precision has them.
+        let indices: Vec<f64> = own.iter().map(|layer| f64::from(layer.0 as f32)).collect();
+        let (_, exact) = layers(&indices, angle.sin());
+        let what = format!("round {round}: {own:?} in the order {order:?} at {}°", angle.to_degrees());
+        assert_within(&what, &build, 512, exact, 2e-3);
+    }
+}
+
+#[test]
+fn a_drink_in_a_glass() {
+    let mut random = Random(7);
+    for round in 0..6 {
+        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let bar = |low: f64, high: f64, radius: f64| Shape::Cylinder {
+            a: turned.axes * v(0.0, low, 0.0),
+            b: turned.axes * v(0.0, high, 0.0),
+            radius,
+            caps: true,
+        };
+        // A full glass: the drink shares the upper face; from above air to 1.33, 1.33 to 1.5, 1.5 to air.
+        let full = scene().shape(bar(0.0, 2.0, 1.0), glass(1.5)).shape(bar(0.2, 2.0, 0.9), glass(1.33));
+        let full = full.shape(turned.square(-1.0, 5000.0), emitter(1.0)).depth(200);
+        let n = f64::from(1.33_f32);
+        let what = format!("full, round {round}");
+        let seen = turned.seen(full, v(0.05, 4.0, 0.02), v(0.05, 0.0, 0.02));
+        assert_within(&what, &seen, 512, layers(&[n, 1.5], 0.0).1, 2e-3);
+        // A hollow glass, its inside given as air, filled to the wall: through the axis from the side.
+        let half = scene()
+            .shape(bar(0.0, 2.0, 1.0), glass(1.5))
+            .shape(bar(0.2, 2.0, 0.9), glass(1.0))
+            .shape(bar(0.2, 1.0, 0.9), glass(1.33));
+        let corner = turned.axes * v(50.0, -50.0, -50.0);
+        let (up, across) = (turned.axes * v(0.0, 100.0, 0.0), turned.axes * v(0.0, 0.0, 100.0));
+        let half = half.shape(Shape::Quad { corner, u: across, v: up }, emitter(1.0)).depth(200);
+        let side = turned.seen(half.clone(), v(-4.0, 0.6, 0.0), v(0.0, 0.6, 0.0));
+        assert_within(&format!("side, round {round}"), &side, 512, layers(&[1.5, n, 1.5], 0.0).1, 2e-3);
+        // Above the drink there is air.
+        let above = turned.seen(half, v(-4.0, 1.5, 0.0), v(0.0, 1.5, 0.0));
+        assert_within(&format!("above, round {round}"), &above, 512, layers(&[1.5, 1.0, 1.5], 0.0).1, 2e-3);
+    }
+}
+
+#[test]
+fn the_same_ball_twice_and_a_ball_that_fills_a_box() {
+    let lamp = |build: Build| {
+        build.quad(v(-5e3, -3.0, 5e3), v(1e4, 0.0, 0.0), v(0.0, 0.0, -1e4), emitter(1.0)).depth(200)
+    };
+    let through = |build: Build| lamp(build).seen(v(0.0, 4.0, 0.0), DVec3::ZERO);
+    let center = v(0.0, 0.1, 0.0);
+    for (one, other) in [(1.5, 1.5), (2.0, 1.5), (1.3, 1.5)] {
+        // Coincident: the later counts.
+        let twice = scene().sphere(center, 1.0, glass(one)).sphere(center, 1.0, glass(other));
+        assert_within(&format!("{one} and {other}"), &through(twice), 512, layers(&[1.5], 0.0).1, 2e-3);
+        let boxes = scene().cuboid(center, v(2.0, 3.0, 4.0), DVec3::ZERO, glass(one)).cuboid(
+            center,
+            v(2.0, 3.0, 4.0),
+            DVec3::ZERO,
+            glass(other),
+        );
+        assert_within(&format!("boxes {one}, {other}"), &through(boxes), 512, layers(&[1.5], 0.0).1, 2e-3);
+    }
+    // The ball touches the box from inside where the axis passes: above and below there is the ball alone.
+    let inside =
+        scene().cuboid(center, DVec3::splat(2.0), DVec3::ZERO, glass(1.5)).sphere(center, 1.0, glass(2.0));
+    assert_within("ball in a box", &through(inside), 512, layers(&[2.0], 0.0).1, 2e-3);
+    // A ball on a table of glass, through the point of contact.
+    let table = scene().cuboid(v(0.0, -1.5, 0.0), v(20.0, 1.0, 20.0), DVec3::ZERO, glass(1.5));
+    let on_table = table.sphere(DVec3::ZERO, 1.0, glass(2.0));
+    assert_within("on a table", &through(on_table), 512, layers(&[2.0, 1.5], 0.0).1, 2e-3);
+}
+
+#[test]
+fn meshes_touch_boxes_and_their_own_parts() {
+    let mut random = Random(11);
+    for round in 0..12 {
+        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        // Aimed beside the diagonal of the faces.
+        let eye = v(0.13, 3.0, -0.08) + v(0.1, 0.0, 0.05) * random.signed();
+        let at = eye - v(0.0, 3.0, 0.0);
+        let lamp = |build: Build| build.shape(turned.square(-5.0, 5000.0), emitter(1.0)).depth(200);
+        let mesh = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0)]);
+        let placed = [DVec3::ONE, turned.degrees, DVec3::ZERO];
+        let below = turned.cuboid(v(-0.7, -2.0, -0.7), v(0.7, -1.0, 0.7));
+        for later in [false, true] {
+            let own = |build: Build| build.mesh(mesh.clone(), placed, glass(1.5));
+            let other = |build: Build| build.shape(below.clone(), glass(2.0));
+            let both = if later { own(other(scene())) } else { other(own(scene())) };
+            let seen = turned.seen(lamp(both), eye, at);
+            let what = format!("mesh on a box, round {round}, {later}");
+            assert_within(&what, &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
+        }
+        // Two parts of one mesh of other glass, that share a face of other triangles.
+        let parts = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 1)]);
+        let turn = |mut mesh: glimt::geometry::mesh::TriangleMesh| {
+            for p in &mut mesh.positions {
+                *p = (turned.axes * p.as_dvec3()).as_vec3();
+            }
+            mesh
+        };
+        let parts = scene().own_mesh(turn(parts), vec![file_material(9, 1.5), file_material(9, 2.0)]);
+        let seen = turned.seen(lamp(parts), eye, at);
+        assert_within(&format!("parts, round {round}"), &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
+        // Of the same glass there is no surface between them.
+        let same = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 0)]);
+        let same = scene().mesh(turn(same), AS_IT_IS, glass(1.5));
+        let seen = turned.seen(lamp(same), eye, at);
+        assert_within(&format!("one glass, round {round}"), &seen, 512, layers(&[1.5], 0.0).1, 2e-3);
+    }
+}
+
+#[test]
+fn glass_that_stands_on_something_opaque() {
+    let mut random = Random(5);
+    let r = fresnel(1.0, 1.5, 0.0);
+    for round in 0..12 {
+        let turned = if round < 2 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let block = (turned.cuboid(v(-1.0, 0.0, -1.0), v(1.0, 1.0, 1.0)), glass(1.5));
+        let stood = |floor: glimt::scene::description::Material, first: bool| {
+            let floor = (turned.square(0.0, 50.0), floor);
+            let order = if first { [floor, block.clone()] } else { [block.clone(), floor] };
+            let build = order.into_iter().fold(scene(), |build, (shape, own)| build.shape(shape, own));
+            turned.seen(build.depth(200), v(0.2, 4.0, 0.1), v(0.2, 0.0, 0.1))
+        };
+        for first in [false, true] {
+            let what = |of: &str| format!("{of}, round {round}, floor first: {first}");
+            // What the floor sends passes the upper face alone; what that turns back the floor takes.
+            assert_within(&what("lamp"), &stood(emitter(1.0), first), 16, 1.0 - r, 1e-4);
+            // r + (1 − r)²·m·Σ(m·r)ᵏ.
+            let mirrored = stood(mirror(0.5), first).background(1.0);
+            let exact = r + (1.0 - r).powi(2) * 0.5 / (1.0 - 0.5 * r);
+            assert_within(&what("mirror"), &mirrored, 512, exact, 2e-3);
+            assert_within(&what("lossless"), &stood(mirror(1.0), first).background(1.0), 512, 1.0, 1e-3);
+            // A lamp hangs at the ceiling: what is seen from below is the floor's back and no glass.
+            let below = turned.seen(stood(emitter(1.0), first), v(0.2, -4.0, 0.1), v(0.2, 0.0, 0.1));
+            assert_eq!(below.background(1.0).value(), 0.0, "{}", what("from below"));
+        }
+    }
+}
+
+#[test]
+fn tints_count_where_their_glass_is() {
+    // Straight down through 1 of one tint and 2 of another, of one index: no surface between them reflects.
+    let tinted = |tint: f32| plain(MaterialKind::Glass { ior: 1.5, tint: Vec3::splat(tint) });
+    let level = Turned::by(DVec3::ZERO);
+    let r = fresnel(1.0, 1.5, 0.0);
+    for first in [false, true] {
+        let top = (level.cuboid(v(-9.0, 0.0, -9.0), v(9.0, 1.0, 9.0)), tinted(0.5));
+        let bottom = (level.cuboid(v(-9.0, -2.0, -9.0), v(9.0, 0.0, 9.0)), tinted(0.8));
+        let order = if first { [top, bottom] } else { [bottom, top] };
+        let build = order.into_iter().fold(scene(), |build, (shape, own)| build.shape(shape, own));
+        let build = build.shape(level.square(-3.0, 5000.0), emitter(1.0)).depth(3);
+        let seen = build.seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2));
+        let passed = f64::from(Glass { ior: 1.5, tint: Vec3::splat(0.8) }.transmittance(2.0).x) * 0.5;
+        assert_close("straight through", seen.value(), (1.0 - r).powi(2) * passed);
+    }
+}
+
+#[test]
+fn where_glasses_overlap_the_later_counts() {
+    // From y = 2 to 0 and from 1 to −1: between 1 and 0 the later one.
+    let level = Turned::by(DVec3::ZERO);
+    let tinted = |ior: f32, tint: f32| plain(MaterialKind::Glass { ior, tint: Vec3::splat(tint) });
+    for (order, exact) in [([0, 1], 0.5 * 0.8 * 0.8), ([1, 0], 0.5 * 0.5 * 0.8)] {
+        let own = [
+            (level.cuboid(v(-9.0, 0.0, -9.0), v(9.0, 2.0, 9.0)), tinted(1.0, 0.5)),
+            (level.cuboid(v(-9.0, -1.0, -9.0), v(9.0, 1.0, 9.0)), tinted(1.0, 0.8)),
+        ];
+        let own = order.map(|i: usize| own[i].clone());
+        let build = own.into_iter().fold(scene(), |build, (shape, own)| build.shape(shape, own));
+        let build = build.shape(level.square(-3.0, 5000.0), emitter(1.0)).depth(4);
+        assert_close("overlap", build.seen(v(0.3, 3.0, 0.2), v(0.3, 0.0, 0.2)).value(), exact);
+    }
+    let mut random = Random(3);
+    for round in 0..10 {
+        let turned = Turned::any(&mut random);
+        let boxes = [
+            (turned.cuboid(v(-90.0, 0.0, -90.0), v(90.0, 2.0, 90.0)), 1.4),
+            (turned.cuboid(v(-90.0, -1.0, -90.0), v(90.0, 1.0, 90.0)), 1.9),
+        ];
+        let order = if round % 2 == 0 { [0, 1] } else { [1, 0] };
+        let build = order
+            .into_iter()
+            .fold(scene(), |build, i: usize| build.shape(boxes[i].0.clone(), glass(boxes[i].1)));
+        let build = build.shape(turned.square(-3.0, 5000.0), emitter(1.0)).depth(200);
+        let angle = (70.0 * random.unit()).to_radians();
+        let seen = turned.seen(build, v(angle.sin(), angle.cos(), 0.0) * 5.0, DVec3::ZERO);
+        let (a, b) = (f64::from(1.4_f32), f64::from(1.9_f32));
+        assert_within(&format!("round {round}"), &seen, 512, layers(&[a, b], angle.sin()).1, 2e-3);
+    }
+}
+
+#[test]
+fn an_eye_in_glass_knows_where_it_is() {
+    let level = Turned::by(DVec3::ZERO);
+    let r = fresnel(1.5, 2.0, 0.0);
+    for first in [false, true] {
+        let top = (level.cuboid(v(-500.0, 0.0, -500.0), v(500.0, 1.0, 500.0)), glass(1.5));
+        let bottom = (level.cuboid(v(-500.0, -1.0, -500.0), v(500.0, 0.0, 500.0)), glass(2.0));
+        let order = if first { [top, bottom] } else { [bottom, top] };
+        let build = order.into_iter().fold(scene(), |build, (shape, own)| build.shape(shape, own));
+        let build = build.shape(level.square(-3.0, 5000.0), emitter(1.0)).depth(2);
+        let seen = build.seen(v(0.3, 0.5, 0.2), v(0.3, 0.0, 0.2));
+        assert_close("within", seen.value(), (1.0 - r) * (1.0 - fresnel(2.0, 1.0, 0.0)));
+    }
+}
+
+#[test]
+fn a_white_furnace_of_glass_in_and_on_glass() {
+    let mut random = Random(99);
+    for round in 0..6 {
+        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let mut things = vec![
+            turned.cuboid(v(-1.0, -1.0, -1.0), v(1.0, 0.0, 1.0)),
+            turned.cuboid(v(-1.0, 0.0, -1.0), v(0.0, 1.0, 1.0)),
+            turned.cuboid(v(0.0, 0.0, -1.0), v(1.0, 1.0, 0.5)),
+            turned.cuboid(v(-0.5, -0.5, -1.0), v(0.5, 0.5, 1.0)),
+            turned.cuboid(v(-1.0, -1.0, 1.0), v(1.0, 1.0, 1.3)),
+            Shape::Sphere { center: turned.axes * v(0.0, 1.5, 0.0), radius: 0.5 },
+            Shape::Sphere { center: turned.axes * v(0.0, 1.5, 0.0), radius: 0.5 },
+            Shape::Cylinder {
+                a: turned.axes * v(0.0, -1.0, 0.0),
+                b: turned.axes * v(0.0, 1.0, 0.0),
+                radius: 0.4,
+                caps: true,
+            },
+        ];
+        for i in 0..things.len() {
+            let other = i + (random.unit() * (things.len() - i) as f64) as usize;
+            things.swap(i, other);
+        }
+        let build = things
+            .into_iter()
+            .fold(scene(), |build, shape| build.shape(shape, glass((1.0 + 1.4 * random.unit()) as f32)));
+        let seen = build.background(1.0).depth(3000);
+        for (i, &pixel) in seen
+            .pictured(turned.axes * v(1.0, 3.0, 6.0), DVec3::ZERO, 40.0, 12, 9)
+            .picture(16, 1)
+            .iter()
+            .enumerate()
+        {
+            assert!((pixel.x - 1.0).abs() < 0.03, "round {round}, pixel {i}: {pixel}");
+        }
+    }
+}
+
+#[test]
+fn ambient_light_in_glass_and_under_it() {
+    // Lossless glass on a white floor under ambient light 1, white all around: all that is seen is 1, in glass and out of it.
+    let mut random = Random(17);
+    for round in 0..6 {
+        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let build = scene()
+            .shape(turned.square(0.0, 50.0), matte(1.0))
+            .shape(turned.cuboid(v(-1.0, 0.0, -1.0), v(1.0, 1.0, 1.0)), glass(1.5))
+            .shape(turned.cuboid(v(-1.0, 1.0, -1.0), v(1.0, 1.5, 1.0)), glass(2.0))
+            .shape(Shape::Sphere { center: turned.axes * v(0.0, 0.5, 0.0), radius: 0.2 }, matte(1.0))
+            .with(|scene| scene.render.ambient = Vec3::ONE)
+            .background(1.0)
+            .depth(1000);
+        for (from, at) in [
+            (v(0.3, 5.0, 0.2), v(0.3, 0.0, 0.2)),
+            (v(3.0, 2.0, 1.0), v(0.0, 0.5, 0.0)),
+            (v(0.9, 0.5, 0.6), v(0.0, 0.5, 0.0)),
+            (v(0.9, 0.5, 0.6), v(0.5, 0.0, 0.0)),
+        ] {
+            let (mean, error) = mean_and_error(&turned.seen(build.clone(), from, at).values(16, 16));
+            assert!((mean - 1.0).abs() < 1e-3, "round {round}, from {from} at {at}: {mean} ± {error}");
+        }
+    }
+}
