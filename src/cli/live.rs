@@ -88,7 +88,18 @@ impl Writes {
                 let lines = conflicts.iter().map(|conflict| format!("error: {}", conflict.message));
                 self.lines().extend(lines);
             }
-            _ => {}
+            Event::Started { .. }
+            | Event::Stage { .. }
+            | Event::Asset { .. }
+            | Event::Settings { .. }
+            | Event::Warnings { .. }
+            | Event::Progress { .. }
+            | Event::Preview { .. }
+            | Event::WritePostponed { .. }
+            | Event::Files { .. }
+            | Event::Done { .. }
+            | Event::Failed { .. }
+            | Event::Cancelled { .. } => {}
         }
     }
 
@@ -112,10 +123,11 @@ fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: im
         if !is_heard {
             continue;
         }
-        match &mut event {
-            Event::Files { files, .. } => watcher.set_files(files.clone()),
-            Event::Failed { failure: Failure::Scene(all), .. } => all.iter_mut().for_each(await_scene),
-            _ => {}
+        if let Event::Files { files, .. } = &event {
+            watcher.set_files(files.clone());
+        }
+        if let Event::Failed { failure: Failure::Scene(all), .. } = &mut event {
+            all.iter_mut().for_each(await_scene);
         }
         is_heard = forward(event);
     }

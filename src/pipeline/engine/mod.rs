@@ -1,6 +1,10 @@
 //! One request from the scene file to pictures on disk: the stages in their order, and all that is kept between
 //! requests.
 
+mod outputs;
+#[cfg(test)]
+mod tests;
+
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,8 +15,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::cache::{Memo, Pool};
 use super::inputs::Inputs;
 use super::plan::{Plan, cores, plan};
-use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
-use super::report::{Finished, report, write_report};
+use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
+use super::report::{Finished, report};
 use super::settings::Overrides;
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel, needed};
@@ -24,7 +28,7 @@ use super::stages::preview::Screen;
 use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::world::{Keyed, world};
-use super::stages::write::{Destination, Written, check_targets, write_by_hand, write_if_wanted};
+use super::stages::write::{Destination, Written, check_targets, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
 use super::table::StageTable;
 use super::targets::{NamedBy, conflicts};
@@ -157,34 +161,6 @@ impl Engine {
         });
     }
 
-    /// Whether there is a picture without holes.
-    pub(super) fn can_write(&self) -> bool {
-        self.films.current().is_some_and(Canvas::is_covered)
-    }
-
-    /// Write the picture as it is, outside of a request.
-    pub(super) fn write_now(&mut self, sink: &Sink) {
-        let (Some(canvas), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
-            return sink.write_failed("there is no picture yet".to_owned());
-        };
-        if !canvas.is_covered() {
-            let message = "nothing is written: the render was stopped before every pixel had a sample";
-            return sink.write_failed(message.to_owned());
-        }
-        if self.is_broken
-            && let Some(path) = self.written.not_ours(&plan.outputs, &self.contents)
-        {
-            let path = path.display();
-            return sink.write_failed(format!(
-                "nothing is written: the scene has errors and may name {path}, which was not written by this run; mend \
-                 the scene first"
-            ));
-        }
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
-        let written = &mut self.written;
-        pool.install(|| write_by_hand(canvas, to, written));
-    }
-
     /// Show the picture as it is at another size, outside of a request.
     pub(super) fn show_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
         if let (Some(canvas), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
@@ -270,41 +246,6 @@ impl Engine {
         Ok(Ready { parsed, plan, world, texels_loaded })
     }
 
-    /// Whether a file that is to be written must not be. Where that need not end the request, it is said, and the
-    /// findings have it.
-    ///
-    /// # Errors
-    /// All conflicts, where the picture must be written.
-    fn look_for_conflicts(
-        &self,
-        request: &Request,
-        plan: &Plan,
-        findings: &mut Findings,
-        sink: &Sink,
-    ) -> Result<(), Stop> {
-        let found = conflicts(plan, &self.inputs);
-        if found.is_empty() {
-            findings.conflicts = found;
-            return Ok(());
-        }
-        if request.write == Writing::Must {
-            findings.errors.extend(found);
-            return Err(Stop::Failed(findings.take_failure()));
-        }
-        if found != findings.conflicts {
-            sink.refused(found.clone());
-        }
-        findings.conflicts = found;
-        Ok(())
-    }
-
-    fn write_report(&self, report: &Report, findings: &Findings, sink: &Sink) {
-        let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
-        if let Err(error) = write_report(plan, &self.inputs, report) {
-            sink.write_failed(error.to_string());
-        }
-    }
-
     /// All files that the scene names; every one is tried before the first error ends it.
     fn load(
         &mut self,
@@ -369,25 +310,6 @@ impl Engine {
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
         render(key, &mut self.films, &rendering)
-    }
-
-    /// Whether the picture is on disk then.
-    fn write(
-        &mut self,
-        request: &Request,
-        plan: &Plan,
-        findings: &Findings,
-        sink: &Sink,
-        token: &CancelToken,
-    ) -> Result<Staged<bool>, Stop> {
-        if let Some(conflict) = findings.conflicts.first() {
-            return Ok(Staged::skipped(false, conflict.message.clone()));
-        }
-        let pool = self.pool(plan.threads)?;
-        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
-        let written = &mut self.written;
-        pool.install(|| write_if_wanted(request.write, canvas, to, written, token))
     }
 
     /// The pool of this many threads; kept while the number stays.
@@ -468,133 +390,4 @@ fn inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
     inputs.add_meshes(&parsed.loaded, meshes);
     inputs.add_read(&findings.files);
     inputs
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-    use std::sync::mpsc;
-
-    use super::*;
-    use crate::pipeline::protocol::{PreviewSlot, Writing};
-    use crate::pipeline::tests::{OBJ, SCENE};
-    use crate::world::{Geometry, MeshTree};
-
-    /// Nobody orders anything.
-    struct Silence;
-
-    impl Orders for Silence {
-        fn wants_write(&self) -> bool {
-            false
-        }
-
-        fn take_write(&self) -> bool {
-            false
-        }
-
-        fn take_preview(&self) -> Option<Option<PreviewSize>> {
-            None
-        }
-    }
-
-    /// What was made for a request.
-    struct Made {
-        geometry: Arc<Geometry>,
-        mesh: Arc<MeshTree>,
-        lights: Arc<Lights>,
-        world: Arc<World>,
-    }
-
-    /// The same scene again and again with edits.
-    struct Desk {
-        folder: tempfile::TempDir,
-        engine: Engine,
-        text: String,
-    }
-
-    impl Desk {
-        fn new(text: &str) -> Self {
-            let folder = tempfile::tempdir().expect("a scratch folder");
-            fs::write(folder.path().join("one.obj"), OBJ).expect("written");
-            fs::write(folder.path().join("skin.ppm"), "P6\n1 1\n255\nabc").expect("written");
-            Self { folder, engine: Engine::new(Means::default(), Arc::default()), text: text.to_owned() }
-        }
-
-        fn request(&mut self) -> Made {
-            let scene = self.folder.path().join("scene.toml");
-            fs::write(&scene, &self.text).expect("written");
-            let (events, received) = mpsc::channel();
-            let sink = Sink { generation: 1, events, previews: PreviewSlot::default() };
-            let request = Request {
-                generation: 1,
-                scene,
-                overrides: Default::default(),
-                preview: None,
-                write: Writing::No,
-                force: false,
-            };
-            let token = CancelToken::new();
-            self.engine.request(&request, &sink, &Meanwhile { token: &token, orders: &Silence });
-            let events: Vec<_> = received.try_iter().collect();
-            assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
-            let geometry = self.engine.accel.latest().expect("it was built").clone();
-            let mesh = geometry.objects()[1].mesh().expect("the mesh comes second").tree.clone();
-            let lights = self.engine.lights.latest().expect("they were gathered").clone();
-            Made { geometry, mesh, lights, world: self.engine.world.latest().expect("it was made").clone() }
-        }
-
-        /// Which of geometry, mesh, lights and world an edit leaves as they are, not equal but the same.
-        fn kept(&mut self, from: &str, to: &str) -> [bool; 4] {
-            let before = self.request();
-            assert!(self.text.contains(from), "{from}");
-            self.text = self.text.replace(from, to);
-            let after = self.request();
-            assert!(Arc::ptr_eq(&after.world.geometry, &after.geometry), "the world has what was made");
-            assert!(Arc::ptr_eq(&after.world.lights, &after.lights), "the world has what was gathered");
-            [
-                Arc::ptr_eq(&before.geometry, &after.geometry),
-                Arc::ptr_eq(&before.mesh, &after.mesh),
-                Arc::ptr_eq(&before.lights, &after.lights),
-                Arc::ptr_eq(&before.world, &after.world),
-            ]
-        }
-    }
-
-    #[test]
-    fn each_edit_keeps_what_does_not_depend_on_it() {
-        let mut desk = Desk::new(&format!("{SCENE}[materials.lamp]\nemission = [0, 0, 0]\n"));
-        let mut kept = |from: &str, to: &str| desk.kept(from, to);
-        assert_eq!(kept("[camera]", "# a comment\n[camera]"), [true, true, true, true]);
-        let settings = "exposure = 0.0\nbackground = [1, 0, 0]\nambient = [1, 1, 1]\nseed = 3\nmax_depth = 2";
-        assert_eq!(kept("exposure = 0.0", settings), [true, true, true, true]);
-        assert_eq!(kept("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]"), [true, true, true, false], "a colour");
-        assert_eq!(
-            kept("position = [0, 1, 4]", "position = [0, 1, 5]"),
-            [true, true, true, false],
-            "the eye"
-        );
-        assert_eq!(kept("[10, 10, 10]", "[9, 10, 10]"), [true, true, false, false], "a light");
-        assert_eq!(
-            kept("translate = [0, 0, 0]", "translate = [1, 0, 0]"),
-            [false, true, true, false],
-            "a mesh moved"
-        );
-        assert_eq!(kept("radius = 0.5", "radius = 0.6"), [false, true, true, false], "a shape");
-        assert_eq!(kept("seed = 3", "accel = \"kdtree\""), [false, false, true, false], "another tree");
-        assert_eq!(
-            kept("material = \"wall\"", "material = \"lamp\""),
-            [true, true, true, false],
-            "it is dark"
-        );
-        assert_eq!(
-            kept("emission = [0, 0, 0]", "emission = [1, 0, 0]"),
-            [true, true, false, false],
-            "it shines"
-        );
-        assert_eq!(
-            kept("translate = [1, 0, 0]", "translate = [2, 0, 0]"),
-            [false, true, false, false],
-            "a lamp moved"
-        );
-    }
 }

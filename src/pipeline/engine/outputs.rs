@@ -1,0 +1,96 @@
+//! Files that the engine writes, and those that it must not.
+
+use super::super::plan::Plan;
+use super::super::protocol::{Report, Request, Writing};
+use super::super::report::write_report;
+use super::super::sink::Sink;
+use super::super::stages::canvas::Canvas;
+use super::super::stages::write::{Destination, write_by_hand, write_if_wanted};
+use super::super::stages::{Findings, Staged, Stop};
+use super::super::targets::conflicts;
+use super::Engine;
+use crate::control::CancelToken;
+
+impl Engine {
+    /// Whether there is a picture without holes.
+    pub(in crate::pipeline) fn can_write(&self) -> bool {
+        self.films.current().is_some_and(Canvas::is_covered)
+    }
+
+    /// Write the picture as it is, outside of a request.
+    pub(in crate::pipeline) fn write_now(&mut self, sink: &Sink) {
+        let (Some(canvas), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
+            return sink.write_failed("there is no picture yet".to_owned());
+        };
+        if !canvas.is_covered() {
+            let message = "nothing is written: the render was stopped before every pixel had a sample";
+            return sink.write_failed(message.to_owned());
+        }
+        if self.is_broken
+            && let Some(path) = self.written.not_ours(&plan.outputs, &self.contents)
+        {
+            let path = path.display();
+            return sink.write_failed(format!(
+                "nothing is written: the scene has errors and may name {path}, which was not written by this run; mend \
+                 the scene first"
+            ));
+        }
+        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let written = &mut self.written;
+        pool.install(|| write_by_hand(canvas, to, written));
+    }
+
+    /// Whether a file that is to be written must not be. Where that need not end the request, it is said, and the
+    /// findings have it.
+    ///
+    /// # Errors
+    /// All conflicts, where the picture must be written.
+    pub(super) fn look_for_conflicts(
+        &self,
+        request: &Request,
+        plan: &Plan,
+        findings: &mut Findings,
+        sink: &Sink,
+    ) -> Result<(), Stop> {
+        let found = conflicts(plan, &self.inputs);
+        if found.is_empty() {
+            findings.conflicts = found;
+            return Ok(());
+        }
+        if request.write == Writing::Must {
+            findings.errors.extend(found);
+            return Err(Stop::Failed(findings.take_failure()));
+        }
+        if found != findings.conflicts {
+            sink.refused(found.clone());
+        }
+        findings.conflicts = found;
+        Ok(())
+    }
+
+    pub(super) fn write_report(&self, report: &Report, findings: &Findings, sink: &Sink) {
+        let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
+        if let Err(error) = write_report(plan, &self.inputs, report) {
+            sink.write_failed(error.to_string());
+        }
+    }
+
+    /// Whether the picture is on disk then.
+    pub(super) fn write(
+        &mut self,
+        request: &Request,
+        plan: &Plan,
+        findings: &Findings,
+        sink: &Sink,
+        token: &CancelToken,
+    ) -> Result<Staged<bool>, Stop> {
+        if let Some(conflict) = findings.conflicts.first() {
+            return Ok(Staged::skipped(false, conflict.message.clone()));
+        }
+        let pool = self.pool(plan.threads)?;
+        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let written = &mut self.written;
+        pool.install(|| write_if_wanted(request.write, canvas, to, written, token))
+    }
+}

@@ -1,0 +1,115 @@
+//! What is kept from request to request.
+
+use std::fs;
+use std::sync::mpsc;
+
+use super::*;
+use crate::pipeline::protocol::{PreviewSlot, Writing};
+use crate::pipeline::tests::{OBJ, SCENE};
+use crate::world::{Geometry, MeshTree};
+
+/// Nobody orders anything.
+struct Silence;
+
+impl Orders for Silence {
+    fn wants_write(&self) -> bool {
+        false
+    }
+
+    fn take_write(&self) -> bool {
+        false
+    }
+
+    fn take_preview(&self) -> Option<Option<PreviewSize>> {
+        None
+    }
+}
+
+/// What was made for a request.
+struct Made {
+    geometry: Arc<Geometry>,
+    mesh: Arc<MeshTree>,
+    lights: Arc<Lights>,
+    world: Arc<World>,
+}
+
+/// The same scene again and again with edits.
+struct Desk {
+    folder: tempfile::TempDir,
+    engine: Engine,
+    text: String,
+}
+
+impl Desk {
+    fn new(text: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        fs::write(folder.path().join("one.obj"), OBJ).expect("written");
+        fs::write(folder.path().join("skin.ppm"), "P6\n1 1\n255\nabc").expect("written");
+        Self { folder, engine: Engine::new(Means::default(), Arc::default()), text: text.to_owned() }
+    }
+
+    fn request(&mut self) -> Made {
+        let scene = self.folder.path().join("scene.toml");
+        fs::write(&scene, &self.text).expect("written");
+        let (events, received) = mpsc::channel();
+        let sink = Sink { generation: 1, events, previews: PreviewSlot::default() };
+        let request = Request {
+            generation: 1,
+            scene,
+            overrides: Default::default(),
+            preview: None,
+            write: Writing::No,
+            force: false,
+        };
+        let token = CancelToken::new();
+        self.engine.request(&request, &sink, &Meanwhile { token: &token, orders: &Silence });
+        let events: Vec<_> = received.try_iter().collect();
+        assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
+        let geometry = self.engine.accel.latest().expect("it was built").clone();
+        let mesh = geometry.objects()[1].mesh().expect("the mesh comes second").tree.clone();
+        let lights = self.engine.lights.latest().expect("they were gathered").clone();
+        Made { geometry, mesh, lights, world: self.engine.world.latest().expect("it was made").clone() }
+    }
+
+    /// Which of geometry, mesh, lights and world an edit leaves as they are, not equal but the same.
+    fn kept(&mut self, from: &str, to: &str) -> [bool; 4] {
+        let before = self.request();
+        assert!(self.text.contains(from), "{from}");
+        self.text = self.text.replace(from, to);
+        let after = self.request();
+        assert!(Arc::ptr_eq(&after.world.geometry, &after.geometry), "the world has what was made");
+        assert!(Arc::ptr_eq(&after.world.lights, &after.lights), "the world has what was gathered");
+        [
+            Arc::ptr_eq(&before.geometry, &after.geometry),
+            Arc::ptr_eq(&before.mesh, &after.mesh),
+            Arc::ptr_eq(&before.lights, &after.lights),
+            Arc::ptr_eq(&before.world, &after.world),
+        ]
+    }
+}
+
+#[test]
+fn each_edit_keeps_what_does_not_depend_on_it() {
+    let mut desk = Desk::new(&format!("{SCENE}[materials.lamp]\nemission = [0, 0, 0]\n"));
+    let mut kept = |from: &str, to: &str| desk.kept(from, to);
+    assert_eq!(kept("[camera]", "# a comment\n[camera]"), [true, true, true, true]);
+    let settings = "exposure = 0.0\nbackground = [1, 0, 0]\nambient = [1, 1, 1]\nseed = 3\nmax_depth = 2";
+    assert_eq!(kept("exposure = 0.0", settings), [true, true, true, true]);
+    assert_eq!(kept("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]"), [true, true, true, false], "a colour");
+    assert_eq!(kept("position = [0, 1, 4]", "position = [0, 1, 5]"), [true, true, true, false], "the eye");
+    assert_eq!(kept("[10, 10, 10]", "[9, 10, 10]"), [true, true, false, false], "a light");
+    assert_eq!(
+        kept("translate = [0, 0, 0]", "translate = [1, 0, 0]"),
+        [false, true, true, false],
+        "a mesh moved"
+    );
+    assert_eq!(kept("radius = 0.5", "radius = 0.6"), [false, true, true, false], "a shape");
+    assert_eq!(kept("seed = 3", "accel = \"kdtree\""), [false, false, true, false], "another tree");
+    assert_eq!(kept("material = \"wall\"", "material = \"lamp\""), [true, true, true, false], "it is dark");
+    assert_eq!(kept("emission = [0, 0, 0]", "emission = [1, 0, 0]"), [true, true, false, false], "it shines");
+    assert_eq!(
+        kept("translate = [1, 0, 0]", "translate = [2, 0, 0]"),
+        [false, true, false, false],
+        "a lamp moved"
+    );
+}
