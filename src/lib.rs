@@ -54,8 +54,9 @@
 //!
 //! ## What holds everywhere
 //!
-//! - The same scene, settings and seed give the same bits, whatever the number of threads: random numbers
-//!   are a function of pixel, sample and dimension, and every sum has a fixed order.
+//! - The same scene, settings and seed give the same bits, whatever the number of threads, on every machine: random
+//!   numbers are a function of pixel, sample and dimension, every sum has a fixed order, and no function of the system's
+//!   mathematical library is between a scene and its picture.
 //! - Rays travel in batches; a hit carries a bound on its error, from which the next ray starts: no distance is a
 //!   constant. Where a constant tells degenerate from usable it is relative to the size of what it judges.
 //! - A scene's coordinates are `f64`; what is traced is `f32` from an origin near what the camera looks at (`world::origin`),

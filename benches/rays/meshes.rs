@@ -11,7 +11,7 @@ use glimt::geometry::ray::offset_origin;
 use glimt::geometry::{Aabb, Ray};
 use glimt::math::frame::Frame;
 use glimt::math::{Vec2, Vec3};
-use glimt::sampling::{PixelSampler, warp};
+use glimt::sampling::{CAMERA_PATH, Decision, PixelSampler, warp};
 
 /// Pixels of a side: a million rays.
 const SIDE: u32 = 1000;
@@ -98,7 +98,7 @@ pub fn rays(tree: &WideBvh, mesh: &TriangleMesh) -> Rays {
         let normal = if normal.dot(ray.direction) < 0.0 { normal } else { -normal };
         let point = a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v;
         let origin = offset_origin(point, point.abs() * 1e-6 + Vec3::splat(size * 1e-7), normal, normal);
-        let [x, y, ..] = PixelSampler::new(0, i, 0, 0).camera();
+        let [x, y] = PixelSampler::new(0, i, 0, 0).pair(CAMERA_PATH, Decision::Pixel).to_array();
         let disk = warp::disk(Vec2::new(x, y));
         let up = (1.0 - disk.length_squared()).max(0.0).sqrt();
         rays.diffuse.push(Ray::new(origin, Frame::from_normal(normal).to_world(disk.extend(up))));

@@ -5,6 +5,7 @@
 
 use crate::math::Vec3;
 use crate::math::color::luminance;
+use crate::math::elementary::{log2, pow};
 
 /// x/(1 + x) on luminance: E. Reinhard et al., "Photographic Tone Reproduction for Digital Images" (2002), eq. 3.
 /// Hue stays until a component is clamped.
@@ -28,7 +29,7 @@ pub(super) fn agx(color: Vec3) -> Vec3 {
     let inset = transform(&AGX_INSET, color);
     let encoded = Vec3::from_array(inset.to_array().map(agx_sigmoid_of_stops));
     let outset = clamp(transform(&AGX_OUTSET, encoded));
-    Vec3::from_array(outset.to_array().map(|x| x.powf(2.2)))
+    Vec3::from_array(outset.to_array().map(|x| pow(x, 2.2)))
 }
 
 /// Columns.
@@ -47,7 +48,7 @@ const AGX_STOPS: [f32; 2] = [-12.473_931, 4.026_069];
 
 fn agx_sigmoid_of_stops(x: f32) -> f32 {
     let [low, high] = AGX_STOPS;
-    agx_sigmoid((x.log2().clamp(low, high) - low) / (high - low))
+    agx_sigmoid((log2(x.max(f32::MIN_POSITIVE)).clamp(low, high) - low) / (high - low))
 }
 
 /// Slope 2 through (10/16.5, ½), toe and shoulder of powers 3 and 3.25; 0 → 0, 1 → 1.
@@ -57,9 +58,9 @@ fn agx_sigmoid(x: f32) -> f32 {
     let (sign, run, power) = if x < PIVOT { (-1.0, PIVOT, 3.0) } else { (1.0, 1.0 - PIVOT, 3.25) };
     let rise: f32 = SLOPE * run;
     // The hyperbola s·t/(1 + tᵖ)^(1/p), t = slope·distance/s, with s chosen so that it ends half a unit from the pivot.
-    let scale = rise / ((rise / 0.5).powf(power) - 1.0).powf(1.0 / power);
+    let scale = rise / pow(pow(rise / 0.5, power) - 1.0, 1.0 / power);
     let term = SLOPE * (x - PIVOT).abs() / scale;
-    0.5 + sign * scale * term / (1.0 + term.powf(power)).powf(1.0 / power)
+    0.5 + sign * scale * term / pow(1.0 + pow(term, power), 1.0 / power)
 }
 
 /// The matrix with its rows scaled to a sum of 1 (the published digits miss it by 1e-4), so that grey stays grey.

@@ -67,8 +67,20 @@ pub struct TileSamples {
     pub rect: Rect,
     /// Samples for each.
     pub samples: u32,
-    /// `rect.area() · samples` radiances, already weighted by the reconstruction filter.
+    /// `rect.area() · samples` radiances, placed as the reconstruction filter weighs.
     pub radiance: Vec<Vec3>,
+    /// Which of them lie where the filter is negative; none where it is so nowhere.
+    pub negative: Option<NegativeLobes>,
+}
+
+/// Samples where the reconstruction filter is negative. A pixel is 1 + `weight` of the mean of the others, less `weight` of
+/// the mean of these, so that what is the same everywhere stays as it is, however the samples fall.
+#[derive(Clone, Debug)]
+pub struct NegativeLobes {
+    /// −∫min(f, 0)/∫f.
+    pub weight: f64,
+    /// For each radiance.
+    pub is_negative: Vec<bool>,
 }
 
 /// Linear radiance, rows from the top, unexposed.

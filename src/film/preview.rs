@@ -174,7 +174,10 @@ mod tests {
             {
                 if let Some(value) = value(x, y) {
                     let rect = Rect { x, y, width: 1, height: 1 };
-                    film.add(tile, &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(value)] });
+                    film.add(
+                        tile,
+                        &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(value)], negative: None },
+                    );
                 }
             }
         }
@@ -240,7 +243,8 @@ mod tests {
         };
         assert_eq!(picture(&first), preview(&first, 9, 5, None));
         let rect = first.tile_rect(1).expect("a tile");
-        let samples = TileSamples { rect, samples: 2, radiance: vec![Vec3::Y; rect.area() * 2] };
+        let samples =
+            TileSamples { rect, samples: 2, radiance: vec![Vec3::Y; rect.area() * 2], negative: None };
         first.add(1, &samples);
         let changed = picture(&first);
         assert_eq!(changed, preview(&first, 9, 5, None));
@@ -255,7 +259,10 @@ mod tests {
         for tile in 0..film.tile_count() {
             let rect = film.tile_rect(tile).expect("a tile");
             let value = Vec3::splat(tile as f32);
-            film.add(tile, &TileSamples { rect, samples: 1, radiance: vec![value; rect.area()] });
+            film.add(
+                tile,
+                &TileSamples { rect, samples: 1, radiance: vec![value; rect.area()], negative: None },
+            );
         }
         film
     }
@@ -289,7 +296,10 @@ mod tests {
         // What changes behind the place reached is taken up in the next round.
         previewer.update(&film, Some(past));
         let rect = film.tile_rect(0).expect("a tile");
-        film.add(0, &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(1e6); rect.area()] });
+        film.add(
+            0,
+            &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(1e6); rect.area()], negative: None },
+        );
         for _ in 0..slices {
             previewer.update(&film, Some(past));
         }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::noise::luminance;
+use super::noise::{Steps, luminance};
 use super::{RadianceImage, Rect, TileSamples};
 use crate::math::{DVec3, Vec3};
 
@@ -66,18 +66,38 @@ pub struct Film {
 #[derive(Debug, Default)]
 pub(super) struct Tile {
     pub(super) sums: Vec<DVec3>,
-    /// Of the squares of the samples' luminances.
-    pub(super) squares: Vec<f64>,
     pub(super) counts: Vec<u32>,
+    /// What the filter's negative lobes have of them; none before a sample comes that is in one.
+    negative: Option<Negative>,
+    pub(super) steps: Steps,
     /// Grows whenever the tile changes.
     pub(super) revision: u64,
 }
 
+/// Sums of the samples in a filter's negative lobes, which are in no other sum.
+#[derive(Debug)]
+struct Negative {
+    weight: f64,
+    sums: Vec<DVec3>,
+    counts: Vec<u32>,
+}
+
 impl Tile {
-    /// Mean of a pixel, if it has samples.
+    /// What a pixel's samples make of it, if it has any: their mean, for a filter with negative lobes those of both signs by
+    /// their weights.
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         let count = self.count(index);
-        (count > 0).then(|| self.sums[index] / f64::from(count))
+        let negative = self.negative.as_ref().filter(|negative| negative.counts[index] > 0);
+        let Some(negative) = negative else {
+            return (count > 0).then(|| self.sums[index] / f64::from(count));
+        };
+        let below = negative.sums[index] / f64::from(negative.counts[index]);
+        let positive_count = count - negative.counts[index];
+        if positive_count == 0 {
+            return Some(below);
+        }
+        let above = self.sums[index] / f64::from(positive_count);
+        Some(above + (above - below) * negative.weight)
     }
 
     pub(super) fn count(&self, index: usize) -> u32 {
@@ -87,9 +107,70 @@ impl Tile {
     /// Cannot fail: the memory was reserved when the film was made.
     fn fill(&mut self, area: usize) {
         self.sums.resize(area, DVec3::ZERO);
-        self.squares.resize(area, 0.0);
         self.counts.resize(area, 0);
+        self.steps.fill(area);
     }
+
+    /// Add samples of one pixel in their order; how many of them are not finite. `is_negative` tells them apart where the
+    /// filter has negative lobes of this weight.
+    fn add(&mut self, index: usize, radiances: &[Vec3], lobes: Option<(f64, &[bool])>) -> u64 {
+        let mut non_finite = 0;
+        let mut rest = 0..radiances.len();
+        while !rest.is_empty() {
+            // Up to where the count is a power of two, where the step from the last one is noted.
+            let count = self.counts[index];
+            let left = ((u64::from(count) + 1).next_power_of_two() - u64::from(count)) as usize;
+            let part = rest.start..rest.end.min(rest.start + left);
+            non_finite += match lobes {
+                None => add_up(&mut self.sums[index], &radiances[part.clone()]),
+                Some((weight, signs)) => {
+                    self.add_signed(index, weight, &radiances[part.clone()], &signs[part.clone()])
+                }
+            };
+            self.counts[index] += part.len() as u32;
+            rest.start = part.end;
+            if part.len() == left
+                && let Some(mean) = self.mean(index)
+            {
+                self.steps.note(index, self.counts[index], luminance(mean));
+            }
+        }
+        non_finite
+    }
+
+    fn add_signed(&mut self, index: usize, weight: f64, radiances: &[Vec3], is_negative: &[bool]) -> u64 {
+        let area = self.sums.len();
+        let negative = self.negative.get_or_insert_with(|| Negative {
+            weight,
+            sums: vec![DVec3::ZERO; area],
+            counts: vec![0; area],
+        });
+        let mut non_finite = 0;
+        for (radiance, &is_negative) in radiances.iter().zip(is_negative) {
+            let sum = if is_negative { &mut negative.sums[index] } else { &mut self.sums[index] };
+            non_finite += add_up(sum, std::slice::from_ref(radiance));
+            negative.counts[index] += u32::from(is_negative);
+        }
+        non_finite
+    }
+}
+
+/// Add what is finite; how many are not.
+fn add_up(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
+    let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
+    if all.is_finite() {
+        *sum = all;
+        return 0;
+    }
+    let mut non_finite = 0;
+    for radiance in radiances {
+        if radiance.is_finite() {
+            *sum += radiance.as_dvec3();
+        } else {
+            non_finite += 1;
+        }
+    }
+    non_finite
 }
 
 impl Film {
@@ -171,19 +252,13 @@ impl Film {
         let mut guard = self.tile(tile);
         let tile = &mut *guard;
         tile.fill(rect.area());
-        for (i, pixel) in samples.radiance.chunks_exact(samples.samples as usize).enumerate() {
+        let count = samples.samples as usize;
+        for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
             let (x, y) = (i as u32 % samples.rect.width, i as u32 / samples.rect.width);
             let Some(index) = index_in(rect, samples.rect.x + x, samples.rect.y + y) else { continue };
-            for &radiance in pixel {
-                if radiance.is_finite() {
-                    let radiance = radiance.as_dvec3();
-                    tile.sums[index] += radiance;
-                    tile.squares[index] += luminance(radiance).powi(2);
-                } else {
-                    non_finite += 1;
-                }
-            }
-            tile.counts[index] += samples.samples;
+            let lobes = samples.negative.as_ref();
+            let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
+            non_finite += tile.add(index, pixel, lobes);
         }
         tile.revision += 1;
         drop(guard);
@@ -267,14 +342,14 @@ fn rings(crop: Rect) -> Vec<usize> {
     let offset = |index: usize, length: usize| 2 * index as i64 - (length as i64 - 1);
     let place = |tile: usize| {
         let (x, y) = (offset(tile % columns, columns), offset(tile / columns, rows));
-        (x.abs().max(y.abs()) / 2, (y as f64).atan2(x as f64), tile)
+        (x.abs().max(y.abs()) / 2, libm::atan2(y as f64, x as f64), tile)
     };
     let mut places: Vec<_> = (0..columns * rows).map(place).collect();
     places.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     places.into_iter().map(|(_, _, tile)| tile).collect()
 }
 
-/// Of one pixel's sum, sum of squares and count.
+/// Of one pixel's sum, last mean and count.
 const SUM_BYTES: usize = size_of::<DVec3>() + size_of::<f64>() + size_of::<u32>();
 
 /// For the sums of the crop, and for the whole picture as radiance and as sRGB.
@@ -294,12 +369,11 @@ fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
     for tile in 0..columns * rows {
         let area = tile_rect(crop, tile).area();
         let mut sums = Vec::new();
-        let mut squares = Vec::new();
         let mut counts = Vec::new();
         sums.try_reserve_exact(area).ok()?;
-        squares.try_reserve_exact(area).ok()?;
+        let steps = Steps::reserved(area)?;
         counts.try_reserve_exact(area).ok()?;
-        tiles.push(Mutex::new(Tile { sums, squares, counts, revision: 0 }));
+        tiles.push(Mutex::new(Tile { sums, counts, steps, ..Tile::default() }));
     }
     Some(tiles)
 }

@@ -6,6 +6,7 @@ use super::{Picture, Picture16, RadianceImage, curves, is_in_pool, linear_to_srg
 use crate::choice;
 use crate::math::Vec3;
 use crate::math::color::linear_to_srgb;
+use crate::math::elementary::exp2;
 
 choice! {
     /// Tone curves.
@@ -123,7 +124,7 @@ impl ToneMapping {
 
     /// One colour: linear display light in [0, 1], whatever is fed; NaN and negative components count as 0.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
-        self.exposed(radiance, self.exposure_stops.exp2())
+        self.exposed(radiance, exp2(self.exposure_stops))
     }
 
     fn exposed(&self, radiance: Vec3, factor: f32) -> Vec3 {
@@ -173,7 +174,7 @@ fn map_pixels<T: Send>(
     tone: &ToneMapping,
     encode: impl Fn(Vec3) -> T + Sync,
 ) -> Vec<T> {
-    let factor = tone.exposure_stops.exp2();
+    let factor = exp2(tone.exposure_stops);
     let pixel = |&radiance: &Vec3| encode(tone.exposed(radiance, factor));
     if image.pixels.len() < PARALLEL_PIXELS || !is_in_pool() {
         image.pixels.iter().map(pixel).collect()

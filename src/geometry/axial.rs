@@ -148,7 +148,7 @@ pub fn ring_shown(area: f64, a: f64, b: f64) -> f64 {
     } else if b <= -a {
         0.0
     } else {
-        area / PI * (((a - b) * (a + b)).sqrt() + b * (-b / a).acos())
+        area / PI * (((a - b) * (a + b)).sqrt() + b * libm::acos(-b / a))
     }
 }
 
@@ -172,10 +172,11 @@ pub fn radial(p: DVec2) -> DVec2 {
 
 /// ½ + angle/2π of a direction in the plane, in [0, 1].
 pub fn turn(p: DVec2) -> f64 {
-    0.5 + p.y.atan2(p.x) / std::f64::consts::TAU
+    0.5 + libm::atan2(p.y, p.x) / std::f64::consts::TAU
 }
 
 /// The direction of [`turn`] = `u`.
 pub fn at_turn(u: f64) -> DVec2 {
-    DVec2::from_angle((u - 0.5) * std::f64::consts::TAU)
+    let (sin, cos) = libm::sincos((u - 0.5) * std::f64::consts::TAU);
+    DVec2::new(cos, sin)
 }

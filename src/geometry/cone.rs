@@ -26,7 +26,7 @@ impl Cone {
     /// From the middle of its base, a tip elsewhere, and the base's radius > 0.
     pub fn new(base: DVec3, tip: DVec3, radius: f64, capped: bool) -> Self {
         let height = (base - tip).length();
-        let slant = height.hypot(radius);
+        let slant = libm::hypot(height, radius);
         Self { frame: AxialFrame::new(tip, base - tip), height, radius, slant, capped }
     }
 

@@ -2,6 +2,7 @@
 
 use super::rows::{Ends, HitRows, RayRows, accept};
 use super::surface::flat_axes;
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec3, Vec2};
@@ -88,20 +89,28 @@ impl Cuboid {
 
     /// The surface at a hit: the point is put onto the face.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let mut local = self.axes.transpose() * (ray.at(f64::from(hit.t)) - self.center);
-        local = local.clamp(-self.half, self.half);
-        let (axis, normal) = face_normal(hit.primitive);
-        local[axis] = self.half[axis] * normal[axis];
+        let ExactPoint { point, normal: outwards, reach } = self.exact(ray, hit);
+        let (_, normal) = face_normal(hit.primitive);
+        let local = self.local(ray, hit);
         let (u, v) = flat_axes(normal);
         let (width, height) = (2.0 * self.half.dot(u.abs()), 2.0 * self.half.dot(v.abs()));
         let uv = Vec2::new((0.5 + local.dot(u) / width) as f32, (0.5 + local.dot(v) / height) as f32);
-        SurfacePoint::exact(
-            self.center + self.axes * local,
-            self.axes * normal,
-            uv,
-            self.axes * (u * width),
-            self.axes * (v * height),
-            self.center.abs().max_element() + self.half.length(),
+        SurfacePoint::exact(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
+    }
+
+    /// A hit along its axes, from the centre, put onto the face.
+    #[inline(always)]
+    fn local(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+        let from_center = ray.at(f64::from(hit.t)) - self.center;
+        let along = |axis: DVec3, half: f64| axis.dot(from_center).max(-half).min(half);
+        let DVec3 { x, y, z } = self.half;
+        let n = outwards(hit.primitive);
+        let (px, py, pz) =
+            (along(self.axes.x_axis, x), along(self.axes.y_axis, y), along(self.axes.z_axis, z));
+        DVec3::new(
+            if n.x == 0.0 { px } else { x * n.x },
+            if n.y == 0.0 { py } else { y * n.y },
+            if n.z == 0.0 { pz } else { z * n.z },
         )
     }
 
@@ -164,6 +173,24 @@ fn face_normal(face: u32) -> (usize, DVec3) {
     let mut normal = DVec3::ZERO;
     normal[axis] = if face % 2 == 1 { 1.0 } else { -1.0 };
     (axis, normal)
+}
+
+impl Exact for Cuboid {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let (local, n) = (self.local(ray, hit), outwards(hit.primitive));
+        let out_of = |v: DVec3| self.axes.x_axis * v.x + self.axes.y_axis * v.y + self.axes.z_axis * v.z;
+        let reach = self.center.abs().max_element() + self.half.length();
+        ExactPoint { point: self.center + out_of(local), normal: out_of(n), reach }
+    }
+}
+
+/// [`face_normal`] without an index.
+#[inline(always)]
+fn outwards(face: u32) -> DVec3 {
+    let size = if face & 1 == 1 { 1.0 } else { -1.0 };
+    let on = |axis: u32| if face >> 1 == axis { size } else { 0.0 };
+    DVec3::new(on(0), on(1), on(2))
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ pub mod ray;
 pub mod rows;
 pub mod sphere;
 pub mod surface;
+pub mod surface_rows;
 pub mod torus;
 pub mod triangle;
 pub mod watertight;
@@ -85,7 +86,7 @@ impl Shape {
     /// The nearest hits of the rays in `met`, side by side where the shape has a loop for that; the others end below 0. `found`
     /// holds none before.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &[Ray], rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+    pub fn intersect_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         match self {
             Self::Plane(plane) => plane.intersect_rows(rows, ends, found),
             Self::Quad(quad) => quad.intersect_rows(rows, ends, found),
@@ -93,14 +94,14 @@ impl Shape {
             Self::Box(cuboid) => cuboid.intersect_rows(rows, ends, found),
             Self::Triangle(triangle) => triangle.intersect_rows(rows, ends, found),
             Self::Disk(disk) => disk.intersect_rows(rows, ends, found),
-            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => self.one_by_one(rays, met, ends, found),
+            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => self.one_by_one(rows, met, ends, found),
         }
     }
 
     #[inline(never)]
-    fn one_by_one(&self, rays: &[Ray], met: u32, ends: &Ends, found: &mut HitRows) {
+    fn one_by_one(&self, rays: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         for lane in rows::lanes(met) {
-            if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays[lane] }.to_f64()) {
+            if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
                 found.put(lane, &hit);
             }
         }

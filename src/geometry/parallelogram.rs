@@ -1,6 +1,7 @@
 //! Quads: squares and any other parallelograms, in double precision.
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
@@ -75,12 +76,16 @@ impl Parallelogram {
 
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        let [s, t] = self.coordinates(ray, hit);
+        SurfacePoint::exact(point, normal, Vec2::new(s as f32, t as f32), self.u, self.v, reach)
+    }
+
+    /// Of a hit along the edges, in [0, 1].
+    #[inline(always)]
+    fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         let from_corner = ray.at(f64::from(hit.t)) - self.corner;
-        let (s, t) =
-            (from_corner.dot(self.dual_u).clamp(0.0, 1.0), from_corner.dot(self.dual_v).clamp(0.0, 1.0));
-        let point = self.corner + self.u * s + self.v * t;
-        let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
-        SurfacePoint::exact(point, self.normal, Vec2::new(s as f32, t as f32), self.u, self.v, reach)
+        [self.dual_u, self.dual_v].map(|dual| from_corner.dot(dual).max(0.0).min(1.0))
     }
 
     /// The box around it.
@@ -118,6 +123,15 @@ impl Parallelogram {
     /// The area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         self.normal.dot(direction).max(0.0)
+    }
+}
+
+impl Exact for Parallelogram {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let [s, t] = self.coordinates(ray, hit);
+        let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
+        ExactPoint { point: self.corner + self.u * s + self.v * t, normal: self.normal, reach }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface::flat_axes;
+use super::surface_rows::{Exact, ExactPoint};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -52,12 +53,17 @@ impl Plane {
 
     /// The surface at a hit; one texture tile per unit of length.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let offset = ray.at(f64::from(hit.t)) - self.point;
-        let (s, t) = (offset.dot(self.u), offset.dot(self.v));
-        let point = self.point + self.u * s + self.v * t;
-        let reach = self.point.abs().max_element() + s.abs() + t.abs();
+        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        let [s, t] = self.coordinates(ray, hit);
         let uv = DVec2::new(s, t);
-        SurfacePoint { uv, ..SurfacePoint::exact(point, self.normal, uv.as_vec2(), self.u, self.v, reach) }
+        SurfacePoint { uv, ..SurfacePoint::exact(point, normal, uv.as_vec2(), self.u, self.v, reach) }
+    }
+
+    /// Of a hit along its axes.
+    #[inline(always)]
+    fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
+        let offset = ray.at(f64::from(hit.t)) - self.point;
+        [offset.dot(self.u), offset.dot(self.v)]
     }
 
     /// It has no part with an area.
@@ -88,6 +94,15 @@ impl Plane {
     /// The area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
+    }
+}
+
+impl Exact for Plane {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let [s, t] = self.coordinates(ray, hit);
+        let reach = self.point.abs().max_element() + s.abs() + t.abs();
+        ExactPoint { point: self.point + self.u * s + self.v * t, normal: self.normal, reach }
     }
 }
 

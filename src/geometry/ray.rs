@@ -22,6 +22,7 @@ impl Ray {
 
     /// The segment that ends just before `to`, shortened by the rounding errors of its two ends, so that a surface
     /// through `to` is not hit (t = 1 is the far end before that).
+    #[inline(always)]
     pub fn segment(from: Vec3, to: Vec3) -> Self {
         let direction = to - from;
         let size = from.abs().max_element() + to.abs().max_element();
@@ -78,6 +79,7 @@ impl RayF64 {
 /// A start for a ray that leaves `point` towards `direction`: on that side of the surface for certain, where each
 /// component of `point` is off by at most `error` (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th
 /// ed., section 6.8.6).
+#[inline(always)]
 pub fn offset_origin(point: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error);
     let offset = if normal.dot(direction) < 0.0 { -normal * distance } else { normal * distance };

@@ -1,11 +1,14 @@
 //! Up to sixteen rays side by side, a row for each coordinate: what a shape tests in a loop without branches, which
 //! compilers turn into vector instructions. Every lane gets the bits that its ray gets alone.
 
+use std::cell::OnceCell;
+
 use super::{Ray, RayF64, ShapeHit};
-use crate::math::DVec3;
+use crate::math::lanes::LANES;
+use crate::math::{DVec3, Vec3};
 
 /// Rays that are traced together.
-pub const PACKET: usize = 16;
+pub const PACKET: usize = LANES;
 
 /// One number for each ray of a packet.
 pub type Row = [f32; PACKET];
@@ -31,13 +34,33 @@ pub struct RayRows {
     pub origin: [Row; 3],
     /// Coordinates of where they go.
     pub direction: [Row; 3],
+    /// The same one by one, for what has no loop; made when it is asked for.
+    list: OnceCell<[Ray; PACKET]>,
 }
 
 impl RayRows {
+    /// From coordinates.
+    #[inline(always)]
+    pub fn of(origin: [Row; 3], direction: [Row; 3]) -> Self {
+        Self { origin, direction, list: OnceCell::new() }
+    }
+
+    /// The rays one by one, without ends.
+    #[inline]
+    pub fn rays(&self) -> &[Ray; PACKET] {
+        self.list.get_or_init(|| std::array::from_fn(|lane| self.ray(lane)))
+    }
+
+    /// The ray in a lane, without an end.
+    pub fn ray(&self, lane: usize) -> Ray {
+        let of = |rows: &[Row; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
+        Ray::new(of(&self.origin), of(&self.direction))
+    }
+
     /// At most [`PACKET`] rays, and their ends.
     #[inline(always)]
     pub fn new(rays: &[Ray]) -> (Self, Ends) {
-        let mut rows = Self { origin: [[0.0; PACKET]; 3], direction: [[0.0; PACKET]; 3] };
+        let mut rows = Self::of([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         let mut ends = [-1.0; PACKET];
         // Compiled once for the full packets, whose loop has a known length.
         match <&[Ray; PACKET]>::try_from(rays) {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 
@@ -71,13 +72,9 @@ impl Sphere {
 
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let outwards = ray.at(f64::from(hit.t)) - self.center;
-        let n =
-            if outwards.length_squared() > 0.0 { outwards.normalize() } else { -ray.direction.normalize() };
-        let (uv, dpdu, dpdv) = sphere_parametrisation(n);
-        let reach = self.center.abs().max_element() + self.radius;
-        let (dpdu, dpdv) = (dpdu * self.radius, dpdv * self.radius);
-        SurfacePoint::exact(self.center + n * self.radius, n, uv, dpdu, dpdv, reach)
+        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        let (uv, dpdu, dpdv) = sphere_parametrisation(normal);
+        SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
     }
 
     /// The box around it.
@@ -95,7 +92,7 @@ impl Sphere {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         let height = 1.0 - 2.0 * x;
         let across = (1.0 - height * height).max(0.0).sqrt();
-        let (sin, cos) = (2.0 * PI * y).sin_cos();
+        let (sin, cos) = libm::sincos(2.0 * PI * y);
         let normal = DVec3::new(across * cos, height, across * sin);
         AreaPoint { point: self.center + normal * self.radius, normal }
     }
@@ -116,12 +113,24 @@ impl Sphere {
     }
 }
 
+impl Exact for Sphere {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let outwards = ray.at(f64::from(hit.t)) - self.center;
+        // At the very centre any direction is right.
+        let is_told = outwards.length_squared() > 0.0;
+        let n = (if is_told { outwards } else { -ray.direction }).normalize();
+        let reach = self.center.abs().max_element() + self.radius;
+        ExactPoint { point: self.center + n * self.radius, normal: n, reach }
+    }
+}
+
 /// Texture coordinates u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π of a unit normal, and how the normal changes with
 /// each; at the poles any pair of perpendicular tangents.
 fn sphere_parametrisation(n: DVec3) -> (Vec2, DVec3, DVec3) {
-    let u = 0.5 + n.z.atan2(n.x) / (2.0 * PI);
-    let v = 0.5 + n.y.clamp(-1.0, 1.0).asin() / PI;
-    let ring = n.x.hypot(n.z);
+    let u = 0.5 + libm::atan2(n.z, n.x) / (2.0 * PI);
+    let v = 0.5 + libm::asin(n.y.clamp(-1.0, 1.0)) / PI;
+    let ring = (n.x * n.x + n.z * n.z).sqrt();
     let (east, north) = if ring > 1e-9 {
         let east = DVec3::new(-n.z, 0.0, n.x) / ring;
         (east, DVec3::new(-n.y * n.x / ring, ring, -n.y * n.z / ring))

@@ -78,6 +78,7 @@ impl SurfacePoint {
 
 /// Bound on each component's error of a point that was computed in double precision from lengths up to `reach`, and of
 /// the next test from there.
+#[inline(always)]
 pub fn error(point: Vec3, reach: f64) -> Vec3 {
     rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32)
 }
@@ -86,6 +87,7 @@ pub fn error(point: Vec3, reach: f64) -> Vec3 {
 const DOUBLE_ERROR: f64 = 32.0 * f64::EPSILON;
 
 /// Twice the error of rounding a point to `f32`.
+#[inline(always)]
 pub fn rounding_error(point: Vec3) -> Vec3 {
     point.abs() * f32::EPSILON + Vec3::splat(f32::MIN_POSITIVE)
 }

@@ -1,6 +1,7 @@
 //! Single triangles, in double precision.
 
 use super::rows::{Ends, HitRows, RayRows, accept};
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec2};
 use crate::sampling::warp;
@@ -53,11 +54,9 @@ impl Triangle {
     }
 
     /// The surface at a hit; its texture coordinates are (0, 0), (1, 0), (0, 1) at the corners.
-    pub fn surface(&self, _: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-        let (ab, ac) = (self.b - self.a, self.c - self.a);
-        let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
-        SurfacePoint::exact(self.a + ab * u + ac * v, ab.cross(ac), Vec2::new(hit.u, hit.v), ab, ac, reach)
+    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        SurfacePoint::exact(point, normal, Vec2::new(hit.u, hit.v), self.b - self.a, self.c - self.a, reach)
     }
 
     /// The box around it.
@@ -94,6 +93,16 @@ impl Triangle {
     /// The area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         (0.5 * self.normal().dot(direction)).max(0.0)
+    }
+}
+
+impl Exact for Triangle {
+    #[inline(always)]
+    fn exact(&self, _: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        let (ab, ac) = (self.b - self.a, self.c - self.a);
+        let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
+        ExactPoint { point: self.a + ab * u + ac * v, normal: ab.cross(ac), reach }
     }
 }
 

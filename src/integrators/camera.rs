@@ -1,31 +1,124 @@
-//! Rays of the camera.
+//! Rays of the camera, in rows.
 
 use std::ops::Range;
 
 use super::medium::{Inside, Medium};
 use super::queues::PathRay;
 use super::shot::Shot;
+use crate::geometry::Ray;
+use crate::geometry::rows::{RayRows, Row};
+use crate::math::lanes::set_lane;
 use crate::math::{DVec2, Vec2, Vec3};
-use crate::sampling::warp;
+use crate::sampling::filter::FilterSample;
+use crate::sampling::{CAMERA_PATH, Decision, SamplerRow, warp};
+use crate::world::{Loops, PACKET};
+
+/// Rays through the pixels of some slots.
+pub struct CameraRow {
+    /// The rays.
+    pub rays: RayRows,
+    /// A bit for each whose place in the pixel has a negative weight.
+    pub negative: u32,
+}
 
 impl Shot<'_> {
-    /// Rays through the pixels of some slots, in place of what is in the queue.
-    pub fn camera_rays(&self, slots: Range<u32>, queue: &mut Vec<PathRay>) {
+    /// Rays through the pixels of some slots, in place of what is in the queue, and which of them have a negative weight.
+    pub fn camera_rays(
+        &self,
+        slots: Range<u32>,
+        queue: &mut Vec<PathRay>,
+        mut negative: impl FnMut(u32, u32),
+    ) {
         queue.clear();
-        queue.extend(slots.map(|slot| self.camera_ray(slot)));
+        for first in slots.clone().step_by(PACKET) {
+            let row = self.world.geometry.instructions().run(Camera { shot: self, first });
+            negative(first, row.negative);
+            let slots = first..slots.end.min(first + PACKET as u32);
+            queue.extend(slots.zip(0..).map(|(slot, lane)| self.camera_path(row.rays.ray(lane), slot)));
+        }
     }
 
-    fn camera_ray(&self, slot: u32) -> PathRay {
-        let (x, y, _) = self.block.place(slot);
-        let [fx, fy, lx, ly] = self.sampler(slot).camera();
-        let sample = self.settings.render.filter.sample(Vec2::new(fx, fy));
-        let in_pixel = (sample.offset + Vec2::splat(0.5)).as_dvec2();
-        let lens = if self.settings.dof { warp::disk(Vec2::new(lx, ly)) } else { Vec2::ZERO };
-        let from_corner = DVec2::new(f64::from(x), f64::from(y)) + in_pixel;
-        let ray = self.world.camera.ray(self.settings.from_middle(from_corner), lens);
+    /// The path that a ray of the camera is.
+    pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
         let around =
             self.world.glass_around(ray.origin).map(|(object, material)| Inside { object, material });
         let medium = around.fold(Medium::default(), Medium::entered);
-        PathRay { ray, throughput: Vec3::splat(sample.weight), slot, path: 1, medium }
+        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium }
+    }
+
+    /// The rays of the slots from `first` on, also beyond the last. To be called inside of loops for each instruction set.
+    #[inline(always)]
+    pub fn camera_row(&self, first: u32) -> CameraRow {
+        let paths = [CAMERA_PATH; PACKET];
+        let (settings, camera) = (self.settings, &self.world.camera);
+        let (xs, ys, samples) = self.block.places(first);
+        let sampler = SamplerRow::new(settings.render.seed, &xs, &ys, &samples);
+        let mut in_pixel = sampler.pairs(&paths, Decision::Pixel, 0, 1);
+        let mut negative = 0;
+        settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
+            negative |= u32::from(sample.is_negative) << lane;
+        });
+        let lens = if settings.dof && camera.aperture > 0.0 {
+            lens_row(sampler.pairs(&paths, Decision::Lens, 0, 1))
+        } else {
+            [[0.0; PACKET]; 2]
+        };
+        let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
+        for lane in 0..PACKET {
+            let corner = DVec2::new(f64::from(xs[lane]), f64::from(ys[lane])) + DVec2::splat(0.5);
+            let place = corner + DVec2::new(f64::from(in_pixel[0][lane]), f64::from(in_pixel[1][lane]));
+            let ray = camera.ray(settings.from_middle(place), Vec2::new(lens[0][lane], lens[1][lane]));
+            set_lane(&mut origin, lane, ray.origin);
+            set_lane(&mut direction, lane, ray.direction);
+        }
+        CameraRow { rays: RayRows::of(origin, direction), negative }
+    }
+}
+
+/// [`Shot::camera_row`].
+struct Camera<'a> {
+    shot: &'a Shot<'a>,
+    first: u32,
+}
+
+impl Loops for Camera<'_> {
+    type Done = CameraRow;
+
+    #[inline(always)]
+    fn run(self) -> CameraRow {
+        self.shot.camera_row(self.first)
+    }
+}
+
+/// Points of the unit disk.
+#[inline(always)]
+fn lens_row([u, v]: [Row; 2]) -> [Row; 2] {
+    let mut points = [u, v];
+    for lane in 0..PACKET {
+        let point = warp::disk(Vec2::new(u[lane], v[lane]));
+        (points[0][lane], points[1][lane]) = (point.x, point.y);
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Rect;
+    use crate::integrators::shot::SampleBlock;
+
+    #[test]
+    fn rows_of_places_go_on_over_samples_and_pixels() {
+        let tile = Rect { x: 5, y: 7, width: 3, height: 40 };
+        for samples in [3..4, 0..5, 100..116, 7..40] {
+            let block = SampleBlock { tile, samples };
+            for first in [0, 1, 2, 15, 33] {
+                let (xs, ys, samples) = block.places(first);
+                for lane in 0..PACKET {
+                    let place = block.place(first + lane as u32);
+                    assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");
+                }
+            }
+        }
     }
 }

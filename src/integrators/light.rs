@@ -1,163 +1,477 @@
-//! Direct light at a vertex: every light with its own shadow rays.
+//! Direct light at vertices, in rows of sixteen: every light with its own shadow rays.
 
-use super::queues::{Arrival, ShadowQueue};
 use super::shot::Shot;
-use super::sink::{Reflected, Sink};
-use super::vertices::{LitVertex, Outlook};
-use super::view::Measure;
+use super::sink::Sink;
+use super::vertices::LitVertex;
+use super::view::{Measure, Parts};
+use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::lights::{Light, LightSamples, SeenLight};
+use crate::geometry::rows::{Ends, RayRows, lanes};
+use crate::lights::{Light, LightRow, SourceRow};
+use crate::materials::phong::{PhongBsdf, lobe};
 use crate::math::Vec3;
-use crate::math::lanes::lane;
-use crate::sampling::{Decision, Repetitions};
+use crate::math::color::luminance;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
 use crate::world::Loops;
 
-/// Where direct light goes.
-pub struct DirectLight<'a, 's> {
-    /// What all have in common.
-    pub shot: &'a Shot<'a>,
-    /// Shadow rays that wait to be traced.
-    pub shadows: &'a mut ShadowQueue,
-    /// Memory for the samples of one light for one point.
-    pub samples: &'a mut Vec<LightSamples>,
-    /// What takes the light.
-    pub sink: Sink<'s>,
+/// Vertices that wait to be lit, side by side; each is lit alone, whatever it shares its row with.
+#[derive(Default)]
+pub struct LitQueue {
+    rows: Vec<LitRow>,
+    /// Rows that are in use; the others are memory.
+    count: usize,
+    /// The one that takes single vertices; full or none where this is no row in use.
+    open: usize,
+    /// What lamps send by the vertex of each path of the round.
+    arrived: Vec<Vec3>,
 }
 
-impl DirectLight<'_, '_> {
-    /// Light a vertex: contributions wait for their shadow rays.
-    pub fn shade(&mut self, vertex: &LitVertex<'_>) {
-        let (shot, outlook) = (self.shot, vertex.vertex.outlook(self.shot));
-        let point = outlook.point;
-        let mut arrivals = Arrivals::new(self, vertex, outlook);
-        for (number, light) in shot.world.lights.iter() {
-            match light.seen_from(point) {
-                Some(SeenLight::Only(sample)) => arrivals.push(&sample.into(), 1.0),
-                Some(seen) => arrivals.push_samples(&seen, number),
-                None => {}
-            }
-            arrivals.end(light);
+/// Vertices to be lit.
+#[derive(Clone)]
+pub struct LitRow {
+    /// A bit for each lane with a vertex.
+    pub used: u32,
+    /// Where lights are seen from and shadow rays start.
+    pub from: Lanes3,
+    /// Normals behind which nothing is seen, of the lanes whose bits are set.
+    horizon: Lanes3,
+    is_bounded: u32,
+    /// Normals that the cosines are of.
+    pub normal: Lanes3,
+    /// Those before a normal map bent them, and the cosine between; [`UNBENT`] where none did.
+    smooth_normal: Lanes3,
+    bend: Lanes,
+    /// The direction to the eye, mirrored.
+    pub mirrored_eye: Lanes3,
+    /// The diffuse part of f in sr⁻¹, and the glossy one at its peak.
+    pub diffuse: Lanes3,
+    /// [`LitRow::diffuse`].
+    pub specular: Lanes3,
+    /// Of the glossy lobe.
+    pub shininess: Lanes,
+    /// Of the paths.
+    pub throughput: Lanes3,
+    /// Of the paths.
+    pub slot: [u32; LANES],
+    /// Of the paths.
+    pub path: [u32; LANES],
+    /// Places of the paths in the round's queue.
+    pub place: [u32; LANES],
+    /// Whether any vertex has a glossy lobe.
+    pub is_glossy: bool,
+    /// Whether any vertex has a bent normal.
+    is_bent: bool,
+}
+
+/// In place of the cosine between two normals that are one.
+const UNBENT: f32 = -2.0;
+
+impl LitRow {
+    /// No vertex.
+    pub const EMPTY: Self = Self {
+        used: 0,
+        from: [[0.0; LANES]; 3],
+        horizon: [[0.0; LANES]; 3],
+        is_bounded: 0,
+        normal: [[0.0; LANES]; 3],
+        smooth_normal: [[0.0; LANES]; 3],
+        bend: [UNBENT; LANES],
+        mirrored_eye: [[0.0; LANES]; 3],
+        diffuse: [[0.0; LANES]; 3],
+        specular: [[0.0; LANES]; 3],
+        shininess: [0.0; LANES],
+        throughput: [[0.0; LANES]; 3],
+        slot: [0; LANES],
+        path: [0; LANES],
+        place: [0; LANES],
+        is_glossy: false,
+        is_bent: false,
+    };
+
+    /// For other vertices, with normals as they are.
+    #[inline(always)]
+    pub fn reset(&mut self) {
+        (self.used, self.is_bounded, self.is_glossy, self.is_bent) = (0, 0, false, false);
+        self.bend = [UNBENT; LANES];
+    }
+
+    /// Take a vertex of another row.
+    fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        for (own, other) in [
+            (&mut self.from, &other.from),
+            (&mut self.horizon, &other.horizon),
+            (&mut self.normal, &other.normal),
+            (&mut self.smooth_normal, &other.smooth_normal),
+            (&mut self.mirrored_eye, &other.mirrored_eye),
+            (&mut self.diffuse, &other.diffuse),
+            (&mut self.specular, &other.specular),
+            (&mut self.throughput, &other.throughput),
+        ] {
+            set_lane(own, i, lane(other, from));
         }
-        arrivals.finish();
+        (self.bend[i], self.shininess[i]) = (other.bend[from], other.shininess[from]);
+        (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
+        self.is_glossy |= other.is_glossy;
+        self.is_bent |= other.is_bent;
+        self.is_bounded |= (other.is_bounded >> from & 1) << i;
+        self.used |= 1 << i;
+    }
+
+    fn put(&mut self, i: usize, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+        let LitVertex { path, place, vertex, shading, bsdf } = lit;
+        let outlook = vertex.outlook(shot);
+        set_lane(&mut self.from, i, outlook.point);
+        set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
+        self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;
+        set_lane(&mut self.normal, i, shading.normal);
+        set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
+        self.bend[i] = shading.bend.unwrap_or(UNBENT);
+        set_lane(&mut self.mirrored_eye, i, shading.mirrored(vertex.to_eye));
+        let [diffuse, specular] = bsdf_parts(bsdf, measure);
+        set_lane(&mut self.diffuse, i, diffuse);
+        set_lane(&mut self.specular, i, specular);
+        self.shininess[i] = bsdf.shininess;
+        set_lane(&mut self.throughput, i, path.throughput);
+        (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
+        self.is_glossy |= specular != Vec3::ZERO;
+        self.is_bent |= shading.bend.is_some();
+        self.used |= 1 << i;
     }
 }
 
-/// Draws samples of a light.
-struct Draw<'a, 'l> {
-    light: &'a SeenLight<'l>,
-    numbers: Repetitions,
-    queue: &'a mut Vec<LightSamples>,
+/// A bit for each lane.
+const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
+
+/// The diffuse part of f in sr⁻¹, and the glossy one at its peak, as far as they are shown.
+#[inline(always)]
+pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
+    let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
+    match measure {
+        Measure::Radiance(Parts { diffuse, specular, .. }) => {
+            [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
+        }
+        Measure::ArrivingShare => [Vec3::ONE, Vec3::ZERO],
+    }
 }
 
-impl Loops for Draw<'_, '_> {
-    type Done = ();
+impl LitQueue {
+    /// Rows from which on they are lit before more come, while what they need is in the cache.
+    const FULL: usize = 64;
+
+    /// Fewer vertices of a row are put together with others.
+    const WORTH_A_ROW: u32 = 8;
+
+    /// Whether they are to be lit now.
+    pub fn is_full(&self) -> bool {
+        self.count >= Self::FULL
+    }
+
+    /// A round of so many paths begins.
+    pub fn expect(&mut self, paths: usize) {
+        self.clear();
+        self.arrived.clear();
+        self.arrived.resize(paths, Vec3::ZERO);
+    }
+
+    /// The round is over: the sink gets what lamps send, in the order of the paths, whose slots are told by their places.
+    pub fn settle(&mut self, slot: impl Fn(usize) -> u32, sink: &mut Sink<'_>) {
+        for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
+            sink.add_arrived(slot(place), *light);
+        }
+    }
+
+    /// A row to be filled, to be kept by [`LitQueue::keep`] or forgotten.
+    pub fn spare(&mut self) -> &mut LitRow {
+        if self.count == self.rows.len() {
+            self.rows.push(LitRow::EMPTY);
+        }
+        &mut self.rows[self.count]
+    }
+
+    /// Keep the vertices of the spare row.
+    pub fn keep(&mut self) {
+        let used = self.rows[self.count].used;
+        if used.count_ones() >= Self::WORTH_A_ROW {
+            self.count += 1;
+            return;
+        }
+        let row = self.rows[self.count].clone();
+        for lane in lanes(used) {
+            let (own, i) = self.open_row();
+            own.copy(i, &row, lane);
+        }
+    }
+
+    /// One more vertex.
+    pub fn push(&mut self, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+        let (row, lane) = self.open_row();
+        row.put(lane, shot, lit, measure);
+    }
+
+    /// A row with a free lane.
+    fn open_row(&mut self) -> (&mut LitRow, usize) {
+        if self.open >= self.count || self.rows[self.open].used == ALL {
+            self.spare().reset();
+            self.open = self.count;
+            self.count += 1;
+        }
+        let row = &mut self.rows[self.open];
+        let lane = row.used.trailing_ones() as usize;
+        (row, lane)
+    }
+
+    /// Forget all vertices.
+    fn clear(&mut self) {
+        (self.count, self.open) = (0, 0);
+    }
+
+    /// Light all vertices and forget them; how many shadow rays that took.
+    pub fn light(&mut self, shot: &Shot<'_>, measure: Measure) -> Result<u64, Cancelled> {
+        let mut rays = 0;
+        for row in &self.rows[..self.count] {
+            shot.token.check()?;
+            let work = Lighting { shot, row, used: row.used, measure };
+            let arrived = shot.world.geometry.instructions().run(work);
+            rays += arrived.rays;
+            for i in lanes(row.used) {
+                self.arrived[row.place[i] as usize] = lane(&arrived.light, i) * lane(&row.throughput, i);
+            }
+        }
+        self.clear();
+        Ok(rays)
+    }
+}
+
+/// Lights the vertices of a row whose bits are set.
+struct Lighting<'a> {
+    shot: &'a Shot<'a>,
+    row: &'a LitRow,
+    used: u32,
+    measure: Measure,
+}
+
+/// What arrives at the vertices of a row.
+struct Arrived {
+    light: Lanes3,
+    rays: u64,
+}
+
+/// Sums over the lights.
+struct Sums {
+    /// Of what arrives.
+    light: Lanes3,
+    /// Of what could.
+    total: Lanes,
+    rays: u64,
+}
+
+/// What a light could send, before one ray tells whether it does.
+struct Waiting {
+    light: Lanes3,
+    active: u32,
+}
+
+impl Loops for Lighting<'_> {
+    type Done = Arrived;
 
     #[inline(always)]
-    fn run(self) {
-        for (numbers, used) in self.numbers {
-            self.light.samples(numbers, used, self.queue);
-        }
-    }
-}
-
-/// Takes what arrives at a vertex to the sink or to the queue of shadow rays.
-struct Arrivals<'a, 'l, 's, 'v> {
-    light: &'a mut DirectLight<'l, 's>,
-    vertex: &'a LitVertex<'v>,
-    outlook: Outlook,
-    /// Length of the queue before.
-    first: usize,
-    /// Sum of all that could arrive.
-    total: f32,
-    /// What could arrive of the light at hand where one ray decides for all of it.
-    of_light: Vec3,
-}
-
-impl<'a, 'l, 's, 'v> Arrivals<'a, 'l, 's, 'v> {
-    fn new(light: &'a mut DirectLight<'l, 's>, vertex: &'a LitVertex<'v>, outlook: Outlook) -> Self {
-        let first = light.shadows.len();
-        Self { light, vertex, outlook, first, total: 0.0, of_light: Vec3::ZERO }
-    }
-
-    /// As many samples of a light as the settings ask for.
-    fn push_samples(&mut self, light: &SeenLight<'_>, number: u32) {
-        let (shot, path) = (self.light.shot, self.vertex.path);
-        let count = shot.settings.render.shadow_samples;
-        let numbers = shot.sampler(path.slot).pairs(path.path, Decision::Light(number), count);
-        let mut queue = std::mem::take(self.light.samples);
-        queue.clear();
-        shot.world.geometry.instructions().run(Draw { light, numbers, queue: &mut queue });
-        for samples in &queue {
-            self.push(samples, 1.0 / count as f32);
-        }
-        *self.light.samples = queue;
-    }
-
-    /// Samples of one light, each of which counts as this share of it.
-    fn push(&mut self, samples: &LightSamples, share: f32) {
-        let LitVertex { vertex, shading, bsdf, .. } = self.vertex;
-        let arriving = samples.radiance * share;
-        let [diffuse, specular] = self.light.sink.taken(&Reflected {
-            arriving,
-            diffuse: arriving * bsdf.diffuse_value(),
-            specular: arriving * bsdf.specular_peak(),
-        });
-        let cosines = shading.cosines(&samples.directions);
-        let mirrored = shading.mirrored_cosines(vertex.to_eye, &samples.directions);
-        for i in 0..samples.count {
-            let factor = cosines[i] * samples.factors[i];
-            if !(factor > 0.0) {
-                continue;
-            }
-            let mut value = diffuse;
-            if specular != Vec3::ZERO {
-                value += specular * bsdf.specular_part(mirrored[i]);
-            }
-            value *= factor;
-            if value != Vec3::ZERO {
-                self.arrive(value, samples, i);
-            }
-        }
-    }
-
-    /// What arrives by one of some samples if nothing is in its way.
-    fn arrive(&mut self, value: Vec3, samples: &LightSamples, i: usize) {
-        let (contribution, slot) = (value * self.vertex.path.throughput, self.vertex.path.slot);
-        self.total += value.x;
-        match self.light.shot.settings.render.shadows {
-            Shadows::Soft if self.outlook.hides(lane(&samples.directions, i)) => {}
-            Shadows::Soft => {
-                let ray = samples.ray(self.outlook.point, i);
-                self.light.shadows.push(ray, samples.source, Arrival { contribution, slot });
-            }
-            Shadows::Hard | Shadows::Off => self.of_light += contribution,
-        }
-    }
-
-    /// No more of a light: what waits for one ray goes to its middle.
-    fn end(&mut self, light: &Light) {
-        let contribution = std::mem::take(&mut self.of_light);
-        if contribution != Vec3::ZERO {
-            let (middle, source) = light.middle();
-            if self.outlook.hides(middle - self.outlook.point) {
-                return;
-            }
-            let ray = Ray::segment(self.outlook.point, middle);
-            let slot = self.vertex.path.slot;
-            self.light.shadows.push(ray, source, Arrival { contribution, slot });
-        }
-    }
-
-    /// Contributions become parts of the whole that could arrive, where that is what is measured.
-    fn finish(self) {
-        match self.light.sink.measure {
-            Measure::Radiance(_) => {}
-            Measure::ArrivingShare => {
-                for arrival in &mut self.light.shadows.arrivals[self.first..] {
-                    arrival.contribution /= self.total;
+    fn run(self) -> Arrived {
+        let render = &self.shot.settings.render;
+        let sampler = self.sampler();
+        let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: 0 };
+        for (number, light) in self.shot.world.lights.iter() {
+            // Where one ray decides for all of a light, what it could send waits for that.
+            let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
+            if light.is_single() {
+                let nowhere = [[0.0; LANES]; 2];
+                let samples = light.sample_row(&self.row.from, self.used, &nowhere);
+                self.add(&samples, 1.0, &mut sums, &mut waiting);
+            } else {
+                let count = render.shadow_samples;
+                for repetition in 0..count {
+                    let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
+                    let samples = light.sample_row(&self.row.from, self.used, &u);
+                    self.add(&samples, 1.0 / count as f32, &mut sums, &mut waiting);
                 }
             }
+            if waiting.active != 0 {
+                self.add_waiting(light, &waiting, &mut sums);
+            }
+        }
+        if self.measure == Measure::ArrivingShare {
+            for i in 0..LANES {
+                let share = if sums.total[i] > 0.0 { sums.light[0][i] / sums.total[i] } else { 0.0 };
+                set_lane(&mut sums.light, i, Vec3::splat(share));
+            }
+        }
+        Arrived { light: sums.light, rays: sums.rays }
+    }
+}
+
+impl Lighting<'_> {
+    #[inline(always)]
+    fn sampler(&self) -> SamplerRow<LANES> {
+        let (block, slots) = (self.shot.block, &self.row.slot);
+        let mut is_run = true;
+        for i in 0..LANES {
+            is_run &= slots[i] == slots[0] + i as u32;
+        }
+        let (xs, ys, samples) = if is_run {
+            block.places(slots[0])
+        } else {
+            let [mut xs, mut ys, mut samples] = [[0; LANES]; 3];
+            for i in (0..LANES).filter(|i| self.used & 1 << i != 0) {
+                (xs[i], ys[i], samples[i]) = block.place(slots[i]);
+            }
+            (xs, ys, samples)
+        };
+        SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples)
+    }
+
+    /// Add samples of one light, each of which counts as this share of it; what waits for one ray is put beside.
+    #[inline(always)]
+    fn add(&self, samples: &LightRow, share: f32, sums: &mut Sums, waiting: &mut Waiting) {
+        let (values, active) = self.values(samples, share);
+        if active == 0 {
+            return;
+        }
+        for i in 0..LANES {
+            let is_active = active & 1 << i != 0;
+            sums.total[i] += if is_active { values[0][i] } else { 0.0 };
+        }
+        if self.shot.settings.render.shadows == Shadows::Soft {
+            let (rays, ends) = self.shadow_rays(samples, active & !self.hidden(&samples.directions));
+            self.add_seen(&rays, &ends, &samples.sources, &values, sums);
+        } else {
+            waiting.active |= active;
+            add_where(active, &values, &mut waiting.light);
         }
     }
+
+    /// A bit for each vertex that certainly sees nothing in a direction.
+    #[inline(always)]
+    fn hidden(&self, directions: &Lanes3) -> u32 {
+        let mut hidden = 0;
+        if self.row.is_bounded != 0 {
+            for i in 0..LANES {
+                let cosine = lane(&self.row.horizon, i).dot(lane(directions, i));
+                let bit = 1 << i;
+                hidden |= if cosine > 0.0 { 0 } else { bit };
+            }
+        }
+        hidden & self.row.is_bounded
+    }
+
+    /// What waits for one ray to the middle of its light.
+    #[inline(always)]
+    fn add_waiting(&self, light: &Light, waiting: &Waiting, sums: &mut Sums) {
+        if self.shot.settings.render.shadows == Shadows::Off {
+            return add_where(waiting.active, &waiting.light, &mut sums.light);
+        }
+        let (middle, source) = light.middle();
+        let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
+        for i in 0..LANES {
+            let ray = Ray::segment(lane(&self.row.from, i), middle);
+            set_lane(&mut direction, i, ray.direction);
+            ends[i] = ray.t_max;
+        }
+        let traced = waiting.active & !self.hidden(&direction);
+        for i in 0..LANES {
+            ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
+        }
+        let rays = RayRows::of(self.row.from, direction);
+        self.add_seen(&rays, &ends, &SourceRow::of(source), &waiting.light, sums);
+    }
+
+    /// Add what arrives on rays; those that are not traced end below 0.
+    #[inline(always)]
+    fn add_seen(&self, rays: &RayRows, ends: &Ends, sources: &SourceRow, values: &Lanes3, sums: &mut Sums) {
+        let mut traced = 0_u32;
+        for i in 0..LANES {
+            let bit = 1 << i;
+            traced |= if ends[i] >= 0.0 { bit } else { 0 };
+        }
+        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
+        sums.rays += u64::from(traced.count_ones());
+        add_where(traced & !occluded, values, &mut sums.light);
+    }
+
+    /// What each sample brings if nothing is in its way, and a bit for each that brings anything.
+    #[inline(always)]
+    fn values(&self, samples: &LightRow, share: f32) -> (Lanes3, u32) {
+        let row = self.row;
+        let mut cosines = [0.0; LANES];
+        for i in 0..LANES {
+            cosines[i] = lane(&row.normal, i).dot(lane(&samples.directions, i));
+        }
+        if row.is_bent {
+            for i in 0..LANES {
+                let smooth = lane(&row.smooth_normal, i).dot(lane(&samples.directions, i));
+                cosines[i] *= terminator(cosines[i], smooth, row.bend[i]);
+            }
+        }
+        let mut f = row.diffuse;
+        if row.is_glossy {
+            for i in 0..LANES {
+                let mirrored = lane(&row.mirrored_eye, i).dot(lane(&samples.directions, i));
+                let value = lane(&row.diffuse, i) + lane(&row.specular, i) * lobe(mirrored, row.shininess[i]);
+                set_lane(&mut f, i, value);
+            }
+        }
+        let mut arriving = samples.weights;
+        if self.measure == Measure::ArrivingShare {
+            for i in 0..LANES {
+                let light = Vec3::splat(luminance(lane(&samples.weights, i)));
+                set_lane(&mut arriving, i, light);
+            }
+        }
+        let (mut values, mut active) = (f, 0);
+        for i in 0..LANES {
+            let value = lane(&f, i) * lane(&arriving, i) * (cosines[i] * share);
+            set_lane(&mut values, i, value);
+            let bit = 1 << i;
+            let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
+            active |= if brings { bit } else { 0 };
+        }
+        (values, active & self.used)
+    }
+
+    /// The rays on which the light of the samples in `active` arrives; the others have no end.
+    #[inline(always)]
+    fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
+        let (mut direction, mut ends) = (samples.directions, [-1.0; LANES]);
+        for i in 0..LANES {
+            let ray = Ray::segment(lane(&self.row.from, i), lane(&samples.targets, i));
+            set_lane(&mut direction, i, ray.direction);
+            ends[i] = if active & 1 << i != 0 { ray.t_max } else { -1.0 };
+        }
+        for i in lanes(samples.beyond & active) {
+            set_lane(&mut direction, i, lane(&samples.directions, i));
+            ends[i] = f32::INFINITY;
+        }
+        (RayRows::of(self.row.from, direction), ends)
+    }
+}
+
+/// Add the values of the lanes whose bits are set.
+#[inline(always)]
+fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let is_added = bits & 1 << i != 0;
+            sums[axis][i] += if is_added { values[axis][i] } else { 0.0 };
+        }
+    }
+}
+
+/// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing
+/// bends them (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+#[inline(always)]
+fn terminator(cosine: f32, smooth: f32, bend: f32) -> f32 {
+    let g = smooth / (cosine * bend);
+    let g = if g < 1.0 { g } else { 1.0 };
+    let soft = if bend > 0.0 { -g * g * g + g * g + g } else { 1.0 };
+    if (smooth > 0.0) | (bend == UNBENT) { soft } else { 0.0 }
 }

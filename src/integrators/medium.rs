@@ -26,6 +26,11 @@ impl Medium {
         &self.inside[..usize::from(self.count)]
     }
 
+    /// Whether no glass is known of.
+    pub fn is_air(&self) -> bool {
+        self.count == 0
+    }
+
     /// The glass that counts.
     pub fn glass(&self) -> Option<Inside> {
         self.known().last().copied()

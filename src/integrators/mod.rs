@@ -10,6 +10,7 @@ mod counters;
 mod crossing;
 mod light;
 mod medium;
+mod packet;
 mod queues;
 mod settings;
 mod shot;
@@ -24,10 +25,10 @@ mod whitted;
 use std::ops::Range;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Rect, TileSamples};
+use crate::film::{NegativeLobes, Rect, TileSamples};
 use crate::math::Vec3;
 use crate::scene::description::Integrator;
-use crate::world::World;
+use crate::world::{PACKET, World};
 pub use counters::RayCounters;
 use queues::Queues;
 pub use settings::RenderSettings;
@@ -51,27 +52,40 @@ pub fn render_tile(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     let block = SampleBlock { tile, samples };
-    let (mut radiance, mut arrived) = (vec![Vec3::ZERO; block.len()], vec![Vec3::ZERO; block.len()]);
+    let weight = settings.render.filter.negative_weight();
+    let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
+    let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
     let shot = Shot { world, settings, block: &block, token };
     let mut queues = Queues::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
-        shot.camera_rays(slots, &mut queues.rays);
-        counters.camera_rays += queues.rays.len() as u64;
+        counters.camera_rays += slots.len() as u64;
+        let negative = |first: u32, bits: u32| mark(&mut is_negative, first, bits);
         match settings.view.shown() {
             Shown::FirstHit(number) => {
+                shot.camera_rays(slots, &mut queues.rays, negative);
                 views::shade(&shot, number, &mut queues, &mut radiance, &mut counters)?;
             }
             Shown::Light(measure) => {
-                let sink = Sink { measure, radiance: &mut radiance, arrived: &mut arrived };
+                let sink = Sink { measure, radiance: &mut radiance };
                 match settings.render.integrator {
-                    Integrator::Whitted => whitted::trace(&shot, &mut queues, sink, &mut counters)?,
+                    Integrator::Whitted => {
+                        whitted::trace(&shot, slots, &mut queues, sink, &mut counters, negative)?;
+                    }
                 }
             }
         }
     }
     queues.leave();
-    radiance.iter_mut().zip(arrived).for_each(|(radiance, arrived)| *radiance += arrived);
-    Ok((TileSamples { rect: block.tile, samples: block.samples.len() as u32, radiance }, counters))
+    let negative = weight.map(|weight| NegativeLobes { weight, is_negative });
+    let samples = block.samples.len() as u32;
+    Ok((TileSamples { rect: block.tile, samples, radiance, negative }, counters))
+}
+
+/// Mark the slots from `first` on whose bits are set.
+fn mark(marked: &mut [bool], first: u32, bits: u32) {
+    for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET).enumerate() {
+        *marked = bits & 1 << lane != 0;
+    }
 }

@@ -3,9 +3,9 @@
 use std::cell::RefCell;
 
 use super::crossing::CrossingMemory;
+use super::light::LitQueue;
 use super::medium::Medium;
 use crate::geometry::Ray;
-use crate::lights::{LightSamples, Source};
 use crate::math::Vec3;
 use crate::world::Hit;
 
@@ -31,55 +31,6 @@ impl PathRay {
     }
 }
 
-/// Shadow rays that wait to be traced: segments from surfaces to lights, in packets that lie as they are traced.
-#[derive(Default)]
-pub struct ShadowQueue {
-    /// The segments.
-    pub rays: Vec<Ray>,
-    /// The light that each goes to, which may be hit.
-    pub sources: Vec<Source>,
-    /// What each brings if nothing is in its way.
-    pub arrivals: Vec<Arrival>,
-}
-
-/// What a shadow ray brings.
-#[derive(Clone, Copy, Debug)]
-pub struct Arrival {
-    /// Radiance for the sample.
-    pub contribution: Vec3,
-    /// The sample.
-    pub slot: u32,
-}
-
-impl ShadowQueue {
-    /// Rays from which on they are traced before more are made, while what they need is in the cache.
-    const FULL: usize = 1024;
-
-    /// How many wait.
-    pub fn len(&self) -> usize {
-        self.rays.len()
-    }
-
-    /// Whether they are to be traced now.
-    pub fn is_full(&self) -> bool {
-        self.len() >= Self::FULL
-    }
-
-    /// One more.
-    pub fn push(&mut self, ray: Ray, source: Source, arrival: Arrival) {
-        self.rays.push(ray);
-        self.sources.push(source);
-        self.arrivals.push(arrival);
-    }
-
-    /// Forget all.
-    pub fn clear(&mut self) {
-        self.rays.clear();
-        self.sources.clear();
-        self.arrivals.clear();
-    }
-}
-
 /// The memory of batches, used again by each.
 #[derive(Default)]
 pub struct Queues {
@@ -87,10 +38,8 @@ pub struct Queues {
     pub rays: Vec<PathRay>,
     /// Rays of the next round.
     pub next: Vec<PathRay>,
-    /// Shadow rays of this round that are not traced yet.
-    pub shadows: ShadowQueue,
-    /// Samples of one light for one point.
-    pub samples: Vec<LightSamples>,
+    /// Vertices of this round that are not lit yet.
+    pub lit: LitQueue,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
     /// What is near to a hit of glass.
@@ -98,19 +47,14 @@ pub struct Queues {
 }
 
 impl Queues {
-    /// What a thread holds between tiles.
-    const MOST_SHADOWS: usize = 1 << 18;
-
     /// Those that this thread left from its last tile; [`Queues::leave`] them for the next.
     pub fn of_thread() -> Self {
         QUEUES.take()
     }
 
-    /// For the next tile of this thread, unless many lights made them very long.
+    /// For the next tile of this thread.
     pub fn leave(self) {
-        if self.shadows.rays.capacity() <= Self::MOST_SHADOWS {
-            QUEUES.set(self);
-        }
+        QUEUES.set(self);
     }
 }
 

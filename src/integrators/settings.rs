@@ -19,10 +19,11 @@ pub struct RenderSettings {
 impl RenderSettings {
     /// A place in the picture, in pixels from its top left corner, as the camera takes it: from its middle to the right
     /// and up, in halves of its height.
+    #[inline(always)]
     pub fn from_middle(&self, from_corner: DVec2) -> DVec2 {
         let Render { width, height, .. } = self.render;
         let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
-        DVec2::new(from_corner.x - half_width, half_height - from_corner.y) / half_height
+        DVec2::new(from_corner.x - half_width, half_height - from_corner.y) * (1.0 / half_height)
     }
 }
 

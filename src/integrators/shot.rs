@@ -6,7 +6,7 @@ use super::RenderSettings;
 use crate::control::CancelToken;
 use crate::film::Rect;
 use crate::sampling::PixelSampler;
-use crate::world::World;
+use crate::world::{PACKET, World};
 
 /// A world, how it is rendered, and the samples that are asked for.
 pub struct Shot<'a> {
@@ -48,5 +48,23 @@ impl SampleBlock {
         let (pixel, sample) = (slot / samples, slot % samples);
         let (x, y) = (pixel % self.tile.width, pixel / self.tile.width);
         (self.tile.x + x, self.tile.y + y, self.samples.start + sample)
+    }
+
+    /// Columns, rows and sample numbers of the slots from `first` on, also beyond the last.
+    #[inline(always)]
+    pub fn places(&self, first: u32) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
+        let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
+        let (mut x, mut y, mut sample) = self.place(first);
+        for lane in 0..PACKET {
+            (xs[lane], ys[lane], samples[lane]) = (x, y, sample);
+            sample += 1;
+            if sample == self.samples.end {
+                (x, sample) = (x + 1, self.samples.start);
+                if x == self.tile.x + self.tile.width {
+                    (x, y) = (self.tile.x, y + 1);
+                }
+            }
+        }
+        (xs, ys, samples)
     }
 }

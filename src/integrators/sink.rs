@@ -2,9 +2,8 @@
 
 use super::view::{Measure, Parts};
 use crate::math::Vec3;
-use crate::math::color::luminance;
 
-/// What a contribution that nothing can stop is.
+/// What a contribution that no lamp sends is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Sent out by a surface, or by what is behind everything.
@@ -13,26 +12,13 @@ pub enum Part {
     Ambient,
 }
 
-/// Light of a lamp that a vertex reflects to the eye, by parts.
-#[derive(Clone, Copy, Debug)]
-pub struct Reflected {
-    /// The radiance that is reflected.
-    pub arriving: Vec3,
-    /// What the diffuse lobe makes of it.
-    pub diffuse: Vec3,
-    /// What the glossy lobe makes of it where the mirrored direction is the eye's.
-    pub specular: Vec3,
-}
-
-/// Takes what a view shows. What nothing can stop and what shadow rays bring are added up apart, each in the order of the paths,
-/// whenever the shadow rays are traced.
+/// Takes what a view shows, of each round of paths first what no lamp sends and then what lamps send, in the order of the
+/// paths.
 pub struct Sink<'a> {
     /// What the numbers are.
     pub measure: Measure,
-    /// Sums of what nothing can stop, by slot.
+    /// Sums, by slot.
     pub radiance: &'a mut [Vec3],
-    /// Sums of what shadow rays bring, by slot.
-    pub arrived: &'a mut [Vec3],
 }
 
 impl Sink<'_> {
@@ -64,19 +50,8 @@ impl Sink<'_> {
         }
     }
 
-    /// What is taken: that which is the same in all directions, and that where the mirrored direction is the eye's.
-    pub fn taken(&self, light: &Reflected) -> [Vec3; 2] {
-        let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
-        match self.measure {
-            Measure::Radiance(parts) => {
-                [part(parts.diffuse, light.diffuse), part(parts.specular, light.specular)]
-            }
-            Measure::ArrivingShare => [Vec3::splat(luminance(light.arriving)), Vec3::ZERO],
-        }
-    }
-
-    /// What a shadow ray brings.
+    /// What lamps send to the eye by a vertex.
     pub fn add_arrived(&mut self, slot: u32, contribution: Vec3) {
-        self.arrived[slot as usize] += contribution;
+        self.radiance[slot as usize] += contribution;
     }
 }

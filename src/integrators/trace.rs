@@ -1,11 +1,9 @@
 //! From rays in queues to what they meet.
 
-use super::queues::{PathRay, ShadowQueue};
+use super::queues::PathRay;
 use super::shot::Shot;
-use super::sink::Sink;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET};
 
 /// Rays between two looks at the token.
@@ -24,27 +22,5 @@ impl Shot<'_> {
             }
         }
         Ok(())
-    }
-
-    /// Give the sink what arrives by the shadow rays in a queue, in their order, and empty it; how many were traced.
-    pub fn trace_shadows(&self, queue: &mut ShadowQueue, sink: &mut Sink<'_>) -> Result<u64, Cancelled> {
-        let is_traced = self.settings.render.shadows != Shadows::Off;
-        let ShadowQueue { rays, sources, arrivals } = &*queue;
-        let packets = rays.chunks(PACKET).zip(sources.chunks(PACKET)).zip(arrivals.chunks(PACKET));
-        for (number, ((rays, sources), arrivals)) in packets.enumerate() {
-            if number.is_multiple_of(POLL_INTERVAL / PACKET) {
-                self.token.check()?;
-            }
-            let geometry = &self.world.geometry;
-            let occluded = if is_traced { geometry.occluded_packet(rays, sources) } else { 0 };
-            for (lane, arrival) in arrivals.iter().enumerate() {
-                if occluded & 1 << lane == 0 {
-                    sink.add_arrived(arrival.slot, arrival.contribution);
-                }
-            }
-        }
-        let count = if is_traced { queue.len() as u64 } else { 0 };
-        queue.clear();
-        Ok(count)
     }
 }

@@ -10,7 +10,6 @@ use crate::lights::Source;
 use crate::materials::Material;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
-use crate::math::lanes::{Lanes, Lanes3, dot, lane};
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
 
@@ -120,14 +119,7 @@ pub struct Outlook {
     /// The point that lights are seen from and shadow rays start from.
     pub point: Vec3,
     /// A normal: nothing is seen behind it. None where the cosines say so anyway, or the shadow rays.
-    horizon: Option<Vec3>,
-}
-
-impl Outlook {
-    /// Whether light from a direction is certainly stopped.
-    pub fn hides(&self, direction: Vec3) -> bool {
-        self.horizon.is_some_and(|normal| !(normal.dot(direction) > 0.0))
-    }
+    pub horizon: Option<Vec3>,
 }
 
 /// The normals that shading goes by, on the eye's side.
@@ -135,41 +127,16 @@ pub struct Shading {
     /// The interpolated normal, bent by a normal map.
     pub normal: Vec3,
     /// The interpolated normal.
-    smooth_normal: Vec3,
+    pub smooth_normal: Vec3,
     /// The cosine between them; none where nothing bends them apart.
-    bend: Option<f32>,
+    pub bend: Option<f32>,
 }
 
 impl Shading {
-    /// Cosines at the surface for light from some directions, softened where bent normals leave the light; not above 0 where
-    /// the light is behind the smooth surface or its bent normal.
-    pub fn cosines(&self, directions: &Lanes3) -> Lanes {
-        let mut cosines = dot(directions, self.normal);
-        if self.bend.is_some() {
-            for (i, cosine) in cosines.iter_mut().enumerate().filter(|(_, cosine)| **cosine > 0.0) {
-                *cosine *= self.terminator(*cosine, lane(directions, i));
-            }
-        }
-        cosines
-    }
-
-    /// Cosines between the mirrored directions and the one to the eye.
-    pub fn mirrored_cosines(&self, to_eye: Vec3, directions: &Lanes3) -> Lanes {
+    /// The direction to the eye, mirrored: its cosine with a direction is that between the direction mirrored and the eye's.
+    pub fn mirrored(&self, to_eye: Vec3) -> Vec3 {
         // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
-        let mirrored_eye = self.normal * (2.0 * self.normal.dot(to_eye)) - to_eye;
-        dot(directions, mirrored_eye)
-    }
-
-    /// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing
-    /// bends them (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
-    fn terminator(&self, cosine: f32, direction: Vec3) -> f32 {
-        let Some(between) = self.bend else { return 1.0 };
-        let smooth = self.smooth_normal.dot(direction);
-        if !(smooth > 0.0) {
-            return 0.0;
-        }
-        let g = (smooth / (cosine * between)).min(1.0);
-        if between > 0.0 { -g * g * g + g * g + g } else { 1.0 }
+        self.normal * (2.0 * self.normal.dot(to_eye)) - to_eye
     }
 }
 
@@ -177,6 +144,8 @@ impl Shading {
 pub struct LitVertex<'a> {
     /// The path that came here.
     pub path: &'a PathRay,
+    /// Its place in the round's queue.
+    pub place: u32,
     /// Where.
     pub vertex: &'a Vertex<'a>,
     /// What shading goes by.

@@ -1,10 +1,13 @@
 //! Direct light by Phong, mirror, glass and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*,
 //! 1980), over queues instead of recursion.
 
+use std::ops::Range;
+
 use super::RayCounters;
 use super::crossing::{Crossing, CrossingMemory};
-use super::light::DirectLight;
+use super::light::LitQueue;
 use super::medium::{Medium, absorption};
+use super::packet::Rays;
 use super::queues::{PathRay, Queues};
 use super::shot::Shot;
 use super::sink::{Part, Sink};
@@ -12,10 +15,11 @@ use super::specular::{Interface, interface, reflected};
 use super::vertices::{LitVertex, Vertex};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
+use crate::geometry::rows::lanes;
 use crate::materials::{Bsdf, Mirror, Phong};
 use crate::math::Vec3;
 use crate::sampling::Decision;
-use crate::world::Hit;
+use crate::world::{Hit, PACKET};
 
 /// A ray is split in two while the weaker part counts at least this much of its sample; below, chance takes one of them.
 const LEAST_SPLIT: f32 = 0.01;
@@ -23,33 +27,40 @@ const LEAST_SPLIT: f32 = 0.01;
 /// Surfaces where the glass stays the same that a ray passes in one round; each so many of them count as a scattering.
 const MOST_HIDDEN: usize = 64;
 
-/// Follow the camera rays in the queue to the end; the sink takes what they see.
+/// Rays between two looks at the token.
+const POLL_INTERVAL: usize = 256;
+
+/// Follow the camera rays of some slots to the end; the sink takes what they see. `negative` is told which of the slots from
+/// one on have a negative weight.
 pub fn trace(
     shot: &Shot<'_>,
+    slots: Range<u32>,
     queues: &mut Queues,
     sink: Sink<'_>,
     counters: &mut RayCounters,
+    mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, shadows, samples, hits, crossing } = queues;
-    shadows.clear();
+    let Queues { rays, next, lit, crossing, .. } = queues;
     next.clear();
-    let mut wave =
-        Wave { depth: 0, light: DirectLight { shot, shadows, samples, sink }, next, crossing, counters };
+    let mut wave = Wave { depth: 0, shot, lit, sink, next, crossing, place: 0, counters };
+    wave.lit.expect(slots.len());
+    for first in slots.clone().step_by(PACKET) {
+        let count = (slots.end - first).min(PACKET as u32) as usize;
+        let place = first - slots.start;
+        negative(first, wave.shade_packet(Rays::Camera(first, count), place)?);
+    }
+    wave.light()?;
+    wave.lit.settle(|place| slots.start + place as u32, &mut wave.sink);
+    wave.next_round(rays);
     while !rays.is_empty() {
-        shot.closest_hits(rays, hits)?;
-        for (path, hit) in rays.iter().zip(hits.iter()) {
-            match hit {
-                Some(hit) => wave.shade(*path, *hit),
-                None => wave.leave(path),
-            }
-            if wave.light.shadows.is_full() {
-                wave.trace_shadows()?;
-            }
+        wave.lit.expect(rays.len());
+        for (number, paths) in rays.chunks(PACKET).enumerate() {
+            wave.shade_packet(Rays::Paths(paths), (number * PACKET) as u32)?;
         }
-        wave.trace_shadows()?;
-        std::mem::swap(rays, wave.next);
-        wave.next.clear();
-        wave.depth += 1;
+        let slots: &[PathRay] = rays;
+        wave.light()?;
+        wave.lit.settle(|place| slots[place].slot, &mut wave.sink);
+        wave.next_round(rays);
     }
     Ok(())
 }
@@ -58,28 +69,85 @@ pub fn trace(
 struct Wave<'a, 's> {
     /// Scatterings before the hits of this round.
     depth: u32,
-    light: DirectLight<'a, 's>,
+    shot: &'a Shot<'a>,
+    /// Vertices of this round that are not lit yet.
+    lit: &'a mut LitQueue,
+    sink: Sink<'s>,
     /// Rays of the next round.
     next: &'a mut Vec<PathRay>,
+    /// Of the path at hand, in the round's queue.
+    place: u32,
     crossing: &'a mut CrossingMemory,
     counters: &'a mut RayCounters,
 }
 
 impl Wave<'_, '_> {
-    fn trace_shadows(&mut self) -> Result<(), Cancelled> {
-        let DirectLight { shot, shadows, sink, .. } = &mut self.light;
-        self.counters.shadow_rays += shot.trace_shadows(shadows, sink)?;
+    fn light(&mut self) -> Result<(), Cancelled> {
+        self.counters.shadow_rays += self.lit.light(self.shot, self.sink.measure)?;
         Ok(())
     }
 
+    /// The rays of the next round are those that were found; what is in their place is memory.
+    fn next_round(&mut self, rays: &mut Vec<PathRay>) {
+        std::mem::swap(rays, self.next);
+        self.next.clear();
+        self.depth += 1;
+    }
+
+    /// What each ray of a packet meets; its places in the round's queue start at `first`. Which of the camera's have a negative
+    /// weight.
+    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<u32, Cancelled> {
+        let shot = self.shot;
+        if (first as usize).is_multiple_of(POLL_INTERVAL) {
+            shot.token.check()?;
+        }
+        let met = shot.meet(rays, first, self.sink.measure, self.lit.spare());
+        if self.depth < shot.settings.render.max_depth && self.sink.takes_reflected() {
+            self.lit.keep();
+        }
+        let render = &shot.settings.render;
+        let all = ((1_u64 << rays.count()) - 1) as u32;
+        let mut wanted = (met.any & !met.plain) | met.shining;
+        wanted |= if render.ambient == Vec3::ZERO { 0 } else { met.plain };
+        wanted |= if render.background == Vec3::ZERO { 0 } else { all & !met.any };
+        // In the order of the paths: what a sample gets by several is added in that.
+        for lane in lanes(wanted) {
+            let (path, bit) = (met.path(shot, &rays, lane), 1 << lane);
+            match met.hit(lane) {
+                Some(hit) if met.plain & bit != 0 => self.add_own_light(&path, &hit, met.shining & bit != 0),
+                Some(hit) => {
+                    self.place = first + lane as u32;
+                    self.shade(path, hit);
+                }
+                None => self.leave(&path),
+            }
+        }
+        if self.lit.is_full() {
+            self.light()?;
+        }
+        Ok(met.negative)
+    }
+
+    /// What a plain surface sends to the eye by itself.
+    fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
+        let Some((material, bsdf)) = self.shot.world.plain_phong(hit.object) else { return };
+        if is_shining {
+            self.sink.add(path.slot, Part::Emitted, path.throughput * material.emission);
+        }
+        let render = &self.shot.settings.render;
+        if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
+            self.sink.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient);
+        }
+    }
+
     fn leave(&mut self, path: &PathRay) {
-        let background = self.light.shot.settings.render.background;
-        self.light.sink.add(path.slot, Part::Emitted, path.throughput * background);
+        let background = self.shot.settings.render.background;
+        self.sink.add(path.slot, Part::Emitted, path.throughput * background);
     }
 
     /// Shade the first thing that is no mere change between parts of one glass.
     fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
-        let shot = self.light.shot;
+        let shot = self.shot;
         for _ in 0..MOST_HIDDEN {
             let vertex = Vertex::new(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
@@ -109,11 +177,11 @@ impl Wave<'_, '_> {
 
     /// Take what a surface sends out on the way of a path; whether the path may be scattered there.
     fn arrive(&mut self, path: &mut PathRay, vertex: &Vertex<'_>, distance: f32) -> bool {
-        let shot = self.light.shot;
+        let shot = self.shot;
         path.throughput *= absorption(shot.world, path.medium, distance);
         let emission = vertex.material.emission;
         if emission != Vec3::ZERO && vertex.is_front {
-            self.light.sink.add(path.slot, Part::Emitted, path.throughput * emission);
+            self.sink.add(path.slot, Part::Emitted, path.throughput * emission);
         }
         self.depth < shot.settings.render.max_depth
     }
@@ -131,15 +199,19 @@ impl Wave<'_, '_> {
 
     fn shade_phong(&mut self, path: &PathRay, vertex: &Vertex<'_>, phong: &Phong) {
         let bsdf = phong.at(vertex.surface.uv, &mut self.counters.texture_lookups);
-        let ambient = self.light.shot.settings.render.ambient;
+        let ambient = self.shot.settings.render.ambient;
         if ambient != Vec3::ZERO {
-            self.light.sink.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);
+            self.sink.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);
         }
-        if bsdf.is_black() || !self.light.sink.takes_reflected() {
+        if bsdf.is_black() || !self.sink.takes_reflected() {
             return;
         }
         let shading = vertex.shading(self.counters);
-        self.light.shade(&LitVertex { path, vertex, shading, bsdf });
+        self.lit.push(
+            self.shot,
+            &LitVertex { path, place: self.place, vertex, shading, bsdf },
+            self.sink.measure,
+        );
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
@@ -153,15 +225,14 @@ impl Wave<'_, '_> {
             return;
         }
         let shading = vertex.shading(self.counters);
-        let Interface { reflectance, refracted } =
-            interface(self.light.shot.world, &path, vertex, &shading, far);
+        let Interface { reflectance, refracted } = interface(self.shot.world, &path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected(&path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         if weaker >= LEAST_SPLIT {
             self.push_reflected(mirrored(reflectance));
             self.push_refracted(refracted, 1.0 - reflectance);
-        } else if self.light.shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
+        } else if self.shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
             self.push_reflected(mirrored(1.0));
         } else {
             self.push_refracted(refracted, 1.0);

@@ -1,13 +1,12 @@
 //! Shapes that emit.
 
-use super::rectangle::{QuadEmitter, SeenQuad};
-use super::sphere::{SeenSphere, SphereEmitter};
+use super::rectangle::QuadEmitter;
+use super::sphere::SphereEmitter;
 use super::surface::SurfaceEmitter;
 use super::triangles::TriangleEmitter;
-use super::{LightSample, LightSamples, Met, Source};
+use super::{End, LightSample, Met, Source};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
-use crate::math::lanes::Lanes;
 use crate::math::{DVec3, Vec3};
 
 /// A shape that sends the same radiance everywhere from its front side.
@@ -75,15 +74,19 @@ pub fn area_lights(shape: &Shape, radiance: Vec3, object: u32) -> Vec<AreaLight>
 }
 
 impl AreaLight {
-    /// The light as seen from a point; none where it certainly sends nothing there.
-    pub fn seen_from(&self, point: Vec3) -> Option<SeenLight<'_>> {
-        let shape = match &self.shape {
-            Emitter::Sphere(sphere) => SeenShape::Sphere(sphere.seen_from(point)?),
-            Emitter::Quad(quad) => SeenShape::Quad(quad.seen_from(point)?),
-            Emitter::Triangles(triangles) => SeenShape::Triangles(triangles, point),
-            Emitter::Surface(surface) => SeenShape::Surface(surface, point),
+    /// [`Light::sample`](super::Light::sample).
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let own = |sample: Arrival| {
+            let Arrival { direction, target, factor } = sample;
+            let (end, source) = (End::At(target), Source::Object(self.object));
+            (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
-        Some(SeenLight::Area(self, shape))
+        match &self.shape {
+            Emitter::Sphere(sphere) => own(sphere.sample(point, u)),
+            Emitter::Quad(quad) => own(quad.sample(point, u)),
+            Emitter::Triangles(triangles) => triangles.sample(point, u, self.radiance, self.object),
+            Emitter::Surface(surface) => surface.sample(point, u, self.radiance, self.object),
+        }
     }
 
     /// [`Light::pdf`](super::Light::pdf).
@@ -110,58 +113,13 @@ impl AreaLight {
     }
 }
 
-/// A light and a point that it may shine on, ready to be sampled many times.
+/// A point of a light that shines on another one, computed without branches.
 #[derive(Clone, Copy, Debug)]
-pub enum SeenLight<'a> {
-    /// There is but one way.
-    Only(LightSample),
-    /// A shape.
-    Area(&'a AreaLight, SeenShape<'a>),
-}
-
-/// A shape as seen from a point.
-#[derive(Clone, Copy, Debug)]
-pub enum SeenShape<'a> {
-    /// A sphere.
-    Sphere(SeenSphere),
-    /// A parallelogram.
-    Quad(SeenQuad<'a>),
-    /// Triangles, and the point.
-    Triangles(&'a TriangleEmitter, Vec3),
-    /// A shape of any other kind, and the point.
-    Surface(&'a SurfaceEmitter, Vec3),
-}
-
-impl SeenLight<'_> {
-    /// Ways for light to arrive by the first numbers of each lane, put behind what is in the queue; none where the part that was
-    /// chosen sends nothing.
-    #[inline(always)]
-    pub fn samples(&self, u: [Lanes; 2], count: usize, queue: &mut Vec<LightSamples>) {
-        match self {
-            Self::Only(sample) => queue.extend((0..count).map(|_| LightSamples::from(*sample))),
-            Self::Area(light, SeenShape::Quad(quad)) => {
-                let all = quad.samples(u, light.radiance, Source::Object(light.object));
-                queue.push(LightSamples { count, ..all });
-            }
-            Self::Area(light, SeenShape::Sphere(sphere)) => {
-                let all = sphere.samples(u, light.radiance, Source::Object(light.object));
-                queue.push(LightSamples { count, ..all });
-            }
-            Self::Area(light, shape) => {
-                queue.extend((0..count).filter_map(|i| light.sample(shape, [u[0][i], u[1][i]])));
-            }
-        }
-    }
-}
-
-impl AreaLight {
-    /// One sample of a shape of which the samples are made one by one.
-    fn sample(&self, shape: &SeenShape<'_>, u: [f32; 2]) -> Option<LightSamples> {
-        let sample = match shape {
-            SeenShape::Triangles(triangles, point) => triangles.sample(*point, u, self.radiance, self.object),
-            SeenShape::Surface(surface, point) => surface.sample(*point, u, self.radiance, self.object),
-            SeenShape::Quad(_) | SeenShape::Sphere(_) => None,
-        };
-        sample.map(LightSamples::from)
-    }
+pub struct Arrival {
+    /// Unit direction to there.
+    pub direction: Vec3,
+    /// Where it is.
+    pub target: Vec3,
+    /// One over the density of the direction, in sr; 0 where the light is seen from behind or from inside.
+    pub factor: f32,
 }

@@ -3,18 +3,18 @@
 pub mod emitter;
 pub mod point;
 pub mod rectangle;
+mod row;
 mod set;
 pub mod sphere;
 pub mod surface;
 pub mod triangles;
 
-pub use emitter::{AreaLight, Part, SeenLight, area_lights};
+pub use emitter::{AreaLight, Part, area_lights};
 pub use point::PointLight;
+pub use row::{LightRow, SourceRow};
 pub use set::Lights;
 
-use crate::geometry::Ray;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
 
 /// A light of any kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,61 +46,6 @@ pub enum End {
     At(Vec3),
     /// From beyond everything in the scene.
     Beyond,
-}
-
-/// [`End`]s with a lane for each; all of one light.
-#[derive(Clone, Copy, Debug)]
-pub enum Ends {
-    /// Points, in world coordinates.
-    At(Lanes3),
-    /// From beyond everything in the scene.
-    Beyond,
-}
-
-/// Ways for light to arrive at a point, some at a time: [`LightSample`] with a lane for each.
-#[derive(Clone, Copy, Debug)]
-pub struct LightSamples {
-    /// Where it comes from.
-    pub ends: Ends,
-    /// Unit directions to there.
-    pub directions: Lanes3,
-    /// Radiance, or of lights without extent irradiance at normal incidence.
-    pub radiance: Vec3,
-    /// What that is to be multiplied by: one over the densities of the directions, in sr.
-    pub factors: Lanes,
-    /// What the shadow rays need not hit.
-    pub source: Source,
-    /// How many lanes count.
-    pub count: usize,
-}
-
-impl LightSamples {
-    /// The ray from a point on which the light of a lane arrives.
-    #[inline(always)]
-    pub fn ray(&self, from: Vec3, i: usize) -> Ray {
-        match &self.ends {
-            Ends::At(targets) => Ray::segment(from, lane(targets, i)),
-            Ends::Beyond => Ray::new(from, lane(&self.directions, i)),
-        }
-    }
-}
-
-impl From<LightSample> for LightSamples {
-    fn from(sample: LightSample) -> Self {
-        let alike = |v: Vec3| v.to_array().map(|x| [x; LANES]);
-        let ends = match sample.end {
-            End::At(target) => Ends::At(alike(target)),
-            End::Beyond => Ends::Beyond,
-        };
-        Self {
-            ends,
-            directions: alike(sample.direction),
-            radiance: sample.weight,
-            factors: [1.0; LANES],
-            source: sample.source,
-            count: 1,
-        }
-    }
 }
 
 /// The part of the scene that a light is.
@@ -143,11 +88,19 @@ impl Light {
         }
     }
 
-    /// The light as seen from a point; none where it certainly sends nothing there.
-    pub fn seen_from(&self, point: Vec3) -> Option<SeenLight<'_>> {
+    /// A way for its light to arrive at a point, by numbers in [0, 1); none where what was chosen sends nothing there.
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
-            Self::Point(light) => light.sample(point).map(SeenLight::Only),
-            Self::Area(light) => light.seen_from(point),
+            Self::Point(light) => light.sample(point),
+            Self::Area(light) => light.sample(point, u),
+        }
+    }
+
+    /// Whether there is but one way.
+    pub fn is_single(&self) -> bool {
+        match self {
+            Self::Point(_) => true,
+            Self::Area(_) => false,
         }
     }
 

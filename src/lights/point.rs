@@ -28,20 +28,21 @@ choice! {
 impl PointLight {
     /// The one way from here.
     pub fn sample(&self, point: Vec3) -> Option<LightSample> {
+        let (direction, weight) = self.arriving(point);
+        let end = End::At(self.position.as_vec3());
+        (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: Source::Nothing })
+    }
+
+    /// Unit direction to the light, and irradiance at normal incidence; none at the light itself.
+    #[inline(always)]
+    pub fn arriving(&self, point: Vec3) -> (Vec3, Vec3) {
         let to_light = self.position - point.as_dvec3();
         let distance_squared = to_light.length_squared();
-        if distance_squared == 0.0 {
-            return None;
-        }
+        let direction = (to_light * (1.0 / distance_squared.sqrt())).as_vec3();
         let weight = match self.falloff {
-            Falloff::Square => self.intensity / distance_squared as f32,
+            Falloff::Square => self.intensity * (1.0 / distance_squared as f32),
             Falloff::None => self.intensity,
         };
-        Some(LightSample {
-            end: End::At(self.position.as_vec3()),
-            direction: (to_light / distance_squared.sqrt()).as_vec3(),
-            weight,
-            source: Source::Nothing,
-        })
+        (direction, if distance_squared > 0.0 { weight } else { Vec3::ZERO })
     }
 }

@@ -2,8 +2,9 @@
 
 use std::f32::consts::PI;
 
-use super::{Ends, LightSamples, Met, Source};
-use crate::math::lanes::{LANES, Lanes, Lanes3, dot, lane, map, sin_cos, zip};
+use super::Met;
+use super::emitter::Arrival;
+use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 
 /// Below this solid angle in sr the sum of four angles has lost too many digits, and uniform over the area is as good.
@@ -51,18 +52,35 @@ impl QuadEmitter {
         }
     }
 
-    /// The light as seen from a point; none from behind.
-    pub fn seen_from(&self, point: Vec3) -> Option<SeenQuad<'_>> {
+    /// Uniform over the solid angle of a rectangle, over the area of another parallelogram.
+    #[inline(always)]
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let to_corner = (self.corner - point.as_dvec3()).as_vec3();
-        (to_corner.dot(self.normal) < 0.0).then(|| SeenQuad {
-            quad: self,
-            point,
-            to_corner,
-            spherical: self
-                .rectangle
-                .as_ref()
-                .and_then(|rectangle| rectangle.seen_from(to_corner, self.normal)),
-        })
+        let by_area = self.by_area(to_corner, u);
+        let (offset, factor) = match &self.rectangle {
+            Some(rectangle) => {
+                let spherical = rectangle.seen_from(to_corner, self.normal);
+                let offset = spherical.sample(u, rectangle, self.normal);
+                let is_told = spherical.is_told();
+                let x = if is_told { offset.x } else { by_area.0.x };
+                let y = if is_told { offset.y } else { by_area.0.y };
+                let z = if is_told { offset.z } else { by_area.0.z };
+                (Vec3::new(x, y, z), if is_told { spherical.solid_angle } else { by_area.1 })
+            }
+            None => by_area,
+        };
+        let direction = offset * (1.0 / offset.length_squared().sqrt());
+        let is_front = to_corner.dot(self.normal) < 0.0;
+        Arrival { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
+    }
+
+    /// From the point that sees it to a point uniform over the area, and that as solid angle.
+    #[inline(always)]
+    fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
+        let offset = to_corner + self.u * u[0] + self.v * u[1];
+        let nearness = 1.0 / offset.length_squared().sqrt();
+        let height = -offset.dot(self.normal) * self.area;
+        (offset, height * nearness * nearness * nearness)
     }
 
     /// Centre of area.
@@ -72,58 +90,15 @@ impl QuadEmitter {
 
     /// [`Light::pdf`](super::Light::pdf).
     pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
-        let Some(seen) = self.seen_from(from) else { return 0.0 };
-        match &seen.spherical {
+        let to_corner = (self.corner - from.as_dvec3()).as_vec3();
+        if !(to_corner.dot(self.normal) < 0.0) {
+            return 0.0;
+        }
+        let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
+        match spherical.filter(SphericalRectangle::is_told) {
             Some(spherical) => 1.0 / spherical.solid_angle,
             None => met.pdf_by_area(f64::from(self.area)),
         }
-    }
-}
-
-/// A quad and a point that sees its front.
-#[derive(Clone, Copy, Debug)]
-pub struct SeenQuad<'a> {
-    quad: &'a QuadEmitter,
-    point: Vec3,
-    to_corner: Vec3,
-    spherical: Option<SphericalRectangle>,
-}
-
-impl SeenQuad<'_> {
-    /// Uniform over the solid angle of a rectangle, over the area of another parallelogram; one for each lane.
-    #[inline(always)]
-    pub fn samples(&self, u: [Lanes; 2], radiance: Vec3, source: Source) -> LightSamples {
-        let spherical = self.spherical.as_ref().zip(self.quad.rectangle.as_ref());
-        let (offsets, nearness, factors) = match spherical {
-            Some((spherical, rectangle)) => {
-                let (offsets, nearness) = spherical.directions(u, rectangle, self.quad.normal);
-                (offsets, nearness, [spherical.solid_angle; LANES])
-            }
-            None => self.by_area(u),
-        };
-        let axis = |axis: usize| {
-            (map(offsets[axis], |x| self.point[axis] + x), zip(offsets[axis], nearness, |x, near| x * near))
-        };
-        let [x, y, z] = [axis(0), axis(1), axis(2)];
-        let (targets, directions) = ([x.0, y.0, z.0], [x.1, y.1, z.1]);
-        let ends = Ends::At(targets);
-        LightSamples { ends, directions, radiance, factors, source, count: LANES }
-    }
-
-    /// Points uniform over the area, from the point that sees them; one over their distances, and the area as solid angle.
-    #[inline(always)]
-    fn by_area(&self, u: [Lanes; 2]) -> (Lanes3, Lanes, Lanes) {
-        let offsets = self.offsets(u);
-        let nearness: Lanes = std::array::from_fn(|i| 1.0 / lane(&offsets, i).length());
-        let height = map(dot(&offsets, self.quad.normal), |height| -height * self.quad.area);
-        (offsets, nearness, zip(height, nearness, |height, near| height * near * near * near))
-    }
-
-    /// Coordinates of points uniform over the area, from the point that sees them.
-    #[inline(always)]
-    fn offsets(&self, u: [Lanes; 2]) -> [Lanes; 3] {
-        let (quad, corner) = (self.quad, self.to_corner);
-        [0, 1, 2].map(|axis| zip(u[0], u[1], |s, t| corner[axis] + quad.u[axis] * s + quad.v[axis] * t))
     }
 }
 
@@ -143,65 +118,64 @@ struct SphericalRectangle {
 }
 
 impl Rectangle {
-    /// None where the solid angle is too small to be told.
-    fn seen_from(&self, to_corner: Vec3, normal: Vec3) -> Option<SphericalRectangle> {
+    #[inline(always)]
+    fn seen_from(&self, to_corner: Vec3, normal: Vec3) -> SphericalRectangle {
         let (x0, y0, z) = (to_corner.dot(self.x), to_corner.dot(self.y), to_corner.dot(normal));
         let (x1, y1) = (x0 + self.width, y0 + self.height);
         let z2 = z * z;
-        let towards = |side: f32| side / (z2 + side * side).sqrt();
-        let (lower, right, upper, left) = (-towards(y0), towards(x1), towards(y1), -towards(x0));
-        let angle = |a: f32, b: f32| (-a * b).clamp(-1.0, 1.0).acos();
+        let (lower, right) = (-towards(y0, z2), towards(x1, z2));
+        let (upper, left) = (towards(y1, z2), -towards(x0, z2));
         let (g0, g1) = (angle(lower, right), angle(right, upper));
         let (g2, g3) = (angle(upper, left), angle(left, lower));
-        let solid_angle = (g0 + g1 - PI) + (g2 + g3 - PI);
-        (solid_angle >= LEAST_SOLID_ANGLE).then_some(SphericalRectangle {
+        SphericalRectangle {
             x: [x0, x1],
             y: [y0, y1],
             z,
             lower,
             upper,
             start: 2.0 * PI - g2 - g3,
-            solid_angle,
-        })
+            solid_angle: (g0 + g1 - PI) + (g2 + g3 - PI),
+        }
     }
 }
 
+/// Of the unit vector towards a side from a line whose squared distance is `d2`, the part along the plane.
+#[inline(always)]
+fn towards(side: f32, d2: f32) -> f32 {
+    side / (d2 + side * side).sqrt()
+}
+
+/// Between two planes through sides.
+#[inline(always)]
+fn angle(a: f32, b: f32) -> f32 {
+    acos((-a * b).max(-1.0).min(1.0))
+}
+
 impl SphericalRectangle {
-    /// Coordinates of points uniform over the solid angle, and one over their distances.
+    /// Whether the solid angle has kept its digits.
     #[inline(always)]
-    fn directions(&self, u: [Lanes; 2], rectangle: &Rectangle, normal: Vec3) -> ([Lanes; 3], Lanes) {
-        let (x, y) = self.samples(u);
-        let away = normal * self.z;
-        let axis = |axis: usize| zip(x, y, |x, y| rectangle.x[axis] * x + rectangle.y[axis] * y + away[axis]);
-        let offset = [axis(0), axis(1), axis(2)];
-        let squares = offset.map(|axis| map(axis, |x| x * x));
-        let flat = zip(squares[0], squares[1], |x, y| x + y);
-        (offset, zip(flat, squares[2], |flat, z| 1.0 / (flat + z).sqrt()))
+    fn is_told(&self) -> bool {
+        self.solid_angle >= LEAST_SOLID_ANGLE
     }
 
-    /// Coordinates of points of the rectangle along its sides, uniform over its solid angle.
+    /// To a point uniform over the solid angle.
     #[inline(always)]
-    fn samples(&self, u: [Lanes; 2]) -> (Lanes, Lanes) {
+    fn sample(&self, u: [f32; 2], rectangle: &Rectangle, normal: Vec3) -> Vec3 {
         // A slice of the sphere up to x takes its share of the solid angle.
-        let (sin, cos) = sin_cos(map(u[0], |u| u * self.solid_angle + self.start));
+        let (sin, cos) = sin_cos(u[0] * self.solid_angle + self.start);
         // sin² of the angle that the lower plane stands at.
         let tilt = 1.0 - self.lower * self.lower;
-        let x = zip(sin, cos, |sin, cos| {
-            // Along the slice x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
-            let slope = cos * self.lower - self.upper;
-            let sin = if slope < 0.0 { -sin } else { sin };
-            let root = (slope * slope - tilt * (sin * sin)).max(f32::MIN_POSITIVE).sqrt();
-            (-self.z * sin / root).max(self.x[0]).min(self.x[1])
-        });
+        // Along the slice x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
+        let slope = cos * self.lower - self.upper;
+        let sin = if slope < 0.0 { -sin } else { sin };
+        let root = (slope * slope - tilt * (sin * sin)).max(f32::MIN_POSITIVE).sqrt();
+        let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
         // There, heights on the unit circle are uniform.
-        let y = zip(x, u[1], |x, u| {
-            let d2 = x * x + self.z * self.z;
-            let height = |y: f32| y / (d2 + y * y).sqrt();
-            let (h0, h1) = (height(self.y[0]), height(self.y[1]));
-            let h = h0 + u * (h1 - h0);
-            let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
-            (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1])
-        });
-        (x, y)
+        let d2 = x * x + self.z * self.z;
+        let (h0, h1) = (towards(self.y[0], d2), towards(self.y[1], d2));
+        let h = h0 + u[1] * (h1 - h0);
+        let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
+        let y = (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1]);
+        rectangle.x * x + rectangle.y * y + normal * self.z
     }
 }

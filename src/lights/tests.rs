@@ -14,6 +14,7 @@ use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::geometry::{Ray, Shape, ShapeHit};
 use crate::math::DVec3;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
 use crate::sampling::{Decision, PixelSampler};
 
 /// Every way to sample a shape: rectangles by solid angle, other parallelograms and distant ones by area.
@@ -52,16 +53,39 @@ fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)> {
 
 /// Samples of a light for a point: directions, where they end, and one over their densities.
 fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
-    let Some(seen) = light.seen_from(from) else { return Vec::new() };
-    let mut queue = Vec::new();
-    for (numbers, used) in PixelSampler::new(1, 2, 3, 0).pairs(1, Decision::Light(number), count) {
-        seen.samples(numbers, used, &mut queue);
-    }
-    let one = |samples: &LightSamples, i: usize| {
-        let ray = samples.ray(from, i);
-        (lane(&samples.directions, i), ray.at(1.0), samples.factors[i] * samples.radiance.x)
+    let one = |sample: u32| {
+        let u = PixelSampler::new(1, 2, 3, sample).pair(1, Decision::Light(number));
+        let sample = light.sample(from, u.to_array())?;
+        let End::At(target) = sample.end else { return None };
+        Some((sample.direction, target, sample.weight.x))
     };
-    queue.iter().flat_map(|samples| (0..samples.count).map(move |i| one(samples, i))).collect()
+    (0..count).filter_map(one).collect()
+}
+
+#[test]
+fn rows_hold_the_samples_of_their_points() {
+    let mut state = 1_u32;
+    let mut next = || {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        (state >> 8) as f32 / (1 << 24) as f32
+    };
+    for shape in shapes() {
+        for (_, light) in lights_of(&shape).iter() {
+            let points: Lanes3 = std::array::from_fn(|_| std::array::from_fn(|_| next() * 6.0 - 3.0));
+            let u: [Lanes; 2] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+            let row = light.sample_row(&points, u32::MAX, &u);
+            for i in 0..LANES {
+                let alone = light.sample(lane(&points, i), [u[0][i], u[1][i]]);
+                let weight = lane(&row.weights, i);
+                let Some(alone) = alone else {
+                    assert_eq!(weight, Vec3::ZERO, "{shape:?}");
+                    continue;
+                };
+                assert_eq!((weight, lane(&row.directions, i)), (alone.weight, alone.direction), "{shape:?}");
+                assert_eq!(End::At(lane(&row.targets, i)), alone.end, "{shape:?}");
+            }
+        }
+    }
 }
 
 fn points() -> [Vec3; 3] {
@@ -189,12 +213,4 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
 #[test]
 fn a_plane_is_no_light() {
     assert!(area_lights(&Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)), Vec3::ONE, 0).is_empty());
-}
-
-#[test]
-fn light_from_beyond_is_stopped_by_anything_on_its_way() {
-    let sample =
-        LightSample { end: End::Beyond, direction: Vec3::Y, weight: Vec3::ONE, source: Source::Nothing };
-    let ray = LightSamples::from(sample).ray(Vec3::X, 0);
-    assert_eq!((ray.origin, ray.direction, ray.t_max), (Vec3::X, Vec3::Y, f32::INFINITY));
 }

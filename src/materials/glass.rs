@@ -1,6 +1,7 @@
 //! Smooth glass.
 
 use crate::math::Vec3;
+use crate::math::elementary::pow;
 
 /// A smooth dielectric that fills its shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +15,11 @@ pub struct Glass {
 impl Glass {
     /// What is left of light after `distance` inside (Beer's law).
     pub fn transmittance(&self, distance: f32) -> Vec3 {
-        if self.tint == Vec3::ONE { Vec3::ONE } else { self.tint.powf(distance) }
+        if self.tint == Vec3::ONE {
+            Vec3::ONE
+        } else {
+            Vec3::from_array(self.tint.to_array().map(|part| pow(part, distance)))
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::texture::Color;
+use crate::math::elementary::pow;
 use crate::math::{DVec2, Vec3};
 
 /// Diffuse and glossy reflection on both sides.
@@ -45,6 +46,19 @@ impl Phong {
     }
 }
 
+impl Phong {
+    /// What it is everywhere, if it has no textures.
+    pub fn constant(&self) -> Option<PhongBsdf> {
+        let diffuse = self.diffuse.constant()?;
+        Some(PhongBsdf {
+            diffuse,
+            specular: self.specular.constant()?,
+            shininess: self.shininess,
+            ambient: self.ambient.as_ref().map_or(Some(diffuse), Color::constant)?,
+        })
+    }
+}
+
 impl PhongBsdf {
     /// The diffuse part of f in sr⁻¹.
     pub fn diffuse_value(&self) -> Vec3 {
@@ -57,7 +71,7 @@ impl PhongBsdf {
             return Vec3::ZERO;
         }
         let mirrored = normal * (2.0 * normal.dot(to_light)) - to_light;
-        self.specular_peak() * self.specular_part(mirrored.dot(to_eye))
+        self.specular_peak() * lobe(mirrored.dot(to_eye), self.shininess)
     }
 
     /// The glossy part of f in sr⁻¹ where the mirrored direction is the eye's.
@@ -65,21 +79,17 @@ impl PhongBsdf {
         self.specular * ((self.shininess + 2.0) / (2.0 * PI))
     }
 
-    /// What part of that is left, by the cosine between the mirrored direction and the eye's.
-    pub fn specular_part(&self, cosine: f32) -> f32 {
-        if cosine > 0.0 {
-            cosine.min(1.0).powf(self.shininess)
-        } else if self.shininess == 0.0 {
-            1.0
-        } else {
-            0.0
-        }
-    }
-
     /// Whether light that arrives can change anything.
     pub fn is_black(&self) -> bool {
         self.diffuse == Vec3::ZERO && self.specular == Vec3::ZERO
     }
+}
+
+/// What part of the glossy lobe's peak is left, by the cosine between the mirrored direction and the eye's.
+#[inline(always)]
+pub fn lobe(cosine: f32, shininess: f32) -> f32 {
+    let size = if cosine > 0.0 { cosine } else { 0.0 };
+    pow(if size < 1.0 { size } else { 1.0 }, shininess)
 }
 
 #[cfg(test)]

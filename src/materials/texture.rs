@@ -52,6 +52,14 @@ pub enum Color {
 }
 
 impl Color {
+    /// The colour, if it is the same everywhere.
+    pub fn constant(&self) -> Option<Vec3> {
+        match self {
+            Self::Constant(color) => Some(*color),
+            Self::Texture(_) => None,
+        }
+    }
+
     /// The colour at texture coordinates, and how many texture look-ups that took.
     pub fn at(&self, uv: DVec2, lookups: &mut u64) -> Vec3 {
         match self {

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::elementary::pow;
+
 /// Weights of linear Rec. 709 primaries in relative luminance (IEC 61966-2-1).
 pub const LUMINANCE_WEIGHTS: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
@@ -12,12 +14,12 @@ pub fn luminance(color: Vec3) -> f32 {
 
 /// One sRGB component in [0, 1] to linear (IEC 61966-2-1).
 pub fn srgb_to_linear(encoded: f32) -> f32 {
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+    if encoded <= 0.04045 { encoded / 12.92 } else { pow((encoded + 0.055) / 1.055, 2.4) }
 }
 
 /// One linear component in [0, 1] to sRGB (IEC 61966-2-1).
 pub fn linear_to_srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
 /// A linear component, clamped to [0, 1], as an sRGB byte; NaN becomes 0.

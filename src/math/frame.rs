@@ -16,6 +16,7 @@ pub struct Frame {
 impl Frame {
     /// The frame of a unit vector, without a branch and accurate over the whole sphere
     /// (Duff et al., *Building an Orthonormal Basis, Revisited*, JCGT 2017).
+    #[inline(always)]
     pub fn from_normal(n: Vec3) -> Self {
         let sign = 1.0_f32.copysign(n.z);
         let a = -1.0 / (sign + n.z);
@@ -28,6 +29,7 @@ impl Frame {
     }
 
     /// A direction in this frame's coordinates to the coordinates the frame is given in.
+    #[inline(always)]
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         self.s * local.x + self.t * local.y + self.n * local.z
     }

@@ -83,7 +83,7 @@ pub fn rotation_xyz(degrees: DVec3) -> DMat3 {
                 _ => (-1.0, 0.0),
             }
         } else {
-            angle.to_radians().sin_cos()
+            libm::sincos(angle.to_radians())
         };
         if axis.x > 0.0 {
             DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, cos, sin, 0.0, -sin, cos])

@@ -49,8 +49,8 @@ fn rgbe(color: Vec3) -> [u8; 4] {
     let color = color.to_array().map(|component| f64::from(as_light(component)));
     let brightest = color[0].max(color[1]).max(color[2]);
     // 2^(exponent − 1) ≤ brightest < 2^exponent, one more where the mantissa would be rounded up to 256.
-    let mut exponent = brightest.log2().floor() + 1.0;
-    if (brightest / exponent.exp2() * 256.0).round() >= 256.0 {
+    let mut exponent = libm::log2(brightest).floor() + 1.0;
+    if (brightest / libm::exp2(exponent) * 256.0).round() >= 256.0 {
         exponent += 1.0;
     }
     // The exponent byte is 1 … 255; a zero stands for black.
@@ -58,7 +58,7 @@ fn rgbe(color: Vec3) -> [u8; 4] {
         return [0; 4];
     }
     let exponent = exponent.min(127.0);
-    let mantissa = |component: f64| (component / exponent.exp2() * 256.0).round().min(255.0) as u8;
+    let mantissa = |component: f64| (component / libm::exp2(exponent) * 256.0).round().min(255.0) as u8;
     [mantissa(color[0]), mantissa(color[1]), mantissa(color[2]), (exponent as i32 + 128) as u8]
 }
 

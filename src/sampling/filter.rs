@@ -1,4 +1,4 @@
-//! Pixel filters by importance: samples are placed as the filter weighs, and all count alike but for a sign (Ernst,
+//! Pixel filters by importance: samples are placed as the filter weighs, and those of one sign all count alike (Ernst,
 //! Stamminger, Greiner, *Filter Importance Sampling*, 2006).
 
 use std::sync::LazyLock;
@@ -20,34 +20,67 @@ choice! {
     }
 }
 
-/// A place relative to the pixel's centre, in pixels, and what a sample there counts: ∫|f|/∫f with f's sign.
+/// A place relative to the pixel's centre, in pixels, drawn in proportion to |f|, and f's sign there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
     /// Offset from the centre.
     pub offset: Vec2,
-    /// Weight; the mean over samples is 1.
-    pub weight: f32,
+    /// Whether the filter is negative there. A pixel is 1 + w of the mean where it is not, less w of the mean where it is, with
+    /// w from [`PixelFilter::negative_weight`].
+    pub is_negative: bool,
 }
 
 impl PixelFilter {
     /// Warp a point of the unit square.
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
-            Self::Box => FilterSample { offset: u - Vec2::splat(0.5), weight: 1.0 },
-            Self::Tent => FilterSample { offset: Vec2::new(tent(u.x), tent(u.y)), weight: 1.0 },
+            Self::Box => FilterSample { offset: u - Vec2::splat(0.5), is_negative: false },
+            Self::Tent => FilterSample { offset: Vec2::new(tent(u.x), tent(u.y)), is_negative: false },
             Self::Gaussian => GAUSSIAN.sample2(u),
             Self::Mitchell => MITCHELL.sample2(u),
+        }
+    }
+
+    /// Warp points of the unit square, in their place; each is also told to `each`, by its number.
+    #[inline(always)]
+    pub fn sample_row<const N: usize>(
+        self,
+        u: &mut [[f32; N]; 2],
+        mut each: impl FnMut(usize, FilterSample),
+    ) {
+        match self {
+            Self::Box => u.as_flattened_mut().iter_mut().for_each(|u| *u -= 0.5),
+            Self::Tent => u.as_flattened_mut().iter_mut().for_each(|u| *u = tent(*u)),
+            Self::Gaussian | Self::Mitchell => {
+                for i in 0..N {
+                    let sample = self.sample(Vec2::new(u[0][i], u[1][i]));
+                    (u[0][i], u[1][i]) = (sample.offset.x, sample.offset.y);
+                    each(i, sample);
+                }
+            }
+        }
+    }
+
+    /// −∫min(f, 0)/∫f over the plane; none where f is nowhere negative.
+    pub fn negative_weight(self) -> Option<f64> {
+        match self {
+            Self::Box | Self::Tent | Self::Gaussian => None,
+            // Of |f| in two dimensions 1 + 2w is left in units of ∫f.
+            Self::Mitchell => Some((MITCHELL.excess * MITCHELL.excess - 1.0) * 0.5),
         }
     }
 }
 
 /// Density 1 − |x| on [−1, 1].
+#[inline(always)]
 fn tent(u: f32) -> f32 {
-    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
+    let (is_left, twice) = (u < 0.5, 2.0 * u);
+    let rest = 1.0 - (if is_left { twice } else { 2.0 - twice }).sqrt();
+    if is_left { -rest } else { rest }
 }
 
 static GAUSSIAN: LazyLock<Tabulated> = LazyLock::new(|| {
-    let at = |x: f64| (-2.0 * x * x).exp();
+    let at = |x: f64| libm::exp(-2.0 * x * x);
     Tabulated::new(1.5, |x| at(x) - at(1.5))
 });
 
@@ -56,9 +89,9 @@ static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
         let x = x.abs();
         // B = C = 1/3 in the general cubic.
         if x < 1.0 {
-            (7.0 * x.powi(3) - 12.0 * x.powi(2) + 16.0 / 3.0) / 6.0
+            ((7.0 * x - 12.0) * x * x + 16.0 / 3.0) / 6.0
         } else {
-            (-7.0 / 3.0 * x.powi(3) + 12.0 * x.powi(2) - 20.0 * x + 32.0 / 3.0) / 6.0
+            (((-7.0 / 3.0 * x + 12.0) * x - 20.0) * x + 32.0 / 3.0) / 6.0
         }
     })
 });
@@ -67,7 +100,7 @@ static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
 struct Tabulated {
     radius: f64,
     sums: Vec<f64>,
-    signs: Vec<f64>,
+    is_negative: Vec<bool>,
     /// ∫|f|/∫f.
     excess: f64,
 }
@@ -85,21 +118,21 @@ impl Tabulated {
         });
         let sums: Vec<f64> = sums.collect();
         let excess = sum / values.iter().sum::<f64>();
-        Self { radius, sums, signs: values.iter().map(|value| value.signum()).collect(), excess }
+        Self { radius, sums, is_negative: values.iter().map(|value| *value < 0.0).collect(), excess }
     }
 
-    fn sample(&self, u: f32) -> (f32, f64) {
+    fn sample(&self, u: f32) -> (f32, bool) {
         let target = f64::from(u) * self.sums[Self::CELLS - 1];
         let cell = self.sums.partition_point(|&sum| sum <= target).min(Self::CELLS - 1);
         let before = if cell == 0 { 0.0 } else { self.sums[cell - 1] };
         let rest = (target - before) / (self.sums[cell] - before).max(f64::MIN_POSITIVE);
         let x = ((cell as f64 + rest.clamp(0.0, 1.0)) / Self::CELLS as f64 * 2.0 - 1.0) * self.radius;
-        (x as f32, self.signs[cell] * self.excess)
+        (x as f32, self.is_negative[cell])
     }
 
     fn sample2(&self, u: Vec2) -> FilterSample {
-        let ((x, wx), (y, wy)) = (self.sample(u.x), self.sample(u.y));
-        FilterSample { offset: Vec2::new(x, y), weight: (wx * wy) as f32 }
+        let ((x, is_x_negative), (y, is_y_negative)) = (self.sample(u.x), self.sample(u.y));
+        FilterSample { offset: Vec2::new(x, y), is_negative: is_x_negative != is_y_negative }
     }
 }
 
@@ -117,13 +150,16 @@ mod tests {
             (PixelFilter::Gaussian, gaussian_moment()),
             (PixelFilter::Mitchell, mitchell_moment()),
         ] {
+            let negative = filter.negative_weight().unwrap_or(0.0);
             let (mut weight, mut second, mut mean) = (0.0, 0.0, 0.0);
             for i in 0..n * n {
                 let u = Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32;
                 let sample = filter.sample(u);
-                weight += f64::from(sample.weight);
-                mean += f64::from(sample.weight * sample.offset.x);
-                second += f64::from(sample.weight * sample.offset.x * sample.offset.x);
+                let (x, size) = (f64::from(sample.offset.x), 1.0 + 2.0 * negative);
+                let own = if sample.is_negative { -size } else { size };
+                weight += own;
+                mean += own * x;
+                second += own * x * x;
             }
             let count = f64::from(n * n);
             assert!((weight / count - 1.0).abs() < 4e-3, "{filter:?}: weight {}", weight / count);

@@ -5,4 +5,4 @@ pub mod filter;
 pub mod stream;
 pub mod warp;
 
-pub use stream::{Decision, PixelSampler, Repetitions};
+pub use stream::{CAMERA_PATH, Decision, PixelSampler, SamplerRow};

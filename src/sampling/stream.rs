@@ -2,15 +2,15 @@
 //! (Burley, *Practical Hash-based Owen Scrambling*, JCGT 2020).
 
 use crate::math::Vec2;
-use crate::math::lanes::{LANES, Lanes};
-
-/// Length of the library's sequences.
-const SEQUENCE_LENGTH: u32 = 1 << 16;
 
 /// A random decision at a vertex of a path. Numbers of different decisions are independent, those of one decision well
 /// distributed over the samples of a pixel. There is no other way to a dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
+    /// Where in the pixel.
+    Pixel,
+    /// Where on the lens.
+    Lens,
     /// Where on the light of this number.
     Light(u32),
     /// Which of two ways to go on.
@@ -19,17 +19,20 @@ pub enum Decision {
 
 impl Decision {
     /// Its dimension at a vertex; `path` tells the paths of one sample apart.
+    #[inline(always)]
     fn dimension(self, path: u32) -> u32 {
         let number = match self {
             Self::Light(number) => number,
             Self::Choice => u32::MAX,
+            Self::Pixel => u32::MAX - 1,
+            Self::Lens => u32::MAX - 2,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }
 }
 
-/// The dimension of the position in the pixel and on the lens.
-const CAMERA: u32 = 0;
+/// The path that a sample's numbers in the camera belong to.
+pub const CAMERA_PATH: u32 = 0;
 
 /// The random numbers of one sample of a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -38,93 +41,71 @@ pub struct PixelSampler {
     sample: u32,
 }
 
+/// Hash of a pixel of the whole picture.
+#[inline(always)]
+fn pixel_seed(seed: u32, x: u32, y: u32) -> u32 {
+    mix(mix(mix(seed) ^ x) ^ y.rotate_left(16))
+}
+
 impl PixelSampler {
     /// For sample number `sample` of pixel (x, y) of the whole picture.
     pub fn new(seed: u32, x: u32, y: u32, sample: u32) -> Self {
-        Self { seed: mix(mix(mix(seed) ^ x) ^ y.rotate_left(16)), sample }
-    }
-
-    /// Four numbers in [0, 1): the position in the pixel and on the lens.
-    pub fn camera(&self) -> [f32; 4] {
-        self.numbers(CAMERA)
-    }
-
-    fn numbers(&self, dimension: u32) -> [f32; 4] {
-        let (round, place) = (self.sample / SEQUENCE_LENGTH, self.sample % SEQUENCE_LENGTH);
-        sobol_burley::sample_4d(place, 0, mix(self.seed ^ dimension) ^ mix(round))
-    }
-
-    /// Two numbers in [0, 1) for each of `n` repetitions of one decision, well distributed over repetitions and samples
-    /// together.
-    pub fn pairs(&self, path: u32, decision: Decision, n: u32) -> Repetitions {
-        let (seed, first) =
-            (mix(self.seed ^ decision.dimension(path)), u64::from(self.sample) * u64::from(n));
-        Repetitions { seed, next: first, end: first + u64::from(n) }
+        Self { seed: pixel_seed(seed, x, y), sample }
     }
 
     /// Two numbers in [0, 1) for one decision.
     pub fn pair(&self, path: u32, decision: Decision) -> Vec2 {
-        let [x, y, ..] = self.numbers(decision.dimension(path));
+        let [[x], [y]] = scrambled([self.sample], [mix(self.seed ^ decision.dimension(path)) ^ mix(0)]);
         Vec2::new(x, y)
     }
 }
 
-/// Numbers for the repetitions of one decision, some at a time.
+/// [`PixelSampler`]s of some samples, side by side.
 #[derive(Clone, Copy, Debug)]
-pub struct Repetitions {
-    seed: u32,
-    next: u64,
-    end: u64,
+pub struct SamplerRow<const N: usize> {
+    seeds: [u32; N],
+    samples: [u32; N],
 }
 
-impl Iterator for Repetitions {
-    /// With how many of the lanes count.
-    type Item = ([Lanes; 2], usize);
-
+impl<const N: usize> SamplerRow<N> {
+    /// For samples of pixels (x, y) of the whole picture.
     #[inline(always)]
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.next >= self.end {
-            return None;
+    pub fn new(seed: u32, x: &[u32; N], y: &[u32; N], samples: &[u32; N]) -> Self {
+        let mut seeds = [0; N];
+        for i in 0..N {
+            seeds[i] = pixel_seed(seed, x[i], y[i]);
         }
-        let used = (self.end - self.next).min(LANES as u64);
-        let points = scrambled_from(self.next, self.seed);
-        self.next += used;
-        Some((points, used as usize))
+        Self { seeds, samples: *samples }
     }
-}
 
-/// Points of the first two dimensions from number `first` on; every 2³² of them are scrambled anew.
-#[inline(always)]
-fn scrambled_from(first: u64, seed: u32) -> [Lanes; 2] {
-    let [round, last_round] = [first, first + LANES as u64 - 1].map(|index| (index >> 32) as u32);
-    let start = first as u32;
-    let mut indices = [start; LANES];
-    for (i, index) in indices.iter_mut().enumerate() {
-        *index = index.wrapping_add(i as u32);
+    /// For each sample two numbers in [0, 1) for one of the repetitions of a decision, of which there are `of`: well distributed
+    /// over repetitions and samples together. Every 2³² points are scrambled anew.
+    #[inline(always)]
+    pub fn pairs(&self, paths: &[u32; N], decision: Decision, repetition: u32, of: u32) -> [[f32; N]; 2] {
+        let (mut indices, mut seeds) = ([0; N], [0; N]);
+        for i in 0..N {
+            let index = u64::from(self.samples[i]) * u64::from(of) + u64::from(repetition);
+            indices[i] = index as u32;
+            seeds[i] = mix(self.seeds[i] ^ decision.dimension(paths[i])) ^ mix((index >> 32) as u32);
+        }
+        scrambled(indices, seeds)
     }
-    let points = scrambled(indices, seed ^ mix(round));
-    if round == last_round {
-        return points;
-    }
-    let anew = scrambled(indices, seed ^ mix(last_round));
-    [0, 1].map(|of| std::array::from_fn(|i| if indices[i] < start { anew[of][i] } else { points[of][i] }))
 }
 
 /// Points of the first two dimensions of Sobol's sequence, their order and both coordinates scrambled.
 #[inline(always)]
-fn scrambled(indices: [u32; LANES], seed: u32) -> [Lanes; 2] {
-    let (x_seed, y_seed) = (mix(seed ^ 0x68bc_21eb), mix(seed ^ 0x02e5_be93));
+fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2] {
     // One step for all lanes after the other: so they become vector instructions.
     let mut places = indices;
-    for place in &mut places {
+    for (place, &seed) in places.iter_mut().zip(&seeds) {
         *place = owen(place.reverse_bits(), seed).reverse_bits();
     }
-    let mut points = [[0.0; LANES]; 2];
-    for (x, &place) in points[0].iter_mut().zip(&places) {
-        *x = unit(owen(place, x_seed));
+    let mut points = [[0.0; N]; 2];
+    for i in 0..N {
+        points[0][i] = unit(owen(places[i], mix(seeds[i] ^ 0x68bc_21eb)));
     }
-    for (y, &place) in points[1].iter_mut().zip(&places) {
-        *y = unit(owen(pascal(place), y_seed));
+    for i in 0..N {
+        points[1][i] = unit(owen(pascal(places[i]), mix(seeds[i] ^ 0x02e5_be93)));
     }
     points
 }
@@ -172,25 +153,31 @@ fn mix(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    fn points(sampler: PixelSampler, decision: Decision, n: u32) -> impl Iterator<Item = [f32; 2]> {
-        let some = |([x, y], used): ([Lanes; 2], usize)| (0..used).map(move |i| [x[i], y[i]]);
-        sampler.pairs(1, decision, n).flat_map(some)
+    fn points(
+        seed: u32,
+        [x, y, sample]: [u32; 3],
+        decision: Decision,
+        of: u32,
+    ) -> impl Iterator<Item = [f32; 2]> {
+        let row = SamplerRow::new(seed, &[x], &[y], &[sample]);
+        (0..of).map(move |repetition| row.pairs(&[1], decision, repetition, of).map(|[x]| x))
     }
 
     #[test]
     fn repetitions_are_one_sequence_also_where_it_is_scrambled_anew() {
-        // Of three, five and one number, and over the end of 32 bits: the same points as one by one.
         for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
-            let sampler = PixelSampler::new(2, 3, 4, sample);
-            let all: Vec<_> = points(sampler, Decision::Choice, n).collect();
-            assert_eq!(all.len(), n as usize);
-            let first = u64::from(sample) * u64::from(n);
-            for (i, point) in all.iter().enumerate() {
-                let index = first + i as u64;
-                let seed = mix(sampler.seed ^ Decision::Choice.dimension(1)) ^ mix((index >> 32) as u32);
-                let [x, y] = scrambled([index as u32; LANES], seed);
-                assert_eq!([x[0], y[0]], *point, "number {i} of sample {sample}");
+            let own = PixelSampler::new(2, 3, 4, sample);
+            for (i, point) in points(2, [3, 4, sample], Decision::Choice, n).enumerate() {
+                let index = u64::from(sample) * u64::from(n) + i as u64;
+                let seed = mix(own.seed ^ Decision::Choice.dimension(1)) ^ mix((index >> 32) as u32);
+                let [[x], [y]] = scrambled([index as u32], [seed]);
+                assert_eq!([x, y], point, "number {i} of sample {sample}");
+                let row = SamplerRow::new(2, &[3; 16], &[4; 16], &[sample; 16]);
+                let [x, y] = row.pairs(&[1; 16], Decision::Choice, i as u32, n);
+                assert_eq!([x[i % 16], y[15]], point, "number {i} of sample {sample} in a row");
             }
+            let first = points(2, [3, 4, sample], Decision::Choice, 1).next();
+            assert_eq!(first, Some(own.pair(1, Decision::Choice).to_array()));
         }
     }
 
@@ -198,8 +185,7 @@ mod tests {
     fn powers_of_two_are_stratified_and_pixels_differ() {
         // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
-            let sampler = |sample| PixelSampler::new(3, 10, 20, sample);
-            let all = (0..64 / n).flat_map(|sample| points(sampler(sample), Decision::Light(2), n));
+            let all = (0..64 / n).flat_map(|sample| points(3, [10, 20, sample], Decision::Light(2), n));
             let points: Vec<[f32; 2]> = all.collect();
             for columns in [1_usize, 2, 4, 8, 16, 32, 64] {
                 let mut cells = [0_u32; 64];
@@ -210,7 +196,7 @@ mod tests {
                 assert_eq!(cells, [1; 64], "{columns} columns");
             }
         }
-        let first = |x| PixelSampler::new(3, x, 20, 0).camera();
+        let first = |x| PixelSampler::new(3, x, 20, 0).pair(CAMERA_PATH, Decision::Pixel);
         assert_ne!(first(10), first(11));
     }
 
@@ -231,8 +217,8 @@ mod tests {
     fn scrambles_of_many_pixels_are_uniform() {
         let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
         for pixel in 0..n {
-            let sampler = PixelSampler::new(1, pixel % 200, pixel / 200, 7);
-            for [x, y] in points(sampler, Decision::Light(0), 1).map(|point| point.map(f64::from)) {
+            let place = [pixel % 200, pixel / 200, 7];
+            for [x, y] in points(1, place, Decision::Light(0), 1).map(|point| point.map(f64::from)) {
                 sums = [sums[0] + x, sums[1] + y];
                 product += (x - 0.5) * (y - 0.5) * 12.0;
             }
@@ -244,27 +230,21 @@ mod tests {
     }
 
     #[test]
-    fn the_sequence_goes_on_after_its_library_s_end() {
-        let numbers = |sample| PixelSampler::new(0, 0, 0, sample).camera();
-        assert_ne!(numbers(0), numbers(SEQUENCE_LENGTH));
-        assert!(numbers(u32::MAX).iter().all(|x| (0.0..1.0).contains(x)));
-    }
-
-    #[test]
     fn decisions_are_independent() {
-        // Correlation of first coordinates over one pixel's samples: a shared scramble would give 1.
-        let (mut products, n) = ([0.0; 3], 4096);
-        for sample in 0..n {
-            let sampler = PixelSampler::new(1, 5, 5, sample);
+        // Mean over 64 pixels of the correlation of first coordinates over a pixel's samples: a shared scramble would give 1.
+        let others =
+            [(0, Decision::Light(1)), (0, Decision::Choice), (1, Decision::Light(0)), (0, Decision::Pixel)];
+        let (mut products, samples, pixels) = ([0.0; 4], 1024, 64);
+        for (pixel, sample) in (0..pixels).flat_map(|pixel| (0..samples).map(move |sample| (pixel, sample))) {
+            let sampler = PixelSampler::new(1, pixel % 8, pixel / 8, sample);
             let first = |path, decision| f64::from(sampler.pair(path, decision).x) - 0.5;
-            for (sum, other) in products.iter_mut().zip([
-                (0, Decision::Light(1)),
-                (0, Decision::Choice),
-                (1, Decision::Light(0)),
-            ]) {
+            for (sum, other) in products.iter_mut().zip(others) {
                 *sum += first(0, Decision::Light(0)) * first(other.0, other.1) * 12.0;
             }
         }
-        assert!(products.iter().all(|product: &f64| (product / f64::from(n)).abs() < 0.05), "{products:?}");
+        let count = f64::from(samples * pixels);
+        // Five times what independent pairs of numbers give at most.
+        let allowed = 5.0 / count.sqrt();
+        assert!(products.iter().all(|product: &f64| (product / count).abs() < allowed), "{products:?}");
     }
 }

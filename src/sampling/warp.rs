@@ -2,21 +2,18 @@
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-use crate::math::lanes::{Lanes, map, sin_cos, zip};
+use crate::math::elementary::sin_cos;
 use crate::math::{Vec2, Vec3};
 
 /// Uniform on the unit disk (Shirley and Chiu, *A Low Distortion Map Between Disk and Square*, 1997).
+#[inline(always)]
 pub fn disk(u: Vec2) -> Vec2 {
     let offset = u * 2.0 - Vec2::ONE;
-    if offset == Vec2::ZERO {
-        return Vec2::ZERO;
-    }
-    let (radius, angle) = if offset.x.abs() > offset.y.abs() {
-        (offset.x, FRAC_PI_4 * (offset.y / offset.x))
-    } else {
-        (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
-    };
-    let (sin, cos) = angle.sin_cos();
+    let is_wide = offset.x.abs() > offset.y.abs();
+    let (radius, across) = if is_wide { (offset.x, offset.y) } else { (offset.y, offset.x) };
+    // In the middle both are 0.
+    let part = FRAC_PI_4 * (across / if radius == 0.0 { 1.0 } else { radius });
+    let (sin, cos) = sin_cos(if is_wide { part } else { FRAC_PI_2 - part });
     Vec2::new(cos, sin) * radius
 }
 
@@ -36,18 +33,16 @@ pub fn triangle(u: Vec2) -> Vec3 {
 /// Uniform over the solid angle of a cone about z, given 1 − cos of its half angle, which keeps its digits for
 /// narrow cones.
 #[inline(always)]
-pub fn cone(u: [Lanes; 2], one_minus_cos_max: f32) -> [Lanes; 3] {
-    let one_minus_cos = map(u[0], |u| u * one_minus_cos_max);
-    let sin = map(one_minus_cos, |c| (c * (2.0 - c)).max(0.0).sqrt());
-    let (sin_phi, cos_phi) = sin_cos(map(u[1], |u| 2.0 * PI * u));
-    let across = |part| zip(sin, part, |sin, part| sin * part);
-    [across(cos_phi), across(sin_phi), map(one_minus_cos, |c| 1.0 - c)]
+pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
+    let one_minus_cos = u[0] * one_minus_cos_max;
+    let sin = (one_minus_cos * (2.0 - one_minus_cos)).max(0.0).sqrt();
+    let (sin_phi, cos_phi) = sin_cos(2.0 * PI * u[1]);
+    Vec3::new(sin * cos_phi, sin * sin_phi, 1.0 - one_minus_cos)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::LANES;
 
     fn grid() -> impl Iterator<Item = Vec2> {
         (0..10_000).map(|i| Vec2::new((i % 100) as f32 + 0.5, (i / 100) as f32 + 0.5) / 100.0)
@@ -74,10 +69,7 @@ mod tests {
     #[test]
     fn the_cone_is_uniform_over_solid_angle_also_when_narrow() {
         for one_minus_cos in [2.0, 0.5, 1e-9] {
-            let cone = |u: Vec2| {
-                let [x, y, z] = cone([[u.x; LANES], [u.y; LANES]], one_minus_cos);
-                Vec3::new(x[0], y[1], z[2])
-            };
+            let cone = |u: Vec2| cone(u.to_array(), one_minus_cos);
             let z = grid().map(|u| 1.0 - f64::from(cone(u).z)).sum::<f64>() / 10_000.0;
             let sin2 = grid().map(|u| f64::from(cone(u).truncate().length_squared())).sum::<f64>() / 1e4;
             let c = f64::from(one_minus_cos);

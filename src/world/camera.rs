@@ -35,7 +35,7 @@ impl Camera {
                     right,
                     up: right.cross(forward),
                     forward,
-                    tan_half_fov: (fov.to_radians() * 0.5).tan(),
+                    tan_half_fov: libm::tan(fov.to_radians() * 0.5),
                     aperture: *aperture,
                     focus: *focus,
                 }
@@ -80,7 +80,7 @@ impl Camera {
             right: axes.x_axis,
             up: axes.y_axis,
             forward: -axes.z_axis,
-            tan_half_fov: (orbiter.fov.to_radians() * 0.5).tan(),
+            tan_half_fov: libm::tan(orbiter.fov.to_radians() * 0.5),
             aperture: 0.0,
             focus: orbiter.size,
         }
@@ -88,6 +88,7 @@ impl Camera {
 
     /// The ray through a point of the picture, seen from its middle to the right and up in halves of its height, from a
     /// point of the unit lens disk; its direction has unit length.
+    #[inline(always)]
     pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
         let place = place * self.tan_half_fov;
         let direction = self.forward + self.right * place.x + self.up * place.y;

@@ -148,6 +148,11 @@ impl World {
         self.glass_at_eye.iter().copied().filter(is_inside)
     }
 
+    /// Whether no part of the lens is in a closed shape of glass.
+    pub fn is_eye_in_air(&self) -> bool {
+        self.glass_at_eye.is_empty()
+    }
+
     /// The closed shapes of glass that the lens may be in, by their objects and materials.
     pub(super) fn find_glass_at_eye(&self) -> Vec<(u32, u32)> {
         let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));

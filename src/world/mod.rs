@@ -30,8 +30,9 @@ pub use textures::{NeededTexture, TextureSource, textures_needed};
 
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
-use crate::materials::Material;
+use crate::materials::phong::PhongBsdf;
 use crate::materials::texels::Texels;
+use crate::materials::{Bsdf, Material};
 
 /// What a world is made of.
 #[derive(Clone, Debug, Default)]
@@ -84,6 +85,18 @@ impl World {
                 let own = self.geometry.file_material(hit);
                 own.map_or(fallback, |own| first + own) as usize
             }
+        }
+    }
+
+    /// The material of an object, and what it makes of light, where that is the same everywhere on it and no δ.
+    pub fn plain_phong(&self, object: u32) -> Option<(&Material, PhongBsdf)> {
+        let material = match self.object_materials[object as usize] {
+            ObjectMaterial::One(index) => &self.materials[index as usize],
+            ObjectMaterial::OfFile { .. } => return None,
+        };
+        match (&material.bsdf, &material.normal_map) {
+            (Bsdf::Phong(phong), None) => Some((material, phong.constant()?)),
+            (Bsdf::Phong(_) | Bsdf::Mirror(_) | Bsdf::Glass(_), _) => None,
         }
     }
 

@@ -33,10 +33,10 @@ impl Object {
 
     /// The nearest hits of the rays of a packet that are in `met`; the others end below 0. `found` holds none before.
     #[inline(always)]
-    pub fn closest_rows(&self, rays: &[Ray], rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+    pub fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         match self {
-            Self::Shape(shape) => shape.intersect_rows(rays, rows, met, ends, found),
-            Self::Mesh(mesh) => mesh.closest_rows(rays, met, ends, found),
+            Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found),
+            Self::Mesh(mesh) => mesh.closest_rows(rows.rays(), met, ends, found),
         }
     }
 
@@ -45,7 +45,6 @@ impl Object {
     #[inline(always)]
     pub fn any_rows(
         &self,
-        rays: &[Ray],
         rows: &RayRows,
         met: u32,
         ends: &Ends,
@@ -53,10 +52,10 @@ impl Object {
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) => return mesh.any_rows(rays, met, ends, except),
+            Self::Mesh(mesh) => return mesh.any_rows(rows.rays(), met, ends, except),
         };
         let mut found = HitRows::none();
-        shape.intersect_rows(rays, rows, met, ends, &mut found);
+        shape.intersect_rows(rows, met, ends, &mut found);
         let mut hit = 0;
         for lane in 0..PACKET {
             let bit = 1 << lane;

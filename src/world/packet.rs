@@ -4,7 +4,7 @@ use super::{Geometry, Hit};
 use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows};
-use crate::lights::Source;
+use crate::lights::SourceRow;
 
 impl Geometry {
     /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
@@ -13,10 +13,20 @@ impl Geometry {
         self.instructions().run(Closest { geometry: self, rays, hits });
     }
 
-    /// [`Geometry::occluded`] of at most [`PACKET`] segments, each with the light that it goes to: a bit for each that is.
-    pub fn occluded_packet(&self, rays: &[Ray], sources: &[Source]) -> u32 {
-        debug_assert!(rays.len() <= PACKET && rays.len() == sources.len());
-        self.instructions().run(Occluded { geometry: self, rays, sources })
+    /// [`Geometry::closest_packet`] inside of such loops: hits, and of which objects they are.
+    #[inline(always)]
+    pub fn closest_rows(&self, rows: &RayRows, ends: &mut Ends) -> (HitRows, [u32; PACKET]) {
+        let mut nearest = Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET] };
+        self.tree().closest_packet(rows, ends, self.unbounded(), &mut nearest);
+        (nearest.hits, nearest.object)
+    }
+
+    /// [`Geometry::occluded`] of the segments of a packet, each with the light that it goes to: a bit for each that is. To be
+    /// called inside of loops for each instruction set.
+    #[inline(always)]
+    pub fn occluded_rows(&self, rows: &RayRows, ends: &Ends, sources: &SourceRow) -> u32 {
+        let mut blockers = Blockers { geometry: self, rows, sources, in_part: in_part(sources) };
+        self.tree().any_packet(rows, ends, self.unbounded(), &mut blockers)
     }
 }
 
@@ -33,17 +43,9 @@ impl Loops for Closest<'_> {
     #[inline(always)]
     fn run(self) {
         let (rows, mut ends) = RayRows::new(self.rays);
-        let mut nearest = Nearest {
-            geometry: self.geometry,
-            rays: self.rays,
-            rows: &rows,
-            hits: HitRows::none(),
-            object: [NONE; PACKET],
-        };
-        self.geometry.tree().closest_packet(&rows, &mut ends, self.geometry.unbounded(), &mut nearest);
+        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends);
         for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET) {
-            let object = nearest.object[lane];
-            *hit = nearest.hits.get(lane).map(|shape| Hit { shape, object });
+            *hit = hits.get(lane).map(|shape| Hit { shape, object: object[lane] });
         }
     }
 }
@@ -54,7 +56,6 @@ const NONE: u32 = u32::MAX;
 /// The nearest hits so far, and of which objects they are.
 struct Nearest<'a> {
     geometry: &'a Geometry,
-    rays: &'a [Ray],
     rows: &'a RayRows,
     hits: HitRows,
     object: [u32; PACKET],
@@ -65,7 +66,7 @@ impl ClosestTest for Nearest<'_> {
     fn test(&mut self, id: u32, met: u32, ends: &mut Ends) {
         let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
-        object.closest_rows(self.rays, self.rows, met, &of_these(met, ends), &mut found);
+        object.closest_rows(self.rows, met, &of_these(met, ends), &mut found);
         for (lane, end) in ends.iter_mut().enumerate() {
             let t = found.t[lane];
             let is_nearer = (t < *end) | ((t == *end) & (id < self.object[lane]));
@@ -80,86 +81,50 @@ impl ClosestTest for Nearest<'_> {
     }
 }
 
-/// [`Geometry::occluded_packet`].
-struct Occluded<'a> {
-    geometry: &'a Geometry,
-    rays: &'a [Ray],
-    sources: &'a [Source],
-}
-
-impl Loops for Occluded<'_> {
-    type Done = u32;
-
-    #[inline(always)]
-    fn run(self) -> u32 {
-        let (rows, ends) = RayRows::new(self.rays);
-        let mut blockers = Blockers {
-            geometry: self.geometry,
-            rays: self.rays,
-            rows: &rows,
-            sources: SourceRows::new(self.sources),
-        };
-        self.geometry.tree().any_packet(&rows, &ends, self.geometry.unbounded(), &mut blockers)
-    }
-}
-
 /// Looks for what is in the way of shadow rays.
 struct Blockers<'a> {
     geometry: &'a Geometry,
-    rays: &'a [Ray],
     rows: &'a RayRows,
-    sources: SourceRows,
+    sources: &'a SourceRow,
+    /// Rays whose light is a part of an object.
+    in_part: u32,
 }
 
 impl AnyTest for Blockers<'_> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32 {
-        let (whole, in_part) = self.sources.of(id);
+        let own = own_bits(self.sources, id);
+        let (whole, in_part) = (own & !self.in_part, own & self.in_part);
         let met = met & !whole;
         if met == 0 {
             return 0;
         }
         let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        object.any_rows(self.rays, self.rows, met, &of_these(met, ends), except)
+        object.any_rows(self.rows, met, &of_these(met, ends), except)
     }
 }
 
-/// The lights of shadow rays, [`Source`]s side by side.
-struct SourceRows {
-    object: [u32; PACKET],
-    part: [u32; PACKET],
-    /// Rays whose light is a part of an object.
-    in_part: u32,
+/// A bit for each ray whose light is a part of an object.
+#[inline(always)]
+fn in_part(sources: &SourceRow) -> u32 {
+    let mut bits = 0;
+    for lane in 0..PACKET {
+        let bit = 1 << lane;
+        bits |= if sources.part[lane] == SourceRow::NONE { 0 } else { bit };
+    }
+    bits
 }
 
-impl SourceRows {
-    #[inline(always)]
-    fn new(sources: &[Source]) -> Self {
-        let mut own = Self { object: [NONE; PACKET], part: [0; PACKET], in_part: 0 };
-        for (lane, source) in sources.iter().enumerate().take(PACKET) {
-            match *source {
-                Source::Nothing => {}
-                Source::Object(object) => own.object[lane] = object,
-                Source::Primitive(object, part) => {
-                    (own.object[lane], own.part[lane]) = (object, part);
-                    own.in_part |= 1 << lane;
-                }
-            }
-        }
-        own
+/// A bit for each ray whose light is an object or a part of it.
+#[inline(always)]
+fn own_bits(sources: &SourceRow, id: u32) -> u32 {
+    let mut bits = 0;
+    for lane in 0..PACKET {
+        let bit = 1 << lane;
+        bits |= if sources.object[lane] == id { bit } else { 0 };
     }
-
-    /// Rays to the whole of an object, and rays to a part of it.
-    #[inline(always)]
-    fn of(&self, id: u32) -> (u32, u32) {
-        let mut own = 0;
-        for lane in 0..PACKET {
-            let bit = 1 << lane;
-            own |= if self.object[lane] == id { bit } else { 0 };
-        }
-        (own & !self.in_part, own & self.in_part)
-    }
+    bits
 }
 
 /// The ends of the rays of `met`; the others end below 0.
@@ -186,6 +151,7 @@ mod tests {
     use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
+    use crate::lights::Source;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
     use crate::scene::description::Accel;
@@ -245,6 +211,22 @@ mod tests {
         }
     }
 
+    struct Occluded<'a> {
+        geometry: &'a Geometry,
+        rays: &'a [Ray],
+        sources: &'a SourceRow,
+    }
+
+    impl Loops for Occluded<'_> {
+        type Done = u32;
+
+        #[inline(always)]
+        fn run(self) -> u32 {
+            let (rows, ends) = RayRows::new(self.rays);
+            self.geometry.occluded_rows(&rows, &ends, self.sources)
+        }
+    }
+
     fn assert_packets(geometry: &Geometry) {
         let mut next = random(3);
         let (mut hits, mut shadows) = (0, 0);
@@ -267,7 +249,9 @@ mod tests {
                 _ => Source::Object(u32::MAX),
             };
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
-            let occluded = geometry.occluded_packet(&rays, &sources);
+            let mut row = SourceRow::of(Source::Nothing);
+            sources.iter().enumerate().for_each(|(lane, source)| row.set(lane, *source));
+            let occluded = geometry.instructions().run(Occluded { geometry, rays: &rays, sources: &row });
             for (lane, (ray, source)) in rays.iter().zip(&sources).enumerate() {
                 assert_eq!(occluded & 1 << lane != 0, geometry.occluded(ray, *source), "{lane} of {rays:?}");
             }

@@ -101,9 +101,9 @@ impl Loops for Both<'_> {
             *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
         let mut found = HitRows::none();
-        object.closest_rows(rays, &rows, met, &ends, &mut found);
-        let any_part = object.any_rows(rays, &rows, met, &ends, None);
-        (found, any_part, object.any_rows(rays, &rows, met, &ends, Some(except)))
+        object.closest_rows(&rows, met, &ends, &mut found);
+        let any_part = object.any_rows(&rows, met, &ends, None);
+        (found, any_part, object.any_rows(&rows, met, &ends, Some(except)))
     }
 }
 

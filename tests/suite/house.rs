@@ -79,3 +79,77 @@ fn the_map_has_no_cycle() {
         assert!(!reached.contains(start), "{start} is reached from itself");
     }
 }
+
+/// Functions that the system's library computes, each machine's with bits of its own. (`sqrt` is right to the last bit
+/// everywhere; a fused product is, but slow where the processor has none.)
+const OF_THE_SYSTEM: [&str; 34] = [
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+    "sin_cos",
+    "sinh",
+    "cosh",
+    "tanh",
+    "asinh",
+    "acosh",
+    "atanh",
+    "exp",
+    "exp2",
+    "exp_m1",
+    "ln",
+    "ln_1p",
+    "log",
+    "log2",
+    "log10",
+    "powf",
+    "powi",
+    "cbrt",
+    "hypot",
+    "mul_add",
+    "rotate_x",
+    "rotate_y",
+    "rotate_z",
+    "to_angle",
+    "angle_between",
+    "slerp",
+    "angle_to",
+];
+
+/// Whose results are in no picture: what a terminal shows, progress, the assets' generator (which has `libm`).
+const ELSEWHERE: [&str; 3] = ["tui", "bin", "pipeline/pace.rs"];
+
+#[test]
+fn no_function_of_the_system_s_library_is_between_a_scene_and_its_picture() {
+    let mut files = Vec::new();
+    sources(&root(), &mut files);
+    let mut found = Vec::new();
+    for file in files {
+        let inside = file.strip_prefix(root()).expect("a file of src");
+        let is_test = inside.to_str().is_some_and(|path| path.contains("tests"));
+        if is_test || ELSEWHERE.iter().any(|place| inside.starts_with(place)) {
+            continue;
+        }
+        let text = fs::read_to_string(&file).expect("a source file");
+        let production = text.split("\n#[cfg(test)]\n").next().unwrap_or_default();
+        for (number, line) in
+            (1..).zip(production.lines()).filter(|(_, line)| !line.trim_start().starts_with("//"))
+        {
+            let is_called = |name: &str| {
+                line.contains(&format!(".{name}("))
+                    || line.contains(&format!("f32::{name}"))
+                    || line.contains(&format!("f64::{name}"))
+            };
+            let is_glam = line.contains("from_angle(")
+                || line.contains("from_axis_angle(")
+                || line.contains("from_euler(");
+            if is_glam || OF_THE_SYSTEM.iter().any(|name| is_called(name)) {
+                found.push(format!("{}:{number}: {}", inside.display(), line.trim()));
+            }
+        }
+    }
+    assert!(found.is_empty(), "use `math::elementary` or `libm`:\n{}", found.join("\n"));
+}

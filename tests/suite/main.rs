@@ -14,5 +14,6 @@ mod mutation;
 mod once;
 mod options;
 mod output;
+mod same_bits;
 mod terminal;
 mod views;

@@ -97,8 +97,9 @@ impl UnitLine {
     fn inflections(&self) -> Option<[f64; 2]> {
         let (p, d) = (self.foot.truncate(), self.direction.truncate());
         let a = d.length_squared();
-        let w = p.perp_dot(d).powi(2);
-        let ring = w.cbrt();
+        let moment = p.perp_dot(d);
+        let w = moment * moment;
+        let ring = libm::cbrt(w);
         let half = ((ring * ring - w / a) / a).sqrt();
         let middle = -p.dot(d) / a;
         (half >= 0.0).then(|| [middle - half.max(KINK), middle + half.max(KINK)])

@@ -96,7 +96,7 @@ impl Torus {
     pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, since ψ = 0 is v = ½.
-        let share = 0.5 - 0.5 * (self.tube / self.radius) * (2.0 * PI * y).cos();
+        let share = 0.5 - 0.5 * (self.tube / self.radius) * libm::cos(2.0 * PI * y);
         let (point, normal) =
             if x < share { self.at(x / share, y) } else { self.at((x - share) / (1.0 - share), 1.5 - y) };
         AreaPoint { point, normal }

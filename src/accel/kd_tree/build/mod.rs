@@ -17,6 +17,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
+use crate::math::elementary::log2;
 
 use crate::accel::reference::{Bounds, Reference};
 use cost::Plane;
@@ -47,7 +48,7 @@ pub struct Built {
 
 /// Planes above a leaf at most, for so many triangles (Havran's 8 + 1.3·log₂ n).
 pub fn depth_limit(count: usize) -> u32 {
-    8 + (1.3 * (count.max(1) as f32).log2()) as u32
+    8 + (1.3 * log2(count.max(1) as f32)) as u32
 }
 
 /// Build over `count` triangles; those whose box has no finite size are in no leaf.

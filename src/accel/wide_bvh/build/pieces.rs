@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::accel::reference::{Bounds, Reference};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
+use crate::math::elementary::exp2;
 
 /// Pieces beyond one for each triangle, as a share of the triangles.
 const MOST_MORE: f64 = 0.3;
@@ -106,8 +107,8 @@ impl Grid {
         let Some(plane) = self.plane(&reference.bounds) else { return 0.0 };
         let normal = (b - a).cross(c - a).abs();
         let too_much = reference.bounds.half_area() - (normal.x + normal.y + normal.z);
-        let weight = 0.5_f32.powi((LEVELS - plane.level) as i32);
-        let priority = (too_much.max(0.0) * weight).cbrt();
+        let weight = exp2(-((LEVELS - plane.level) as f32));
+        let priority = libm::cbrtf(too_much.max(0.0) * weight);
         if priority.is_finite() { priority } else { 0.0 }
     }
 

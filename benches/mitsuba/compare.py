@@ -1,0 +1,113 @@
+"""See run.py, which starts this inside its environment."""
+
+import argparse
+import hashlib
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+mi.set_variant("llvm_ad_rgb")
+from scenes import SCENES  # noqa: E402
+
+HOME = Path(os.environ["GLIMT_MITSUBA_HOME"])
+ROOT = Path(__file__).resolve().parent.parent.parent
+THREADS = 2
+SAMPLES = 256
+# Mitsuba as it comes samples the light and the BSDF; told that the light is enough, it does half of the work.
+INTEGRATORS = {"Mitsuba": {}, "its light alone": {"emitter_samples": 1, "bsdf_samples": 0}}
+REFERENCE = (24, 1024)  # renders, of as many samples
+
+
+def rel_mse(picture, reference):
+    """mean((x - r)^2 / (r^2 + 0.01)) on linear radiance."""
+    return float(np.mean((picture - reference) ** 2 / (reference**2 + 0.01)))
+
+
+class Mitsuba:
+    """One scene, loaded once."""
+
+    def __init__(self, scene, integrator):
+        self.scene = mi.load_dict(scene.mitsuba(mi, integrator))
+
+    def render(self, samples, seed):
+        """Seconds and the picture; the caller has rendered once before, which compiles."""
+        start = time.perf_counter()
+        image = mi.render(self.scene, spp=samples, seed=seed)
+        dr.eval(image)
+        dr.sync_thread()
+        return time.perf_counter() - start, np.array(image, dtype=np.float64)
+
+
+def reference(scene, renderer, render):
+    """The mean of many of a renderer's own pictures, kept in a file: delete it when what the renderer computes changes."""
+    key = hashlib.sha256(scene.toml(*REFERENCE).encode()).hexdigest()[:16]
+    file = HOME / f"reference-{renderer}-{key}.npy"
+    if not file.exists():
+        count, samples = REFERENCE
+        np.save(file, np.mean([render(samples, 1000 + i)[1] for i in range(count)], axis=0))
+    return np.load(file)
+
+
+def glimt(binary, scene, samples, seed):
+    """Seconds of the stage `render`, and the picture."""
+    folder = HOME / "out"
+    folder.mkdir(exist_ok=True)
+    file, picture, report = folder / "scene.toml", folder / "picture.exr", folder / "report.json"
+    file.write_text(scene.toml(samples, seed))
+    command = [binary, "--once", file, "-o", picture, "--report", report, "--threads", str(THREADS)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    stages = {stage["name"]: stage for stage in json.loads(report.read_text())["stages"]}
+    image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    return stages["render"]["seconds"], image.astype(np.float64)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("names", nargs="*", help="scenes whose name contains one of these")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--glimt", nargs="+", default=[ROOT / "target" / "release" / "glimt"])
+    options = parser.parse_args()
+    dr.set_thread_count(THREADS)
+    print(f"{'':16}{'':16}{'seconds':>9}{'relMSE':>10}{'product':>10}{'to Mitsuba':>12}")
+    for scene in SCENES:
+        if options.names and not any(name in scene.name for name in options.names):
+            continue
+        loaded = {name: Mitsuba(scene, integrator) for name, integrator in INTEGRATORS.items()}
+        by_glimt = lambda binary: lambda samples, seed: glimt(binary, scene, samples, seed)
+        # Each is held to its own: Mitsuba lifts shadow rays off surfaces by a fixed epsilon, which moves the edges of shadows.
+        own = reference(scene, "mitsuba", loaded["its light alone"].render)
+        glimts = reference(scene, "glimt", by_glimt(options.glimt[0]))
+        renderers = []
+        for name, mitsuba in loaded.items():
+            mitsuba.render(SAMPLES, 0)
+            renderers.append((name, mitsuba.render, own))
+        for binary in options.glimt:
+            renderers.append((Path(binary).name, by_glimt(binary), glimts))
+        results = [([], []) for _ in renderers]
+        for round_number in range(1, options.rounds + 1):
+            for (_, render, reference_picture), (seconds, errors) in zip(renderers, results):
+                taken, picture = render(SAMPLES, round_number)
+                seconds.append(taken)
+                errors.append(rel_mse(picture, reference_picture))
+        product = lambda result: statistics.median(result[0]) * statistics.mean(result[1])
+        for (name, *_), result in zip(renderers, results):
+            seconds, error = statistics.median(result[0]), statistics.mean(result[1])
+            ratio = product(result) / product(results[0])
+            print(f"{scene.name:16}{name:16}{seconds:9.3f}{error:10.2e}{seconds * error:10.2e}{ratio:12.2f}")
+        print(f"{scene.name:16}{'references':16}{'':9}{rel_mse(glimts, own):10.2e}  apart")
+        off = statistics.mean(results[0][1]) / scene.anchor - 1
+        if abs(off) > 0.1:
+            print(f"{scene.name}: does not count, Mitsuba's relMSE is {off:+.0%} off its anchor {scene.anchor:.1e}")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

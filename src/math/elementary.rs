@@ -1,0 +1,165 @@
+//! Elementary functions without branches and without the system's library: the same bits on every machine, and vector
+//! instructions in loops. `f64` inside where that makes an `f32` result right but for its rounding.
+
+use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, PI};
+use std::f64::consts::LN_2;
+
+/// xʸ for x ≥ 0, within one ulp; 1 where y is 0, 0 for x = 0 < y.
+#[inline(always)]
+pub fn pow(x: f32, y: f32) -> f32 {
+    let power = exp2_f64(f64::from(y) * log2_f64(f64::from(x))) as f32;
+    let of_nothing = if y > 0.0 { 0.0 } else { f32::INFINITY };
+    let power = if x > 0.0 { power } else { of_nothing };
+    if (y == 0.0) | (x == 1.0) { 1.0 } else { power }
+}
+
+/// 2ˣ within one ulp.
+#[inline(always)]
+pub fn exp2(x: f32) -> f32 {
+    exp2_f64(f64::from(x)) as f32
+}
+
+/// Binary logarithm of x > 0 that is not subnormal, within one ulp.
+#[inline(always)]
+pub fn log2(x: f32) -> f32 {
+    log2_f64(f64::from(x)) as f32
+}
+
+/// Binary logarithm of a normal x > 0 within 1e-11: by the exponent, and for the rest m in [√½, √2) by the series of
+/// 2·artanh((m − 1)/(m + 1)).
+#[inline(always)]
+fn log2_f64(x: f64) -> f64 {
+    const SQRT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
+    const MANTISSA: u64 = (1 << 52) - 1;
+    // A whole number below 2⁵² in the last bits of 2⁵² is that number beside 2⁵².
+    const WHOLE: u64 = 0x4330_0000_0000_0000;
+    let shifted = x.to_bits().wrapping_add(0x3ff0_0000_0000_0000 - SQRT_HALF);
+    let exponent = f64::from_bits((shifted >> 52) | WHOLE) - (f64::from_bits(WHOLE) + 1023.0);
+    let m = f64::from_bits((shifted & MANTISSA) + SQRT_HALF);
+    let s = (m - 1.0) / (m + 1.0);
+    let z = s * s;
+    let series = 1.0 / 11.0 + z * (1.0 / 13.0 + z * (1.0 / 15.0));
+    let series = 1.0 / 5.0 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z * series));
+    let series = s * (1.0 + z * (1.0 / 3.0 + z * series));
+    exponent + series * (2.0 / LN_2)
+}
+
+/// 2ˣ within 1e-11 of itself, taken to where `f32` is 0 or ∞ outside of [−200, 200]: by the whole part, and the rest in
+/// [−½, ½] by Taylor's series.
+#[inline(always)]
+fn exp2_f64(x: f64) -> f64 {
+    // 1.5·2⁵²: sums with it are rounded to whole numbers, which stand in their last bits.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    let x = if x < 200.0 { x } else { 200.0 };
+    let x = if x > -200.0 { x } else { -200.0 };
+    let sum = x + ROUND;
+    let r = (x - (sum - ROUND)) * LN_2;
+    let series = 1.0 / 5040.0 + r * (1.0 / 40_320.0 + r * (1.0 / 362_880.0 + r * (1.0 / 3_628_800.0)));
+    let series = 1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0 + r * series));
+    let series = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * series)));
+    f64::from_bits(series.to_bits().wrapping_add(sum.to_bits() << 52))
+}
+
+/// Arc cosine of x in [−1, 1] within 2 ulp: near 0 by the arc sine, beyond ½ by that of the half angle (the polynomial is that
+/// of Moshier's Cephes library).
+#[inline(always)]
+pub fn acos(x: f32) -> f32 {
+    let size = x.abs();
+    let is_large = size > 0.5;
+    let half = (1.0 - size) * 0.5;
+    let z = if is_large { half } else { size * size };
+    let s = if is_large { half.sqrt() } else { size };
+    let p = 2.418_131e-2 + z * 4.216_32e-2;
+    let p = 7.495_300_3e-2 + z * (4.547_002_6e-2 + z * p);
+    let arcsine = s + s * z * (1.666_675_2e-1 + z * p);
+    let of_size = if is_large { 2.0 * arcsine } else { FRAC_PI_2 - arcsine };
+    // What π/2 and π lack of themselves as `f32`.
+    let rest = if is_large { 0.0 } else { -4.371_139e-8 };
+    let negative = if is_large { PI - (of_size + 8.742_278e-8) } else { FRAC_PI_2 + (arcsine + rest) };
+    if x < 0.0 { negative } else { of_size + rest }
+}
+
+/// Sine and cosine of an angle of at most 1000, within 1.2e-7: the angle is taken to [−π/4, π/4] around a multiple of π/2, which
+/// is subtracted in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980), and there the
+/// polynomials are those of Moshier's Cephes library.
+#[inline(always)]
+pub fn sin_cos(angle: f32) -> (f32, f32) {
+    // 1.5·2²³, as above.
+    const ROUND: f32 = 12_582_912.0;
+    let sum = angle * FRAC_2_PI + ROUND;
+    let (k, quarter) = (sum - ROUND, sum.to_bits());
+    let r = ((angle - k * 1.570_312_5) - k * 4.837_513e-4) - k * 7.549_79e-8;
+    let z = r * r;
+    let sin = r + r * z * (-1.666_665_5e-1 + z * (8.332_161e-3 + z * -1.951_529_6e-4));
+    let cos = 1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
+    let is_odd = quarter & 1 == 1;
+    let (of_sin, of_cos) = if is_odd { (cos, sin) } else { (sin, cos) };
+    let sign = |value: f32, is_negative: u32| f32::from_bits(value.to_bits() ^ (is_negative & 2) << 30);
+    (sign(of_sin, quarter), sign(of_cos, quarter.wrapping_add(1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How far a result is off, in units of the last place of the right one.
+    fn ulps(value: f32, exact: f64) -> f64 {
+        let near = exact as f32;
+        let ulp = f64::from((near.abs().next_up() - near.abs()).max(f32::MIN_POSITIVE * f32::EPSILON));
+        (f64::from(value) - exact).abs() / ulp
+    }
+
+    #[test]
+    fn arc_cosines_of_all_numbers_by_steps() {
+        let mut worst = 0.0_f64;
+        for bits in (0..=1.0_f32.to_bits()).step_by(101).chain([1.0_f32.to_bits(), 0.5_f32.to_bits()]) {
+            let x = f32::from_bits(bits);
+            for x in [x, -x] {
+                worst = worst.max(ulps(acos(x), libm::acos(f64::from(x))));
+            }
+        }
+        assert!(worst <= 2.0, "{worst} ulp");
+        assert_eq!((acos(1.0), acos(-1.0), acos(0.0)), (0.0, PI, FRAC_PI_2));
+    }
+
+    #[test]
+    fn powers_and_logarithms() {
+        let mut worst = [0.0_f64; 3];
+        for i in 0..2_000_000_u32 {
+            let spread = i.wrapping_mul(2_654_435_761);
+            let x = f32::from_bits(0x0080_0000 + spread % (0x7f00_0000 - 0x0080_0000));
+            let y = (f64::from(i) / 1e6 - 1.0) as f32 * 40.0;
+            let exact = libm::pow(f64::from(x), f64::from(y));
+            if (f64::from(f32::MIN_POSITIVE)..f64::from(f32::MAX)).contains(&exact) {
+                worst[0] = worst[0].max(ulps(pow(x, y), exact));
+            }
+            worst[1] = worst[1].max(ulps(exp2(y), libm::exp2(f64::from(y))));
+            worst[2] = worst[2].max(ulps(log2(x), libm::log2(f64::from(x))));
+        }
+        assert!(worst.iter().all(|worst| *worst <= 1.0), "{worst:?} ulp");
+        // Lobes of every width.
+        for (i, shininess) in (1..4000).flat_map(|i| [1.0, 7.5, 300.0, 1e5].map(|n| (i, n))) {
+            let x = 1.0 - i as f32 * 1e-6;
+            assert!(ulps(pow(x, shininess), libm::pow(f64::from(x), f64::from(shininess))) <= 1.0);
+        }
+    }
+
+    #[test]
+    fn powers_at_the_ends() {
+        assert_eq!([pow(0.0, 2.0), pow(0.0, 0.0), pow(3.0, 0.0), pow(1.0, f32::MAX)], [0.0, 1.0, 1.0, 1.0]);
+        assert_eq!([pow(0.5, 1e30), pow(2.0, 1e30), pow(2.0, 3.0)], [0.0, f32::INFINITY, 8.0]);
+        assert_eq!([exp2(0.0), exp2(-3.0), exp2(200.0), exp2(-300.0)], [1.0, 0.125, f32::INFINITY, 0.0]);
+        assert_eq!([log2(1.0), log2(8.0), log2(0.25)], [0.0, 3.0, -2.0]);
+    }
+
+    #[test]
+    fn sines_and_cosines_all_around() {
+        for i in -200_000..=200_000_i32 {
+            let angle = i as f32 * 1e-4;
+            let (sin, cos) = sin_cos(angle);
+            let (exact_sin, exact_cos) = libm::sincos(f64::from(angle));
+            assert!((f64::from(sin) - exact_sin).abs() < 1.2e-7, "sin {angle}: {sin}");
+            assert!((f64::from(cos) - exact_cos).abs() < 1.2e-7, "cos {angle}: {cos}");
+        }
+    }
+}

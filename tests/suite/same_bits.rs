@@ -1,0 +1,129 @@
+//! The same bits on every machine, by every instruction set: hashes of small pictures that stand here.
+
+use glimt::accel::Instructions;
+
+use super::desk::Desk;
+
+/// FNV-1a of the bits of a picture's numbers.
+fn hash(desk: &Desk, name: &str) -> u64 {
+    let picture = image::open(desk.path(name)).expect("a picture").to_rgb32f();
+    let bytes = picture.as_raw().iter().flat_map(|x| x.to_bits().to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Lamps and shapes of every kind, mirror, glass, textured lookups by the shapes' own coordinates, a lens, a filter.
+const EVERYTHING: &str = r#"
+[render]
+width = 40
+height = 30
+samples = 5
+shadow_samples = 2
+filter = "FILTER"
+ambient = [0.05, 0.06, 0.07]
+background = [0.2, 0.3, 0.5]
+[camera]
+position = [0, 1.6, 5]
+look_at = [0, 0.7, 0]
+fov = 50
+aperture = 0.02
+[materials]
+floor = { diffuse = [0.6, 0.6, 0.5], specular = [0.1, 0.1, 0.1], shininess = 20 }
+red = { diffuse = [0.7, 0.2, 0.1], specular = [0.3, 0.3, 0.3], shininess = 33.5 }
+mirror = { type = "mirror" }
+glass = { type = "glass", tint = [0.8, 0.9, 0.95] }
+lamp = { diffuse = [0, 0, 0], emission = [6, 5, 4] }
+[[plane]]
+material = "floor"
+[[sphere]]
+center = [-1.2, 0.6, 0]
+radius = 0.6
+material = "glass"
+[[sphere]]
+center = [0.3, 0.5, -0.8]
+radius = 0.5
+material = "mirror"
+[[box]]
+center = [1.5, 0.4, 0]
+size = [0.6, 0.8, 0.6]
+rotate = [0, 33, 0]
+material = "red"
+[[cylinder]]
+a = [-0.4, 0, 0.9]
+b = [-0.4, 0.7, 0.9]
+radius = 0.2
+material = "red"
+[[cone]]
+base = [0.7, 0, 0.9]
+tip = [0.7, 0.8, 0.9]
+radius = 0.3
+material = "red"
+[[torus]]
+center = [-2, 0.5, -1]
+axis = [0.3, 1, 0.2]
+material = "red"
+[[disk]]
+center = [2.2, 1, -1]
+normal = [-1, 0.3, 1]
+material = "floor"
+[[triangle]]
+a = [-3, 0, -2]
+b = [-1, 0, -2.5]
+c = [-2, 2, -2.2]
+material = "red"
+[[quad]]
+corner = [-0.5, 3, 0.5]
+u = [1, 0, 0]
+v = [0, 0, -1]
+material = "mirror"
+[[quad]]
+corner = [-0.5, 2.9, -0.5]
+u = [1, 0, 0]
+v = [0, 0, 1]
+material = "lamp"
+[[sphere]]
+center = [2, 2, 1]
+radius = 0.2
+material = "lamp"
+[[cylinder]]
+a = [-2.5, 1.8, 0]
+b = [-2.5, 2.4, 0]
+radius = 0.1
+material = "lamp"
+[[light]]
+position = [1, 4, 3]
+intensity = [9, 9, 9]
+"#;
+
+#[test]
+fn known_pictures_have_their_bits_by_every_instruction_set() {
+    let desk = Desk::new();
+    let known: [(&str, u64); 4] = [
+        ("box", 0xebd4_c854_8f09_37b3),
+        ("tent", 0xf711_7a86_3d75_3c9c),
+        ("gaussian", 0xa27d_9fcf_f81f_c0fe),
+        ("mitchell", 0x72ae_fc26_ac88_857c),
+    ];
+    let mut tried = Vec::new();
+    let mut wrong = Vec::new();
+    for (name, instructions) in
+        [("portable", Instructions::Portable), ("avx2", Instructions::Avx2), ("avx512", Instructions::Avx512)]
+    {
+        if instructions.available() != instructions {
+            continue;
+        }
+        tried.push(instructions);
+        for (filter, expected) in known {
+            desk.write("all.toml", EVERYTHING.replace("FILTER", filter));
+            let mut process = desk.glimt("all.toml --once -o all.exr");
+            let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
+            assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+            let found = hash(&desk, "all.exr");
+            if found != expected {
+                wrong.push(format!("{filter} by {name}: {found:#018x}"));
+            }
+        }
+    }
+    eprintln!("tried {tried:?}");
+    assert!(tried.contains(&Instructions::Portable.max(Instructions::Avx512.available())), "tried {tried:?}");
+    assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
+}
