@@ -32,9 +32,9 @@ fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Ex
     let measured = pool.install(|| compare::measure(&pair));
     let summary = Summary::new(args, &pair, &measured.errors);
     if args.json {
-        say_json(&summary, console)
+        say_json(&summary, console);
     } else {
-        say_table(&summary, console)
+        say_table(&summary, console);
     }
     if let Some(diff) = diff {
         let written = pool.install(|| diff.write(args, &pair, &measured));
@@ -219,14 +219,12 @@ fn rows(summary: &Summary<'_>) -> [(&'static str, String, &'static str, String);
 
 /// Six digits that count.
 fn figure(value: f64) -> String {
-    match value.abs() {
-        size if size == 0.0 => "0".to_owned(),
-        size if (1e-3..1e6).contains(&size) => {
-            let whole_digits = format!("{:.0}", size.floor()).len();
-            let decimals = if size < 1.0 { 6 } else { 6_usize.saturating_sub(whole_digits) };
-            format!("{value:.decimals$}")
-        }
-        _ => format!("{value:.4e}"),
+    let is_short = (1e-4..1e6).contains(&value);
+    let decimals = if is_short { (5.0 - libm::log10(value).floor()).max(0.0) as usize } else { 5 };
+    match value {
+        0.0 => "0".to_owned(),
+        _ if is_short => format!("{value:.decimals$}"),
+        _ => format!("{value:.decimals$e}"),
     }
 }
 
@@ -242,12 +240,14 @@ mod tests {
     fn figures_have_the_digits_that_count() {
         let cases = [
             (0.0, "0"),
-            (0.012_345_678, "0.012346"),
+            (0.012_345_678, "0.0123457"),
+            (0.000_2, "0.000200000"),
             (1.5, "1.50000"),
             (123.456_789, "123.457"),
             (123_456.7, "123457"),
-            (1.234_5e-7, "1.2345e-7"),
-            (5e30, "5.0000e30"),
+            (999_999.9, "1000000"),
+            (1.234_5e-7, "1.23450e-7"),
+            (5e30, "5.00000e30"),
         ];
         for (value, text) in cases {
             assert_eq!(figure(value), text);

@@ -4,17 +4,24 @@ use std::f64::consts::TAU;
 
 use crate::math::Vec3;
 
-/// Linear Rec. 709 colour of a value in [0, 1]. Lightness of Oklab (B. Ottosson, 2020) is proportional to the value;
-/// the hue makes half a turn, and chroma is largest in the middle.
+/// Linear Rec. 709 colour of a value in [0, 1]. CIE lightness is proportional to the value; the hue of Oklab
+/// (B. Ottosson, 2020) makes half a turn, and chroma is largest in the middle.
 pub(super) fn color(value: f64) -> Vec3 {
-    const LIGHTEST: f64 = 0.97;
+    const LIGHTEST: f64 = 95.0;
     const CHROMA: f64 = 0.19;
     const PALEST: f64 = 0.07;
     let value = value.clamp(0.0, 1.0);
     let turn = 0.79 + 0.5 * value;
     let chroma = CHROMA * 4.0 * value * (1.0 - value) + PALEST * value * value;
     let (a, b) = (chroma * libm::cos(TAU * turn), chroma * libm::sin(TAU * turn));
-    of_oklab(LIGHTEST * value, a, b)
+    of_oklab(libm::cbrt(luminance_of(LIGHTEST * value)), a, b)
+}
+
+/// Relative luminance of a CIE lightness, 0 to 100.
+fn luminance_of(lightness: f64) -> f64 {
+    const KAPPA: f64 = 24_389.0 / 27.0;
+    let root = (lightness + 16.0) / 116.0;
+    if lightness > 8.0 { root * root * root } else { lightness / KAPPA }
 }
 
 fn of_oklab(lightness: f64, a: f64, b: f64) -> Vec3 {
