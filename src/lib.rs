@@ -21,6 +21,7 @@
 //! | [`world`] | everything ready to trace, immutable |
 //! | [`film`] | sums of samples, tone mapping, pictures |
 //! | [`integrators`] | whitted, views |
+//! | [`compare`] | the error of a picture against a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
 //! | [`pipeline`] | stages, caches, the worker, watching files |
 //! | [`tui`] | the terminal front end |
@@ -46,10 +47,11 @@
 //! world       -> scene assets accel materials lights geometry math control
 //! film        -> math choice
 //! integrators -> world scene materials lights geometry sampling film math choice control
+//! compare     -> assets film math control
 //! output      -> film math control system
 //! pipeline    -> integrators world assets scene film output lights materials math choice control system
 //! tui         -> pipeline scene film math choice
-//! cli         -> pipeline tui output scene film choice
+//! cli         -> pipeline tui compare output scene film choice control
 //! ```
 //!
 //! ## What holds everywhere
@@ -71,6 +73,7 @@ pub mod accel;
 pub mod assets;
 pub mod choice;
 pub mod cli;
+pub mod compare;
 pub mod control;
 pub mod film;
 pub mod geometry;

@@ -21,6 +21,7 @@ Examples:
   glimt ball.toml --once -o a.png -o a.exr
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
+  glimt compare a.exr reference.exr       the error of one picture against another
 
 The scene that `glimt new` writes has every key, with comments.
 A scene that is named like a command is given with its folder: glimt ./check
@@ -52,7 +53,7 @@ impl Args {
     pub(super) fn color(&self) -> ColorChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
-            _ => self.render.color,
+            Some(Subcommand::New { .. } | Subcommand::Compare(_)) | None => self.render.color,
         }
     }
 }
@@ -73,6 +74,38 @@ pub enum Subcommand {
         /// The file to write; - is stdout
         file: PathBuf,
     },
+    /// Measure the error of a picture against a reference
+    #[command(after_help = COMPARE_HELP)]
+    Compare(CompareArgs),
+}
+
+const COMPARE_HELP: &str = "\
+On linear values as they are: RMSE, max |a - b|, and relMSE = mean of (a - b)^2/(b^2 + 0.01), also
+without the 0.1 % of the pixels that have the largest errors. On what a display shows, clamped sRGB:
+PSNR; SSIM (Wang et al. 2004, on Rec. 709 luma); FLIP (Andersson et al. 2020, 67 pixels a degree).
+
+Files of 8 and 16 bits are taken for sRGB, float files for linear; alpha is left out.
+
+Exit codes: 0 measured, and not above --max-relmse; 1 above it, or --diff could not be written;
+2 the call or a file is wrong: sizes that differ, values that are not finite.";
+
+/// Two pictures and what is made of their difference.
+#[derive(Clone, Debug, clap::Args)]
+pub struct CompareArgs {
+    /// The picture that is judged: png, jpg, ppm, tga, bmp, webp, exr or hdr
+    pub a: PathBuf,
+    /// The reference, of the same size
+    pub b: PathBuf,
+    /// Exit with 1 if relMSE (of all pixels) is above X
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = error_bound)]
+    pub max_relmse: Option<f64>,
+    /// Write the error as a picture, png, jpg, ppm: FLIP of each pixel, black for 0 through purple, red and orange to
+    /// pale yellow for 1; exr, hdr: |a - b|, linear
+    #[arg(long, value_name = "FILE")]
+    pub diff: Option<PathBuf>,
+    /// One JSON object on stdout in place of the table; psnr_db is null where the pictures are equal
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// A render's options; each overrides the scene for this run.
@@ -254,6 +287,13 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds above 0".to_owned()),
+    }
+}
+
+fn error_bound(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
+        _ => Err("expected a number that is not below 0".to_owned()),
     }
 }
 

@@ -4,6 +4,7 @@
 
 pub mod args;
 mod check;
+mod compare;
 mod console;
 mod exit;
 mod live;
@@ -34,6 +35,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     match args.command {
         Some(Subcommand::Check { scene, .. }) => check::run(&scene, &console),
         Some(Subcommand::New { file }) => new::run(&file, &console),
+        Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         None => match lower::lower(args.render) {
             Ok(order) if order.is_once => once::run(&order, &console),
             Ok(order) => live::run(order, &console),

@@ -36,9 +36,18 @@ impl Texels {
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
         let index = y as usize * self.width as usize + x as usize;
         match &self.data {
-            TexelData::Srgb8(bytes) => Vec3::from_array(bytes[index].map(|byte| SRGB[usize::from(byte)])),
-            TexelData::Linear8(bytes) => Vec3::from_array(bytes[index].map(|byte| f32::from(byte) / 255.0)),
+            TexelData::Srgb8(bytes) => of_srgb(bytes[index]),
+            TexelData::Linear8(bytes) => of_linear(bytes[index]),
             TexelData::Float(floats) => floats[index],
+        }
+    }
+
+    /// Linear values of all texels.
+    pub fn into_linear(self) -> Vec<Vec3> {
+        match self.data {
+            TexelData::Srgb8(bytes) => bytes.into_iter().map(of_srgb).collect(),
+            TexelData::Linear8(bytes) => bytes.into_iter().map(of_linear).collect(),
+            TexelData::Float(floats) => floats,
         }
     }
 
@@ -59,4 +68,12 @@ impl Texels {
             TexelData::Float(floats) => size_of_val(floats.as_slice()),
         }
     }
+}
+
+fn of_srgb(bytes: [u8; 3]) -> Vec3 {
+    Vec3::from_array(bytes.map(|byte| SRGB[usize::from(byte)]))
+}
+
+fn of_linear(bytes: [u8; 3]) -> Vec3 {
+    Vec3::from_array(bytes.map(|byte| f32::from(byte) / 255.0))
 }

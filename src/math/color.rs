@@ -22,6 +22,11 @@ pub fn linear_to_srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
+/// [`linear_to_srgb`] in double precision, for measures of error.
+pub fn linear_to_srgb_f64(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
+}
+
 /// A linear component, clamped to [0, 1], as an sRGB byte; NaN becomes 0.
 pub fn linear_to_srgb8(linear: f32) -> u8 {
     let encoded = linear_to_srgb(linear.clamp(0.0, 1.0));
@@ -49,6 +54,7 @@ mod tests {
     fn known_values_of_the_curve() {
         assert!((srgb_to_linear(0.5) - 0.214_041_14).abs() < 1e-6);
         assert!((linear_to_srgb(0.18) - 0.461_356).abs() < 1e-5);
+        assert!((linear_to_srgb_f64(0.18) - 0.461_356_129_500_442).abs() < 1e-12);
         assert_eq!(linear_to_srgb8(f32::NAN), 0);
         assert_eq!(linear_to_srgb8(f32::INFINITY), 255);
         assert_eq!(linear_to_srgb8(-1.0), 0);

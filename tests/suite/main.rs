@@ -3,6 +3,7 @@
 mod broken;
 mod bytes;
 mod closed_forms;
+mod compare;
 mod contract;
 mod desk;
 mod extremes;

@@ -44,7 +44,9 @@ fn words(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData
     let value = |word: u16| f32::from(word) / f32::from(u16::MAX);
     let linear: Vec<f32> = match encoding {
         ImageEncoding::Linear => (0..=u16::MAX).map(value).collect(),
-        _ => (0..=u16::MAX).map(|word| srgb_to_linear(value(word))).collect(),
+        ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Raw => {
+            (0..=u16::MAX).map(|word| srgb_to_linear(value(word))).collect()
+        }
     };
     let texel = |pixel| Vec3::from_array(rgb(pixel).map(|word| linear[usize::from(word)]));
     TexelData::Float(samples.chunks_exact(channels).map(texel).collect())
@@ -54,7 +56,8 @@ fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding) -> TexelDat
     let clean = |value: f32| if value.is_finite() { value.max(0.0) } else { 0.0 };
     let decode = |value: f32| match encoding {
         ImageEncoding::Srgb => clean(srgb_to_linear(clean(value))),
-        _ => clean(value),
+        ImageEncoding::Color | ImageEncoding::Linear => clean(value),
+        ImageEncoding::Raw => value,
     };
     let texel = |pixel| Vec3::from_array(rgb(pixel).map(decode));
     TexelData::Float(samples.chunks_exact(channels).map(texel).collect())

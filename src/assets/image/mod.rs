@@ -36,6 +36,8 @@ pub enum ImageEncoding {
     Srgb,
     /// Always linear: normal maps.
     Linear,
+    /// As [`Self::Color`], and floats stay as they are, negative or not finite: pictures that are judged.
+    Raw,
 }
 
 /// What an image may cost.
@@ -57,7 +59,7 @@ impl Default for ImageLimits {
 /// Read an image: PNG, JPEG, PNM, TGA, BMP, HDR, EXR, WebP, told by its first bytes, else by its ending.
 ///
 /// Grey becomes RGB, alpha is left out, a camera's note on orientation is followed; texels that are negative or
-/// not finite become 0. A JPEG that is cut short is an error. 16-bit and float files give linear floats. Progress is in bytes of the file.
+/// not finite become 0 (but for [`ImageEncoding::Raw`]). A JPEG that is cut short is an error. 16-bit and float files give linear floats. Progress is in bytes of the file.
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], [`AssetError::Malformed`] where the content is not what it says or beyond the

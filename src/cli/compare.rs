@@ -1,0 +1,258 @@
+//! `glimt compare`: the error of a picture against a reference, as a table, as JSON, as a picture.
+
+use std::path::Path;
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::Serialize;
+
+use super::args::CompareArgs;
+use super::console::Console;
+use super::exit::Exit;
+use crate::compare::{self, Errors, Measured, PIXELS_PER_DEGREE, Pair};
+use crate::control::CancelToken;
+use crate::film::RadianceImage;
+use crate::output::write::{self, Guard};
+use crate::output::{self, EncodeOptions, FileIdentity, Format, OutputError};
+
+pub(super) fn run(args: &CompareArgs, console: &Console) -> Exit {
+    match ThreadPoolBuilder::new().build() {
+        Ok(pool) => run_in(&pool, args, console).unwrap_or_else(|exit| exit),
+        Err(error) => console.fail(Exit::FAILED, &format!("cannot start threads: {error}")),
+    }
+}
+
+/// What was wrong is said, and is the exit code of an error.
+fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
+    let diff = args.diff.as_deref().map(|path| Diff::check(path, args, console)).transpose()?;
+    let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
+        errors.iter().for_each(|error| console.say(&format!("error: {error}")));
+        Exit::WRONG
+    })?;
+    warn_of_one_file(args, console);
+    let measured = pool.install(|| compare::measure(&pair));
+    let summary = Summary::new(args, &pair, &measured.errors);
+    if args.json {
+        say_json(&summary, console);
+    } else {
+        say_table(&summary, console);
+    }
+    if let Some(diff) = diff {
+        let written = pool.install(|| diff.write(args, &pair, &measured));
+        written.map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+        console.say(&format!("wrote {} ({})", diff.path.display(), diff.shows()));
+    }
+    Ok(judge(&summary, console))
+}
+
+fn judge(summary: &Summary<'_>, console: &Console) -> Exit {
+    match summary.max_relmse {
+        Some(most) if !summary.is_within => {
+            let relmse = figure(summary.relmse);
+            console.fail(Exit::FAILED, &format!("relMSE is {relmse}, above the {most} of --max-relmse"))
+        }
+        Some(_) | None => Exit::DONE,
+    }
+}
+
+fn warn_of_one_file(args: &CompareArgs, console: &Console) {
+    let identity = FileIdentity::of(&args.a);
+    if identity.is_some() && identity == FileIdentity::of(&args.b) {
+        let (a, b) = (args.a.display(), args.b.display());
+        let which = if args.a == args.b {
+            format!("{a} is given twice")
+        } else {
+            format!("{a} and {b} are one file")
+        };
+        console.say(&format!(
+            "warning: {which}: there is no error, whatever it holds; name a picture and a reference"
+        ));
+    }
+}
+
+/// A picture of the error, to be written.
+struct Diff<'a> {
+    path: &'a Path,
+    format: Format,
+}
+
+impl<'a> Diff<'a> {
+    /// What can be told before the work.
+    fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
+        let format = Format::of(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
+        check_no_input(path, path, args).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
+        output::check_target(path).map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+        Ok(Self { path, format })
+    }
+
+    fn is_float(&self) -> bool {
+        match self.format {
+            Format::Exr | Format::Hdr => true,
+            Format::Png | Format::Jpeg | Format::Ppm => false,
+        }
+    }
+
+    fn shows(&self) -> &'static str {
+        if self.is_float() {
+            "|a - b| of each channel, linear"
+        } else {
+            "FLIP of each pixel: black 0, then purple, red, orange, to pale yellow 1"
+        }
+    }
+
+    fn write(&self, args: &CompareArgs, pair: &Pair, measured: &Measured) -> Result<(), OutputError> {
+        let image: RadianceImage =
+            if self.is_float() { compare::absolute(pair) } else { compare::heat(pair, &measured.flip) };
+        let note = format!("{}; a: {}, b: {}", self.shows(), args.a.display(), args.b.display());
+        let options =
+            EncodeOptions { metadata: vec![("Error".to_owned(), note)], ..EncodeOptions::default() };
+        let token = CancelToken::new();
+        let bytes = output::encode(&image, &options, self.format, &token)?;
+        let may_replace = |real: &Path| check_no_input(self.path, real, args);
+        let is_kept = |path: &Path| check_no_input(path, path, args).is_err();
+        write::atomic_until(
+            self.path,
+            &bytes,
+            &Guard { is_kept: &is_kept, may_replace: &may_replace },
+            &token,
+        )
+    }
+}
+
+/// The target, which leads to `real`, must not be A or B.
+fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
+    let Some(identity) = FileIdentity::of(real) else { return Ok(()) };
+    let inputs = [&args.a, &args.b];
+    match inputs.into_iter().find(|input| FileIdentity::of(input).as_ref() == Some(&identity)) {
+        Some(input) => {
+            let other = if path == input { String::new() } else { format!("{}, ", input.display()) };
+            let name = path.display();
+            let reason = format!(
+                "cannot write {name}: it is {other}one of the pictures compared; name another file with --diff FILE"
+            );
+            Err(OutputError::Refused { reason })
+        }
+        None => Ok(()),
+    }
+}
+
+/// What is said, and the keys of the JSON object.
+#[derive(Serialize)]
+struct Summary<'a> {
+    a: String,
+    b: String,
+    width: u32,
+    height: u32,
+    rmse: f64,
+    relmse: f64,
+    relmse_trimmed: f64,
+    dropped_pixels: u64,
+    max: f64,
+    max_at: &'a [u32; 2],
+    psnr_db: f64,
+    ssim: f64,
+    flip: f64,
+    max_relmse: Option<f64>,
+    /// Whether relMSE is not above that.
+    is_within: bool,
+}
+
+impl<'a> Summary<'a> {
+    fn new(args: &CompareArgs, pair: &Pair, errors: &'a Errors) -> Self {
+        let &Errors { rmse, relmse, relmse_trimmed, dropped_pixels, max, ref max_at, psnr_db, ssim, flip } =
+            errors;
+        Self {
+            a: args.a.display().to_string(),
+            b: args.b.display().to_string(),
+            width: pair.a().width,
+            height: pair.a().height,
+            rmse,
+            relmse,
+            relmse_trimmed,
+            dropped_pixels,
+            max,
+            max_at,
+            psnr_db,
+            ssim,
+            flip,
+            max_relmse: args.max_relmse,
+            is_within: args.max_relmse.is_none_or(|most| relmse <= most),
+        }
+    }
+}
+
+/// A value that is not finite becomes null.
+fn say_json(summary: &Summary<'_>, console: &Console) {
+    match serde_json::to_string(summary) {
+        Ok(text) => console.answer(&text),
+        Err(error) => console.say(&format!("error: {error}")),
+    }
+}
+
+fn say_table(summary: &Summary<'_>, console: &Console) {
+    let Summary { a, b, width, height, .. } = summary;
+    console.answer(&format!("{a} against the reference {b}, {width}×{height} pixels"));
+    console.answer("");
+    for (name, value, unit, note) in rows(summary) {
+        console.answer(format!("{name:<16}{value:>12} {unit:<4}{note}").trim_end());
+    }
+    console.answer("");
+    console.answer("Better is: PSNR higher, SSIM nearer to 1, everything else nearer to 0.");
+}
+
+/// Name, value, unit, and what it is of.
+fn rows(summary: &Summary<'_>) -> [(&'static str, String, &'static str, String); 7] {
+    let pixels = u64::from(summary.width) * u64::from(summary.height);
+    let [x, y] = summary.max_at;
+    let trimmed = format!("the same, without the worst 0.1 %: {} of {pixels} pixels", summary.dropped_pixels);
+    let place = if summary.max > 0.0 { format!(", at pixel ({x}, {y})") } else { String::new() };
+    let flip = format!("clamped sRGB, {PIXELS_PER_DEGREE} pixels a degree; mean, 0 to 1");
+    [
+        ("RMSE", figure(summary.rmse), "", "linear".to_owned()),
+        ("relMSE", figure(summary.relmse), "", "linear: mean of (a - b)²/(b² + 0.01)".to_owned()),
+        ("relMSE, trimmed", figure(summary.relmse_trimmed), "", trimmed),
+        ("max |a - b|", figure(summary.max), "", format!("linear{place}")),
+        ("PSNR", decibels(summary.psnr_db), "dB", "clamped sRGB".to_owned()),
+        ("SSIM", format!("{:.6}", summary.ssim), "", "luma of clamped sRGB".to_owned()),
+        ("FLIP", figure(summary.flip), "", flip),
+    ]
+}
+
+/// Six digits that count.
+fn figure(value: f64) -> String {
+    let is_short = (1e-4..1e6).contains(&value);
+    let decimals = if is_short { (5.0 - libm::log10(value).floor()).max(0.0) as usize } else { 5 };
+    match value {
+        0.0 => "0".to_owned(),
+        _ if is_short => format!("{value:.decimals$}"),
+        _ => format!("{value:.decimals$e}"),
+    }
+}
+
+fn decibels(value: f64) -> String {
+    if value.is_finite() { format!("{value:.4}") } else { "∞".to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_have_the_digits_that_count() {
+        let cases = [
+            (0.0, "0"),
+            (0.012_345_678, "0.0123457"),
+            (0.000_2, "0.000200000"),
+            (1.5, "1.50000"),
+            (123.456_789, "123.457"),
+            (123_456.7, "123457"),
+            (999_999.9, "1000000"),
+            (1.234_5e-7, "1.23450e-7"),
+            (5e30, "5.00000e30"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(figure(value), text);
+        }
+        assert_eq!(decibels(f64::INFINITY), "∞");
+        assert_eq!(decibels(31.25), "31.2500");
+    }
+}

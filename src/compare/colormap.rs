@@ -1,0 +1,66 @@
+//! Colours for errors: black, purple, red, orange, pale yellow, as much lighter for each step as the one before.
+
+use std::f64::consts::TAU;
+
+use crate::math::Vec3;
+
+/// Linear Rec. 709 colour of a value in [0, 1]. CIE lightness is proportional to the value; the hue of Oklab
+/// (B. Ottosson, 2020) makes half a turn, and chroma is largest in the middle.
+pub(super) fn color(value: f64) -> Vec3 {
+    const LIGHTEST: f64 = 95.0;
+    const CHROMA: f64 = 0.19;
+    const PALEST: f64 = 0.07;
+    let value = value.clamp(0.0, 1.0);
+    let turn = 0.79 + 0.5 * value;
+    let chroma = CHROMA * 4.0 * value * (1.0 - value) + PALEST * value * value;
+    let (a, b) = (chroma * libm::cos(TAU * turn), chroma * libm::sin(TAU * turn));
+    of_oklab(libm::cbrt(luminance_of(LIGHTEST * value)), a, b)
+}
+
+/// Relative luminance of a CIE lightness, 0 to 100.
+fn luminance_of(lightness: f64) -> f64 {
+    const KAPPA: f64 = 24_389.0 / 27.0;
+    let root = (lightness + 16.0) / 116.0;
+    if lightness > 8.0 { root * root * root } else { lightness / KAPPA }
+}
+
+fn of_oklab(lightness: f64, a: f64, b: f64) -> Vec3 {
+    let cube = |x: f64| x * x * x;
+    let long = cube(lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
+    let middle = cube(lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b);
+    let short = cube(lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b);
+    let red = 4.076_741_662_1 * long - 3.307_711_591_3 * middle + 0.230_969_929_2 * short;
+    let green = -1.268_438_004_6 * long + 2.609_757_401_1 * middle - 0.341_319_396_5 * short;
+    let blue = -0.004_196_086_3 * long - 0.703_418_614_7 * middle + 1.707_614_701_0 * short;
+    Vec3::new(red as f32, green as f32, blue as f32).clamp(Vec3::ZERO, Vec3::ONE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::color::luminance;
+
+    #[test]
+    fn larger_errors_are_lighter_and_the_ends_are_known() {
+        assert_eq!(color(0.0), Vec3::ZERO);
+        assert_eq!(color(-1.0), color(0.0));
+        assert_eq!(color(2.0), color(1.0));
+        assert!(luminance(color(1.0)) > 0.85, "{}", color(1.0));
+        for step in 0..256 {
+            let [darker, lighter] = [step, step + 1].map(|step| luminance(color(f64::from(step) / 256.0)));
+            assert!(lighter > darker, "{step}: {darker} {lighter}");
+        }
+    }
+
+    #[test]
+    fn hues_are_as_described() {
+        let is_largest = |value: f64, channel: usize| {
+            let color = color(value).to_array();
+            color.iter().all(|other| *other <= color[channel])
+        };
+        assert!(is_largest(0.15, 2), "purple: {}", color(0.15));
+        assert!(is_largest(0.5, 0), "red: {}", color(0.5));
+        let yellow = color(1.0);
+        assert!(yellow.x > yellow.z && yellow.y > yellow.z, "{yellow}");
+    }
+}

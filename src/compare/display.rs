@@ -1,0 +1,131 @@
+//! Errors of what a display shows, clamped sRGB of any fineness: PSNR of its channels, SSIM of its luma.
+//!
+//! SSIM: Z. Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity" (2004): a Gaussian
+//! window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1; the mean over the windows that lie inside.
+//! Along a side of fewer than 11 pixels, windows are cut at its ends, and their weights still have a sum of one.
+
+use rayon::prelude::*;
+
+use super::plane::{Plane, gaussian, normalised};
+use super::{Pair, tiles};
+use crate::film::Rect;
+use crate::math::Vec3;
+use crate::math::color::linear_to_srgb_f64;
+
+const RADIUS: usize = 5;
+const SIGMA: f64 = 1.5;
+const C1: f64 = 0.01 * 0.01;
+const C2: f64 = 0.03 * 0.03;
+/// Weights of red, green and blue in luma (ITU-R BT.709).
+const LUMA: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
+pub(super) struct Display {
+    pub(super) psnr_db: f64,
+    pub(super) ssim: f64,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    square: f64,
+    ssim: f64,
+    windows: u64,
+}
+
+impl Sums {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            square: self.square + other.square,
+            ssim: self.ssim + other.ssim,
+            windows: self.windows + other.windows,
+        }
+    }
+}
+
+pub(super) fn measure(pair: &Pair) -> Display {
+    let (width, height) = (pair.width(), pair.height());
+    let window = normalised(&gaussian(SIGMA, RADIUS));
+    let of_band = |band| {
+        let sums = tiles::of_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
+        sums.fold(Sums::default(), Sums::plus)
+    };
+    let bands: Vec<_> = (0..tiles::bands(height)).into_par_iter().map(of_band).collect();
+    let sums = bands.into_iter().fold(Sums::default(), Sums::plus);
+    let mean_square = sums.square / (3 * width * height) as f64;
+    Display { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
+}
+
+fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> Sums {
+    let (square, [a, b]) = lumas(pair, tile);
+    let mean = |plane: &Plane| plane.filtered(window, window);
+    let (mean_a, mean_b) = (mean(&a), mean(&b));
+    let (mean_aa, mean_bb, mean_ab) = (mean(&a.times(&a)), mean(&b.times(&b)), mean(&a.times(&b)));
+    let columns = weights_inside(tile.x, tile.width, pair.width(), window);
+    let rows = weights_inside(tile.y, tile.height, pair.height(), window);
+    let mut sums = Sums { square, ..Sums::default() };
+    for (y, row) in rows.iter().enumerate() {
+        for (x, column) in columns.iter().enumerate() {
+            let (Some(row), Some(column)) = (row, column) else { continue };
+            let at = |plane: &Plane| plane.values[y * plane.width + x] / (row * column);
+            sums.ssim += similarity([at(&mean_a), at(&mean_b)], [at(&mean_aa), at(&mean_bb)], at(&mean_ab));
+            sums.windows += 1;
+        }
+    }
+    sums
+}
+
+/// Wang et al., equation 13, from the means of a, b, of a², b² and of ab.
+fn similarity([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
+    let (variances, covariance) = (aa - a * a + (bb - b * b), ab - a * b);
+    (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
+}
+
+/// Squared differences of the tile's channels, and the lumas of the tile and of [`RADIUS`] pixels around it, 0 outside
+/// of the picture.
+fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
+    let side = |length: u32| length as usize + 2 * RADIUS;
+    let mut lumas =
+        [Plane::zero(side(tile.width), side(tile.height)), Plane::zero(side(tile.width), side(tile.height))];
+    let mut square = 0.0;
+    let width = side(tile.width);
+    for row in 0..side(tile.height) {
+        let Some(y) = inside(tile.y, row, pair.height()) else { continue };
+        for column in 0..width {
+            let Some(x) = inside(tile.x, column, pair.width()) else { continue };
+            let [a, b] = pair.at(x, y).map(encoded);
+            lumas[0].values[row * width + column] = luma(a);
+            lumas[1].values[row * width + column] = luma(b);
+            if is_inner(row, tile.height) && is_inner(column, tile.width) {
+                square += a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+            }
+        }
+    }
+    (square, lumas)
+}
+
+/// The place in the picture of one in the tile with its margin, if it is inside.
+fn inside(start: u32, offset: usize, length: usize) -> Option<usize> {
+    (start as usize + offset).checked_sub(RADIUS).filter(|&place| place < length)
+}
+
+fn is_inner(offset: usize, length: u32) -> bool {
+    (RADIUS..RADIUS + length as usize).contains(&offset)
+}
+
+/// For each place of the tile along one side, the weights of its window that are inside of the picture; none where the
+/// window does not count.
+fn weights_inside(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
+    let weight = |place: usize| {
+        let is_whole = place >= RADIUS && place + RADIUS < length;
+        let taps = (place..).zip(window).filter(|(tap, _)| (RADIUS..RADIUS + length).contains(tap));
+        (is_whole || length < window.len()).then(|| taps.map(|(_, weight)| weight).sum())
+    };
+    (0..count).map(|offset| weight((start + offset) as usize)).collect()
+}
+
+fn encoded(color: Vec3) -> [f64; 3] {
+    color.to_array().map(|linear| linear_to_srgb_f64(f64::from(linear).clamp(0.0, 1.0)))
+}
+
+fn luma(encoded: [f64; 3]) -> f64 {
+    encoded.iter().zip(LUMA).map(|(value, weight)| value * weight).sum()
+}

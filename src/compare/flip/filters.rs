@@ -1,0 +1,140 @@
+//! The eye's filters: contrast sensitivity as a blur of each opponent channel, edge and point detection on lightness.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+use super::super::plane::{Plane, gaussian, normalised, offsets};
+
+/// One Gaussian of a contrast sensitivity function: its amplitude, and its width in square degrees.
+#[derive(Clone, Copy)]
+struct Term {
+    a: f64,
+    b: f64,
+}
+
+/// Achromatic, red–green, blue–yellow (the paper, table 1; the second terms of the first two are 0).
+const SENSITIVITY: [&[Term]; 3] = [
+    &[Term { a: 1.0, b: 0.0047 }],
+    &[Term { a: 1.0, b: 0.0053 }],
+    &[Term { a: 34.1, b: 0.04 }, Term { a: 13.5, b: 0.025 }],
+];
+/// The widest of them.
+const WIDEST: f64 = 0.04;
+/// Width of the feature that the eye sees best, degrees.
+const FEATURE_DEGREES: f64 = 0.082;
+/// Widths of a Gaussian that a filter reaches.
+const REACH: f64 = 3.0;
+
+/// A separable blur with a weight: taps along rows and along columns.
+struct Blur {
+    weight: f64,
+    taps: Vec<f64>,
+}
+
+/// All filters at some number of pixels per degree, of one length.
+pub(super) struct Filters {
+    radius: usize,
+    blurs: [Vec<Blur>; 3],
+    smooth: Vec<f64>,
+    edge: Vec<f64>,
+    point: Vec<f64>,
+}
+
+impl Filters {
+    pub(super) fn new(pixels_per_degree: f64) -> Self {
+        let blur_radius = (REACH * (WIDEST / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as usize;
+        let sigma = 0.5 * FEATURE_DEGREES * pixels_per_degree;
+        let feature_radius = (REACH * sigma).ceil() as usize;
+        let radius = blur_radius.max(feature_radius);
+        let lengthened = |taps: &[f64], from: usize| {
+            let zeros = vec![0.0; radius - from];
+            [&zeros, taps, &zeros].concat()
+        };
+        let blurs = SENSITIVITY.map(|terms| {
+            let mut blurs = blurs(terms, blur_radius, pixels_per_degree);
+            blurs.iter_mut().for_each(|blur| blur.taps = lengthened(&blur.taps, blur_radius));
+            blurs
+        });
+        let bell = gaussian(sigma, feature_radius);
+        let slope: Vec<_> = offsets(feature_radius).zip(&bell).map(|(x, g)| -x * g).collect();
+        let curvature: Vec<_> =
+            offsets(feature_radius).zip(&bell).map(|(x, g)| (x * x / (sigma * sigma) - 1.0) * g).collect();
+        Self {
+            radius,
+            blurs,
+            smooth: lengthened(&normalised(&bell), feature_radius),
+            edge: lengthened(&balanced(&slope), feature_radius),
+            point: lengthened(&balanced(&curvature), feature_radius),
+        }
+    }
+
+    /// Pixels that a filter reaches to each side.
+    pub(super) fn radius(&self) -> usize {
+        self.radius
+    }
+
+    /// What is left of the opponent channels at this distance.
+    pub(super) fn blurred(&self, planes: &[Plane; 3]) -> [Plane; 3] {
+        [0, 1, 2].map(|channel| {
+            let parts = self.blurs[channel].iter().map(|blur| {
+                let mut part = planes[channel].filtered(&blur.taps, &blur.taps);
+                part.values.iter_mut().for_each(|value| *value *= blur.weight);
+                part
+            });
+            let sum = |mut sum: Plane, part: Plane| {
+                sum.values.iter_mut().zip(part.values).for_each(|(sum, value)| *sum += value);
+                sum
+            };
+            parts.reduce(sum).unwrap_or_else(|| Plane::zero(0, 0))
+        })
+    }
+
+    /// Edges and points in the achromatic channel.
+    pub(super) fn features(&self, y: &Plane) -> Features {
+        let lightness = Plane { values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect(), ..*y };
+        let smooth = lightness.along_rows(&self.smooth);
+        let strengths = |taps: &[f64]| {
+            let across = lightness.along_rows(taps).along_columns(&self.smooth);
+            let down = smooth.along_columns(taps);
+            across.values.iter().zip(&down.values).map(|(x, y)| (x * x + y * y).sqrt()).collect()
+        };
+        Features { edges: strengths(&self.edge), points: strengths(&self.point) }
+    }
+}
+
+/// The Gaussians of one channel, weighted so that all taps of their sum, in two dimensions, have a sum of one.
+fn blurs(terms: &[Term], radius: usize, pixels_per_degree: f64) -> Vec<Blur> {
+    let volumes = terms.iter().map(|term| {
+        // exp(−π²d²/b) with d in degrees.
+        let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;
+        let taps = gaussian(sigma, radius);
+        let sum: f64 = taps.iter().sum();
+        Blur { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalised(&taps) }
+    });
+    let mut blurs: Vec<_> = volumes.collect();
+    let whole: f64 = blurs.iter().map(|blur| blur.weight).sum();
+    blurs.iter_mut().for_each(|blur| blur.weight /= whole);
+    blurs
+}
+
+/// Positive taps scaled to a sum of 1, negative ones to −1.
+fn balanced(taps: &[f64]) -> Vec<f64> {
+    let positive: f64 = taps.iter().filter(|tap| **tap > 0.0).sum();
+    let negative: f64 = -taps.iter().filter(|tap| **tap < 0.0).sum::<f64>();
+    taps.iter().map(|tap| tap / if *tap > 0.0 { positive } else { negative }).collect()
+}
+
+/// How strong edges and points are at each pixel.
+pub(super) struct Features {
+    edges: Vec<f64>,
+    points: Vec<f64>,
+}
+
+impl Features {
+    /// Of each pixel, in [0, 1].
+    pub(super) fn differences<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = f64> + 'a {
+        let between = |a: &'a [f64], b: &'a [f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        let edges = between(&self.edges, &other.edges);
+        let points = between(&self.points, &other.points);
+        edges.zip(points).map(|(edge, point)| (edge.max(point) * FRAC_1_SQRT_2).sqrt())
+    }
+}

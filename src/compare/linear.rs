@@ -1,0 +1,95 @@
+//! Errors of linear values as they are.
+
+use rayon::prelude::*;
+
+use super::Pair;
+use crate::math::Vec3;
+
+/// Of the pixels, one in so many is left out of the trimmed mean.
+const DROPPED_ONE_IN: usize = 1000;
+/// Keeps what is relative to a black reference finite.
+const LEAST: f64 = 0.01;
+
+pub(super) struct Linear {
+    pub(super) rmse: f64,
+    pub(super) relmse: f64,
+    pub(super) relmse_trimmed: f64,
+    pub(super) dropped_pixels: u64,
+    pub(super) max: f64,
+    pub(super) max_at: [u32; 2],
+}
+
+/// Sums over some pixels.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    square: f64,
+    relative: f64,
+    max: f64,
+    /// Column and row of the first that has it.
+    max_at: [u32; 2],
+}
+
+pub(super) fn measure(pair: &Pair) -> Linear {
+    let pixels = pair.a().pixels.len();
+    let rows = map_rows(pair, row_sums);
+    let sums = rows.into_iter().enumerate().fold(Sums::default(), |sums, (y, row)| {
+        let (max, max_at) =
+            if row.max > sums.max { (row.max, [row.max_at[0], y as u32]) } else { (sums.max, sums.max_at) };
+        Sums { square: sums.square + row.square, relative: sums.relative + row.relative, max, max_at }
+    });
+    let dropped = pixels / DROPPED_ONE_IN;
+    let relmse = sums.relative / pixels as f64;
+    Linear {
+        rmse: (sums.square / (3 * pixels) as f64).sqrt(),
+        relmse,
+        relmse_trimmed: if dropped == 0 { relmse } else { trimmed(pair, dropped) },
+        dropped_pixels: dropped as u64,
+        max: sums.max,
+        max_at: sums.max_at,
+    }
+}
+
+/// What `of` gives for each row, in their order.
+fn map_rows<T: Send>(pair: &Pair, of: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
+    let a = pair.a().pixels.par_chunks(pair.width());
+    a.zip(pair.b().pixels.par_chunks(pair.width())).map(|(a, b)| of(a, b)).collect()
+}
+
+fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
+    let mut sums = Sums::default();
+    for (x, (&a, &b)) in a.iter().zip(b).enumerate() {
+        let difference = a.as_dvec3() - b.as_dvec3();
+        sums.square += difference.length_squared();
+        sums.relative += relative(a, b);
+        let largest = difference.abs().max_element();
+        if largest > sums.max {
+            (sums.max, sums.max_at) = (largest, [x as u32, 0]);
+        }
+    }
+    sums
+}
+
+/// Mean over the channels of (a − b)²/(b² + 0.01).
+fn relative(a: Vec3, b: Vec3) -> f64 {
+    let (a, b) = (a.as_dvec3(), b.as_dvec3());
+    ((a - b) * (a - b) / (b * b + LEAST)).element_sum() / 3.0
+}
+
+/// Mean of [`relative`] without the largest values.
+fn trimmed(pair: &Pair, dropped: usize) -> f64 {
+    let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels);
+    let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative(a, b)).collect();
+    let kept = errors.len() - dropped;
+    let (_, &mut least_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);
+    drop(errors);
+    let rows = map_rows(pair, |a, b| {
+        let errors = a.iter().zip(b).map(|(&a, &b)| relative(a, b));
+        errors
+            .filter(|error| *error < least_dropped)
+            .fold((0.0, 0), |(sum, count), error| (sum + error, count + 1))
+    });
+    let (sum, count) =
+        rows.into_iter().fold((0.0, 0_usize), |all, row: (f64, usize)| (all.0 + row.0, all.1 + row.1));
+    // Of those that are equal to the least that is dropped, some may stay.
+    (sum + (kept - count) as f64 * least_dropped) / kept as f64
+}

@@ -1,0 +1,108 @@
+//! One number for each pixel of a tile, and separable filters.
+
+/// Numbers in rows.
+#[derive(Clone, Debug)]
+pub(super) struct Plane {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) values: Vec<f64>,
+}
+
+impl Plane {
+    pub(super) fn zero(width: usize, height: usize) -> Self {
+        Self { width, height, values: vec![0.0; width * height] }
+    }
+
+    /// The product of two planes, value by value.
+    pub(super) fn times(&self, other: &Self) -> Self {
+        let values = self.values.iter().zip(&other.values).map(|(a, b)| a * b).collect();
+        Self { values, ..*self }
+    }
+
+    /// Weighted sums along rows and columns, where all taps lie inside: the plane shrinks by `taps − 1` on both sides.
+    pub(super) fn filtered(&self, along_rows: &[f64], along_columns: &[f64]) -> Self {
+        self.along_rows(along_rows).along_columns(along_columns)
+    }
+
+    /// Sums over neighbours in a row.
+    pub(super) fn along_rows(&self, taps: &[f64]) -> Self {
+        let mut out = Self::zero(self.width + 1 - taps.len(), self.height);
+        for (row, out) in self.values.chunks_exact(self.width).zip(out.values.chunks_exact_mut(out.width)) {
+            let shifted: Vec<_> = row.windows(out.len()).collect();
+            add(out, &shifted, taps);
+        }
+        out
+    }
+
+    /// Sums over neighbours in a column.
+    pub(super) fn along_columns(&self, taps: &[f64]) -> Self {
+        let mut out = Self::zero(self.width, self.height + 1 - taps.len());
+        let rows: Vec<_> = self.values.chunks_exact(self.width).collect();
+        for (out, rows) in out.values.chunks_exact_mut(self.width).zip(rows.windows(taps.len())) {
+            add(out, rows, taps);
+        }
+        out
+    }
+}
+
+/// Adds the rows, each times its tap; four at once, so that sums are loaded and stored less often.
+fn add(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
+    let (fours, rest) = taps.as_chunks();
+    let (fours_of_rows, rest_of_rows) = rows.as_chunks();
+    for ([t, u, v, w], [a, b, c, d]) in fours.iter().zip(fours_of_rows) {
+        let values = a.iter().zip(*b).zip(*c).zip(*d);
+        for (sum, (((a, b), c), d)) in sums.iter_mut().zip(values) {
+            *sum += (t * a + u * b) + (v * c + w * d);
+        }
+    }
+    for (tap, row) in rest.iter().zip(rest_of_rows) {
+        for (sum, value) in sums.iter_mut().zip(*row) {
+            *sum += tap * value;
+        }
+    }
+}
+
+/// exp(−x²/2σ²) at whole numbers from −radius to radius, pixels.
+pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
+    offsets(radius).map(|x| libm::exp(-x * x / (2.0 * sigma * sigma))).collect()
+}
+
+/// −radius … radius.
+pub(super) fn offsets(radius: usize) -> impl Iterator<Item = f64> {
+    let radius = radius as i32;
+    (-radius..=radius).map(f64::from)
+}
+
+/// The same taps with a sum of one.
+pub(super) fn normalised(taps: &[f64]) -> Vec<f64> {
+    let sum: f64 = taps.iter().sum();
+    taps.iter().map(|tap| tap / sum).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_weigh_neighbours() {
+        let plane = Plane { width: 4, height: 3, values: (0..12).map(f64::from).collect() };
+        let rows = plane.along_rows(&[1.0, 10.0, 100.0]);
+        assert_eq!((rows.width, rows.height), (2, 3));
+        assert_eq!(rows.values, [210.0, 321.0, 654.0, 765.0, 1098.0, 1209.0]);
+        let columns = plane.along_columns(&[1.0, 10.0]);
+        assert_eq!((columns.width, columns.height), (4, 2));
+        assert_eq!(columns.values, [40.0, 51.0, 62.0, 73.0, 84.0, 95.0, 106.0, 117.0]);
+        let row = Plane { width: 12, height: 1, ..plane };
+        let taps: Vec<_> = (0..6).map(|power| f64::from(8_i32.pow(power))).collect();
+        let sum = |start: usize| (0..6).map(|i| (start + i) as f64 * taps[i]).sum::<f64>();
+        let sums: Vec<_> = (0..7).map(sum).collect();
+        assert_eq!(row.along_rows(&taps).values, sums);
+    }
+
+    #[test]
+    fn gaussians_are_known() {
+        let taps = normalised(&gaussian(1.5, 5));
+        assert_eq!(taps.len(), 11);
+        assert!((taps[5] - 0.266_011_7).abs() < 1e-7 && (taps[0] - 0.001_028_4).abs() < 1e-7, "{taps:?}");
+    }
+}

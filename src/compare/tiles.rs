@@ -1,0 +1,25 @@
+//! A picture in pieces that fit into a cache: the same pieces whatever the number of threads.
+
+use crate::film::Rect;
+
+/// Columns and rows of a tile.
+pub(super) const SIDE: usize = 128;
+
+/// How many rows of tiles there are.
+pub(super) fn bands(height: usize) -> usize {
+    height.div_ceil(SIDE)
+}
+
+/// The tiles of one of them, from left to right.
+pub(super) fn of_band(band: usize, width: usize, height: usize) -> impl Iterator<Item = Rect> {
+    let y = band * SIDE;
+    (0..width.div_ceil(SIDE)).map(move |column| {
+        let x = column * SIDE;
+        Rect {
+            x: x as u32,
+            y: y as u32,
+            width: SIDE.min(width - x) as u32,
+            height: SIDE.min(height - y) as u32,
+        }
+    })
+}
