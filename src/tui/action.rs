@@ -17,6 +17,7 @@ pub(super) enum Action {
     ScrollDown,
     ToggleHelp,
     Close,
+    Redraw,
     Suspend,
     Interrupt,
     Quit,

@@ -83,6 +83,12 @@ impl Display {
         self.send(FIRST_QUESTIONS.to_vec(), Some(Question::Attributes), now);
     }
 
+    /// The content of the screen is unknown; the line is the same.
+    pub(super) fn forget(&mut self) {
+        self.painter.forget();
+        self.is_complete = false;
+    }
+
     /// Leads to this from now on. `is_new`: with a picture that was not wanted before.
     pub(super) fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, is_new: bool) {
         self.painter.aim(wanted, picture, fidelity);

@@ -63,6 +63,7 @@ pub(super) const KEYMAP: &[Binding] = &[
         "close the help or the errors",
         "close",
     ),
+    binding(&[KeyPress::ctrl('l')], "ctrl-l", Action::Redraw, "draw the screen anew", ""),
     binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "stop and go back to the shell", ""),
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];

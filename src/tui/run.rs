@@ -324,7 +324,11 @@ impl Ui {
             }
             Effect::Suspend => {}
             Effect::Redraw => return self.redraw(),
-            Effect::Measure => return self.measure(),
+            Effect::Measure => {
+                // It may have shrunk and grown again, and cut what was shown.
+                self.display.forget();
+                return self.measure();
+            }
         }
         None
     }

@@ -37,6 +37,10 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
 /// How long a terminal that takes nothing is waited for, at each step of giving it back.
 const STUCK: Duration = Duration::from_millis(60);
+/// A writer whose terminal took something goes on within this time.
+const STEP: Duration = Duration::from_millis(5);
+/// So often.
+const STEPS: u32 = 20;
 
 /// The terminal, taken.
 pub(super) struct Screen(());
@@ -104,15 +108,18 @@ fn give_back() {
 }
 
 /// Gives the screen back, if it is taken. What has not been sent is dropped; a terminal that takes nothing loses what
-/// the system keeps for it as well, and is waited for no longer than three times [`STUCK`].
+/// the system keeps for it as well, and is waited for no longer than three times [`STUCK`] and [`STEPS`] times [`STEP`].
 fn leave_screen() {
     if !TAKEN.swap(false, Ordering::AcqRel) {
         return;
     }
     let drop_kept = || tcflush(io::stdout(), FlushArg::TCOFLUSH);
     if !writer::discard(STUCK) {
+        // What is kept is less than a slice: one goes in several goes. After the last one nobody else writes, and there
+        // is room.
+        let is_written = || drop_kept().is_ok() && writer::discard(STEP);
+        (0..STEPS).any(|_| is_written());
         let _ = drop_kept();
-        writer::discard(STUCK);
     }
     let (sender, written) = channel();
     thread::spawn(move || {

@@ -28,8 +28,9 @@ const LEAST: f64 = 1_500.0;
 const QUEUE: Duration = Duration::from_millis(60);
 /// How long a terminal has to give its first answer.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// After this silence answers are taken for lost.
-const SILENCE: Duration = Duration::from_secs(3);
+/// After this silence, or after so many round trips, answers are taken for lost.
+const SILENCE: Duration = Duration::from_secs(1);
+const SILENT_TRIPS: u32 = 4;
 /// The least round trip is that of the last one or two of these.
 const AGE: Duration = Duration::from_secs(15);
 /// Slices are this large at most, and no smaller ones than this are begun.
@@ -165,7 +166,7 @@ impl Line {
         let filled = self.bucket.when(LEAST_SLICE + ASKED_BYTES, now);
         match self.pace {
             Pace::Answers => {
-                let lost = (!self.flight.is_empty()).then_some(self.heard + SILENCE);
+                let lost = (!self.flight.is_empty()).then_some(self.heard + self.silence());
                 let filled = self.is_multiplexed.then_some(filled).filter(|filled| *filled > now);
                 [lost, filled].into_iter().flatten().min()
             }
@@ -211,13 +212,18 @@ impl Line {
                 self.pace = Pace::Silent;
                 self.forget_flight();
             }
-            Pace::Answers if self.owes() && now >= self.heard + SILENCE => {
+            Pace::Answers if self.owes() && now >= self.heard + self.silence() => {
                 // The line stands still, or an answer was lost. Little is sent until one comes.
                 self.forget_flight();
                 self.window = LEAST;
             }
             Pace::Asked { .. } | Pace::Answers | Pace::Silent => {}
         }
+    }
+
+    /// How long answers may be out before they are taken for lost.
+    fn silence(&self) -> Duration {
+        SILENCE.max(self.round_trips.least().unwrap_or_default() * SILENT_TRIPS)
     }
 
     fn forget_flight(&mut self) {

@@ -145,6 +145,26 @@ fn a_line_that_stands_still_gets_little_and_recovers() {
 }
 
 #[test]
+fn a_lost_answer_holds_the_screen_up_for_a_second() {
+    let mut line = Line::new(false, Instant::now());
+    let now = Instant::now();
+    line.send(100, Some(Question::Attributes), now);
+    line.answered(Question::Attributes, now + Duration::from_millis(5));
+    let sent = now + Duration::from_millis(100);
+    line.send(line.window_bytes(), Some(Question::Status), sent);
+    assert_eq!(line.room(sent + Duration::from_millis(900)), 0);
+    assert_eq!(line.wake(sent), Some(sent + SILENCE));
+    assert!(line.room(sent + SILENCE) > 0);
+    // Where answers take long they are waited for longer.
+    let mut slow = Line::new(false, now);
+    slow.send(100, Some(Question::Attributes), now);
+    slow.answered(Question::Attributes, now + Duration::from_millis(800));
+    slow.send(slow.window_bytes(), Some(Question::Status), sent);
+    assert_eq!(slow.room(sent + Duration::from_secs(3)), 0);
+    assert!(slow.room(sent + Duration::from_millis(3200)) > 0);
+}
+
+#[test]
 fn nothing_is_due_while_nothing_is_owed() {
     let mut relay = Relay::new(1e8, 1, true, false);
     relay.run(100);

@@ -9,6 +9,9 @@ const MOST: usize = 6;
 /// No colour is looked for that serves longer than this.
 const LONGEST: usize = 8;
 
+/// Themes of 22 colours put their own in the place of the first ones of the cube.
+const FIRST_UNTOUCHED: u8 = 22;
+
 /// Colours for the halves of one cell.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Candidates {
@@ -44,8 +47,9 @@ fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), taste: Taste) -> Vec<S
     for span in taste.spans {
         let box_ = common(wanted.clone(), *span);
         add(Shade::Rgb(box_.shortest()));
-        let fixed = Shade::Palette(nearest_256(box_.mean()));
-        if fixed.rgb().is_some_and(|rgb| box_.holds(rgb)) {
+        let index = nearest_256(box_.mean());
+        let fixed = Shade::Palette(index);
+        if index >= FIRST_UNTOUCHED && fixed.rgb().is_some_and(|rgb| box_.holds(rgb)) {
             add(fixed);
         }
     }
@@ -112,8 +116,10 @@ mod tests {
         // 20 to 22 have 21 in common; 24 does not.
         let found = candidates(&row(&[20, 21, 22, 24]), Taste::EXACT);
         assert_eq!(found.upper, [Shade::Rgb([21, 50, 99])]);
-        assert_eq!(found.lower, [Shade::Rgb([0, 0, 0]), Shade::Palette(16)]);
+        assert_eq!(found.lower, [Shade::Rgb([0, 0, 0])], "16 may be another colour");
         assert_eq!(found.both.len(), 1, "the halves have nothing in common");
+        let greys = [Some([Shade::Rgb([8, 8, 8]); 2])];
+        assert_eq!(candidates(&greys, Taste::EXACT).upper, [Shade::Rgb([8, 8, 8]), Shade::Palette(232)]);
     }
 
     #[test]

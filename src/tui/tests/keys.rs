@@ -84,6 +84,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             desk.key(key);
             assert!(!desk.text().contains(" keys "));
         }
+        Action::Redraw => assert!(matches!(desk.key(key)[..], [Effect::Redraw])),
         Action::Suspend => assert!(matches!(desk.key(key)[..], [Effect::StopJob])),
         Action::Interrupt => assert!(matches!(desk.key(key)[..], [Effect::Quit(ExitStatus(130))])),
         Action::Quit => assert!(matches!(desk.key(key)[..], [Effect::Quit(ExitStatus(0))])),

@@ -36,6 +36,7 @@ fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::Close => {
             change(state, |state| if state.help { state.help = false } else { state.pane.open = false })
         }
+        Action::Redraw => vec![Effect::Redraw],
         Action::Suspend => vec![Effect::StopJob],
         Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],
         Action::Quit => vec![Effect::Quit(ExitStatus::QUIT)],

@@ -115,3 +115,19 @@ fn a_terminal_that_takes_nothing_does_not_hold_up_the_end() {
     terminal.set_reading(true);
     assert_eq!(terminal.end(), 0);
 }
+
+/// A terminal cuts what does not fit; the program may see the last size only.
+#[test]
+fn a_window_that_shrinks_and_grows_at_once_is_drawn_anew() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    for _ in 0..8 {
+        terminal.resize(10, 3);
+        terminal.resize(80, 24);
+        terminal.wait_for("whitted");
+        terminal.wait_for_color("red");
+    }
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
