@@ -3,12 +3,12 @@
 //! One [`Screen`] owns it. It is given back when the screen is dropped, when the front end's thread panics (by a
 //! hook that is chained once), before the program stops, and by [`rescue`] when the front end is stuck.
 
+use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::channel;
 use std::sync::{Mutex, Once, PoisonError};
 use std::thread::{self, ThreadId};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crossterm::cursor::{Hide, Show};
 use crossterm::event::{DisableBracketedPaste, EnableBracketedPaste};
@@ -37,10 +37,6 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
 /// How long a terminal that takes nothing is waited for, at each step of giving it back.
 const STUCK: Duration = Duration::from_millis(60);
-/// A writer whose terminal took something goes on within this time.
-const STEP: Duration = Duration::from_millis(5);
-/// So often.
-const STEPS: u32 = 20;
 
 /// The terminal, taken.
 pub(super) struct Screen(());
@@ -108,31 +104,25 @@ fn give_back() {
 }
 
 /// Gives the screen back, if it is taken. What has not been sent is dropped; a terminal that takes nothing loses what
-/// the system keeps for it as well, and is waited for no longer than three times [`STUCK`] and [`STEPS`] times [`STEP`].
+/// the system keeps for it as well, and is waited for no longer than three times [`STUCK`].
 fn leave_screen() {
     if !TAKEN.swap(false, Ordering::AcqRel) {
         return;
     }
     let drop_kept = || tcflush(io::stdout(), FlushArg::TCOFLUSH);
     if !writer::discard(STUCK) {
-        // What is kept is less than a slice: one goes in several goes. After the last one nobody else writes, and there
-        // is room.
-        let is_written = || drop_kept().is_ok() && writer::discard(STEP);
-        (0..STEPS).any(|_| is_written());
         let _ = drop_kept();
     }
-    let (sender, written) = channel();
-    thread::spawn(move || {
-        let _ = writer::output().and_then(|mut out| leave(&mut out));
-        let _ = sender.send(());
-    });
-    if written.recv_timeout(STUCK).is_err() {
-        let _ = drop_kept();
-        let _ = written.recv_timeout(STUCK);
-    }
+    let mut bytes = Vec::new();
+    let (deadline, dropped) = (Instant::now() + STUCK, Cell::new(false));
+    // Nobody else writes: once what the system keeps has been dropped there is room.
+    let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
+    let _ = leave(&mut bytes)
+        .and_then(|()| writer::output())
+        .and_then(|mut out| writer::write_all(&mut out, &bytes, is_late));
 }
 
-/// Gives the terminal back from another thread while the owner may be stuck. Returns at once; a terminal that takes
+/// Gives the terminal back from another thread while the owner may be stuck. Returns soon; a terminal that takes
 /// nothing keeps the writer waiting, not the caller.
 pub(super) fn rescue() {
     if RAW.swap(false, Ordering::AcqRel) {

@@ -2,21 +2,24 @@
 //! thread, never the loop.
 
 use std::collections::VecDeque;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsFd;
+use std::os::unix::fs::OpenOptionsExt;
 use std::sync::mpsc::Sender;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use nix::fcntl::OFlag;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::unistd::ttyname;
 
 use super::event::Event;
 
 /// What waits to be written. There is one standard output, and one of these.
 static QUEUE: Queue = Queue {
-    waiting: Mutex::new(Waiting { slices: VecDeque::new(), is_writing: false }),
+    waiting: Mutex::new(Waiting { slices: VecDeque::new(), is_writing: false, is_given_up: false }),
     changed: Condvar::new(),
 };
 
@@ -28,6 +31,8 @@ struct Queue {
 struct Waiting {
     slices: VecDeque<Vec<u8>>,
     is_writing: bool,
+    /// Whether what the terminal does not take at once is dropped.
+    is_given_up: bool,
 }
 
 impl Queue {
@@ -63,7 +68,7 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     let write = move || {
         loop {
             let slice = QUEUE.take();
-            let outcome = write_all(&mut out, &slice);
+            let outcome = write_all(&mut out, &slice, || QUEUE.lock().is_given_up);
             QUEUE.done();
             let event = match &outcome {
                 Ok(()) => Event::Written { bytes: slice.len() },
@@ -78,39 +83,62 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// Standard output without a buffer and without a lock that a stuck writer could hold.
+/// The terminal that standard output is, without a buffer and without a lock that a stuck writer could hold. Its mode does
+/// not wait, which others that have the terminal open do not notice.
 pub(super) fn output() -> io::Result<File> {
-    Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
+    let stdout = io::stdout();
+    let terminal = ttyname(stdout.as_fd()).map_err(io::Error::from).and_then(|name| {
+        let flags = OFlag::O_NONBLOCK | OFlag::O_NOCTTY;
+        OpenOptions::new().write(true).custom_flags(flags.bits()).open(name)
+    });
+    // A terminal without a name is written to as it is.
+    terminal.or_else(|_| Ok(File::from(stdout.as_fd().try_clone_to_owned()?)))
 }
 
 /// One slice more to write.
 pub(super) fn send(slice: Vec<u8>) {
-    QUEUE.lock().slices.push_back(slice);
+    let mut waiting = QUEUE.lock();
+    waiting.is_given_up = false;
+    waiting.slices.push_back(slice);
+    drop(waiting);
     QUEUE.changed.notify_all();
 }
 
-/// Drops what has not been begun and waits for what has; false: it is still under way after this time.
+/// Drops what has not been begun and waits for what has; after this time the rest of that is dropped as well. False:
+/// it was.
 pub(super) fn discard(patience: Duration) -> bool {
     let mut waiting = QUEUE.lock();
     waiting.slices.clear();
-    let (waiting, _) = QUEUE
-        .changed
-        .wait_timeout_while(waiting, patience, |waiting| waiting.is_writing)
-        .unwrap_or_else(PoisonError::into_inner);
-    !waiting.is_writing
+    let wait = |waiting, patience| {
+        let is_writing = |waiting: &mut Waiting| waiting.is_writing;
+        let ended = QUEUE.changed.wait_timeout_while(waiting, patience, is_writing);
+        ended.unwrap_or_else(PoisonError::into_inner).0
+    };
+    waiting = wait(waiting, patience);
+    let is_whole = !waiting.is_writing;
+    waiting.is_given_up = !is_whole;
+    drop(wait(waiting, 2 * LOOK));
+    is_whole
 }
 
-/// Writes all, also where somebody left the terminal in a mode that does not wait.
-pub(super) fn write_all(out: &mut File, mut bytes: &[u8]) -> io::Result<()> {
+/// How often a terminal that takes nothing is looked at.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Writes all, until it is given up.
+pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn() -> bool) -> io::Result<()> {
     while !bytes.is_empty() {
         match out.write(bytes) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(count) => bytes = &bytes[count..],
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                if is_given_up() {
+                    return Ok(());
+                }
                 let mut ends = [PollFd::new(out.as_fd(), PollFlags::POLLOUT)];
+                let look = PollTimeout::try_from(LOOK).unwrap_or(PollTimeout::ZERO);
                 // An error here shows itself again in the next write.
-                let _ = poll(&mut ends, PollTimeout::from(100_u8));
+                let _ = poll(&mut ends, look);
             }
             Err(error) => return Err(error),
         }
