@@ -80,11 +80,14 @@ impl SurfacePoint {
 /// the next test from there.
 #[inline(always)]
 pub fn error(point: Vec3, reach: f64) -> Vec3 {
-    rounding_error(point) + Vec3::splat((reach * DOUBLE_ERROR) as f32)
+    rounding_error(point) + Vec3::splat(double_error(reach))
 }
 
-/// Bound on the relative error of the `f64` arithmetic of a hit, its surface and the next test from there.
-const DOUBLE_ERROR: f64 = 32.0 * f64::EPSILON;
+/// Bound on the error of the `f64` arithmetic of a hit, its surface and the next test from there, with lengths up to `reach`.
+#[inline(always)]
+pub fn double_error(reach: f64) -> f32 {
+    (reach * (32.0 * f64::EPSILON)) as f32
+}
 
 /// Twice the error of rounding a point to `f32`.
 #[inline(always)]

@@ -27,7 +27,8 @@ pub struct PathRay {
 impl PathRay {
     /// Number of the path that goes on from here; `branch` tells the ways to go on apart.
     pub fn next_path(&self, branch: u32) -> u32 {
-        (self.path ^ branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
+        // By XOR the number 1 would stay 1 at each reflection, and every choice of the path would be the first one again.
+        self.path.wrapping_add(branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
     }
 }
 
@@ -60,4 +61,34 @@ impl Queues {
 
 thread_local! {
     static QUEUES: RefCell<Queues> = RefCell::default();
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::sampling::CAMERA_PATH;
+
+    fn numbered(path: u32) -> PathRay {
+        let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+        PathRay { ray, throughput: Vec3::ONE, slot: 0, path, medium: Medium::default() }
+    }
+
+    #[test]
+    fn the_paths_of_a_sample_have_numbers_of_their_own() {
+        // All of 12 splits, and a path that is always reflected or always refracted.
+        let (mut round, mut seen) = (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
+        for _ in 0..12 {
+            round = round.iter().flat_map(|&path| [1, 2].map(|way| numbered(path).next_path(way))).collect();
+            assert!(round.iter().all(|&path| seen.insert(path)));
+        }
+        for way in [1, 2] {
+            let (mut path, mut seen) = (CAMERA_PATH + 1, HashSet::from([CAMERA_PATH]));
+            for length in 0..10_000 {
+                assert!(seen.insert(path), "way {way} comes back to itself after {length}");
+                path = numbered(path).next_path(way);
+            }
+        }
+    }
 }

@@ -218,10 +218,10 @@ impl MeshInstance {
 
     /// What a triangle near a point may be off: its corners by their rounding in the file, and the tests of rays there.
     fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
-        let corners = self.tree.loaded().mesh.corners(triangle);
-        let reach = corners.iter().fold(Vec3::ZERO, |reach, corner| reach.max(corner.abs()));
-        let of_tests = self.error(point, self.transform.inverse_point(point.as_dvec3()));
-        of_tests + self.transform.reach(reach.as_dvec3()).as_vec3() * f32::EPSILON
+        let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
+        let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
+        let of_tests = self.error(point, self.transform.inverse_point(point.as_dvec3()), corners);
+        of_tests + self.transform.reach(reach).as_vec3() * f32::EPSILON
     }
 
     /// More than any triangle near it may be off.

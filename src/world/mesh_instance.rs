@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::mesh_tree::MeshTree;
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, lanes};
+use crate::geometry::surface::double_error;
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -67,7 +68,7 @@ impl MeshInstance {
         SurfacePoint {
             point,
             shadow_point: self.shadow_point(vertices, barycentric, normal, local, ray.direction),
-            error: self.error(point, local),
+            error: self.error(point, local, [a, b, c]),
             normal,
             shading_normal: self.shading_normal(vertices, barycentric, normal),
             uv: uv.as_dvec2(),
@@ -77,11 +78,14 @@ impl MeshInstance {
         }
     }
 
-    /// Rounding of the point, of the next ray's origin in the mesh's coordinates, and of what it is computed from.
-    pub(super) fn error(&self, point: Vec3, local: DVec3) -> Vec3 {
+    /// Rounding of a point of a triangle, of the next ray's origin in the mesh's coordinates, and of what it is computed from;
+    /// where all of these are near 0, that of the double precision in which sides of the triangle are told apart.
+    pub(super) fn error(&self, point: Vec3, local: DVec3, corners: [DVec3; 3]) -> Vec3 {
         let reach = self.transform.reach(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.transform.translation.abs().as_vec3();
-        parts * (2.0 * f32::EPSILON) + Vec3::splat(f32::MIN_POSITIVE)
+        let greatest = corners.into_iter().fold(DVec3::ZERO, |greatest, corner| greatest.max(corner.abs()));
+        let of_double = double_error(self.transform.reach(greatest).max_element());
+        parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE)
     }
 
     /// Interpolated and on the side of the geometric normal.

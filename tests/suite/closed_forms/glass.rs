@@ -173,6 +173,17 @@ fn lossless_glass_under_a_uniform_sky_is_invisible() {
 }
 
 #[test]
+fn a_white_furnace_seen_from_within_a_ball() {
+    // The inner reflections that chance takes weigh as much as those that it leaves: all is 1, however weak they are.
+    for ior in [1.1, 1.5, 2.4] {
+        let ball = scene().sphere(DVec3::ZERO, 1.0, glass(ior)).background(1.0).depth(300);
+        let seen = ball.pictured(v(0.0, 0.0, 1e-3), v(0.0, 0.0, -1.0), 2.0, 8, 8).picture(1024, 1);
+        let mean = seen.iter().map(|pixel| pixel.x).sum::<f64>() / seen.len() as f64;
+        assert!((mean - 1.0).abs() < 2e-4, "n = {ior}: {mean}");
+    }
+}
+
+#[test]
 fn absorption_along_a_slab_and_a_ball() {
     // Straight through d of tint a: (1 − R)²·aᵈ, R = .04; with all reflections (1 − R)²aᵈ/(1 − R²a²ᵈ).
     let tint = Vec3::new(0.5, 0.9, 0.25);

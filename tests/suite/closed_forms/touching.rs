@@ -1,5 +1,6 @@
 //! Glass that touches or overlaps glass, and opaque things: both surfaces count, in any order of the file, at any angle.
 
+use glimt::geometry::mesh::TriangleMesh;
 use glimt::materials::Glass;
 use glimt::math::transform::rotation_xyz;
 use glimt::math::{DMat3, DVec3, Vec3};
@@ -429,4 +430,58 @@ fn ambient_light_in_glass_and_under_it() {
             assert!((mean - 1.0).abs() < 1e-3, "round {round}, from {from} at {at}: {mean} ± {error}");
         }
     }
+}
+
+/// A box of triangles; its corners are exactly those that are given.
+fn block(low: DVec3, high: DVec3) -> TriangleMesh {
+    let mut mesh = boxes(&[(DVec3::ZERO, 2.0, 0)]);
+    for p in &mut mesh.positions {
+        let is_high = p.cmpgt(Vec3::ZERO);
+        *p = Vec3::select(is_high, high.as_vec3(), low.as_vec3());
+    }
+    mesh
+}
+
+/// All of a white furnace is 1.
+#[track_caller]
+fn assert_white(what: &str, build: Build) {
+    let seen = build.background(1.0).depth(1000).pictured(v(2.2, 1.7, 4.5), DVec3::ZERO, 40.0, 32, 24);
+    for (i, pixel) in seen.picture(8, 1).into_iter().enumerate() {
+        assert!((pixel.x - 1.0).abs() <= 1e-5, "{what}, pixel {i}: {pixel}");
+    }
+}
+
+#[test]
+fn mesh_faces_in_the_coordinate_planes_touch_as_elsewhere() {
+    let one = DVec3::ONE;
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        // From −1 to 0 along the axis, and from 0 to 1.
+        let (below, above) = (
+            (-one * 0.5 - axis * 0.5, one * 0.5 - axis * 0.5),
+            (axis * 0.5 - one * 0.5, axis * 0.5 + one * 0.5),
+        );
+        let analytic = |(low, high): (DVec3, DVec3)| Shape::Box {
+            center: (low + high) * 0.5,
+            size: high - low,
+            rotate: DVec3::ZERO,
+        };
+        let mesh = |build: Build, (low, high), own| build.mesh(block(low, high), AS_IT_IS, own);
+        let what = |of: &str| format!("{of}, normal {axis}");
+        let through = (
+            v(-0.45, -0.25, 0.25) * (one - axis) - axis * 0.3,
+            v(0.25, 0.25, 0.75) * (one - axis) + axis * 0.4,
+        );
+        let mirrored = mesh(scene().shape(analytic(through), glass(1.33)), below, mirror(1.0));
+        assert_white(&what("a mirror in glass"), mirrored);
+        let meshes = mesh(mesh(scene(), below, glass(1.5)), above, glass(1.33));
+        assert_white(&what("two meshes"), meshes);
+        let pair = mesh(scene().shape(analytic(below), glass(1.5)), above, glass(1.33));
+        assert_white(&what("a box and a mesh"), pair);
+    }
+    // Eight that meet at the origin, where rays that meet their own faces again were without end.
+    let eight = (0..8_u32).fold(scene(), |build, i| {
+        let low = v(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - one;
+        build.mesh(block(low, low + one), AS_IT_IS, glass([1.5, 1.33, 2.4][i as usize % 3]))
+    });
+    assert_white("eight meshes", eight);
 }
