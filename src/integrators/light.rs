@@ -1,5 +1,8 @@
 //! Direct light at vertices, in rows of sixteen: every light with its own shadow rays.
 
+use super::medium::Medium;
+use super::onward::{Onward, Scattering};
+use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
 use super::vertices::LitVertex;
@@ -8,7 +11,9 @@ use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::lights::{Light, LightRow, SourceRow};
-use crate::materials::phong::{PhongBsdf, lobe};
+use crate::materials::Lobes;
+use crate::materials::lobes::gloss;
+use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
@@ -26,6 +31,8 @@ pub struct LitQueue {
     open: usize,
     /// What lamps send by the vertex of each path of the round.
     arrived: Vec<Vec3>,
+    /// The glass around vertices; the first is none.
+    media: Vec<Medium>,
 }
 
 /// Vertices to be lit.
@@ -51,6 +58,8 @@ pub struct LitRow {
     pub specular: Lanes3,
     /// Of the glossy lobe.
     pub shininess: Lanes,
+    /// The largest parts of kd and ks, whatever is shown of them.
+    pub albedos: [Lanes; 2],
     /// Of the paths.
     pub throughput: Lanes3,
     /// Of the paths.
@@ -59,6 +68,10 @@ pub struct LitRow {
     pub path: [u32; LANES],
     /// Places of the paths in the round's queue.
     pub place: [u32; LANES],
+    /// [`History::carried`](super::queues::History::carried) of the paths.
+    pub carried: Lanes,
+    /// Places of the glass that they are in.
+    pub medium: [u32; LANES],
     /// Whether any vertex has a glossy lobe.
     pub is_glossy: bool,
     /// Whether any vertex has a bent normal.
@@ -69,6 +82,26 @@ pub struct LitRow {
 const UNBENT: f32 = -2.0;
 
 impl LitRow {
+    /// The random numbers of the vertices.
+    #[inline(always)]
+    pub fn sampler(&self, shot: &Shot<'_>) -> SamplerRow<LANES> {
+        let (block, slots) = (shot.block, &self.slot);
+        let mut is_run = true;
+        for i in 0..LANES {
+            is_run &= slots[i] == slots[0] + i as u32;
+        }
+        let (xs, ys, samples) = if is_run {
+            block.places(slots[0])
+        } else {
+            let [mut xs, mut ys, mut samples] = [[0; LANES]; 3];
+            for i in (0..LANES).filter(|i| self.used & 1 << i != 0) {
+                (xs[i], ys[i], samples[i]) = block.place(slots[i]);
+            }
+            (xs, ys, samples)
+        };
+        SamplerRow::new(shot.settings.render.seed, &xs, &ys, &samples)
+    }
+
     /// No vertex.
     pub const EMPTY: Self = Self {
         used: 0,
@@ -82,10 +115,13 @@ impl LitRow {
         diffuse: [[0.0; LANES]; 3],
         specular: [[0.0; LANES]; 3],
         shininess: [0.0; LANES],
+        albedos: [[0.0; LANES]; 2],
         throughput: [[0.0; LANES]; 3],
         slot: [0; LANES],
         path: [0; LANES],
         place: [0; LANES],
+        carried: [0.0; LANES],
+        medium: [0; LANES],
         is_glossy: false,
         is_bent: false,
     };
@@ -112,6 +148,10 @@ impl LitRow {
             set_lane(own, i, lane(other, from));
         }
         (self.bend[i], self.shininess[i]) = (other.bend[from], other.shininess[from]);
+        for (own, other) in self.albedos.iter_mut().zip(&other.albedos) {
+            own[i] = other[from];
+        }
+        (self.carried[i], self.medium[i]) = (other.carried[from], other.medium[from]);
         (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
         self.is_glossy |= other.is_glossy;
         self.is_bent |= other.is_bent;
@@ -119,7 +159,7 @@ impl LitRow {
         self.used |= 1 << i;
     }
 
-    fn put(&mut self, i: usize, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+    fn put(&mut self, i: usize, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure, medium: u32) {
         let LitVertex { path, place, vertex, shading, bsdf } = lit;
         let outlook = vertex.outlook(shot);
         set_lane(&mut self.from, i, outlook.point);
@@ -133,12 +173,75 @@ impl LitRow {
         set_lane(&mut self.diffuse, i, diffuse);
         set_lane(&mut self.specular, i, specular);
         self.shininess[i] = bsdf.shininess;
+        self.albedos[0][i] = bsdf.diffuse.max_element();
+        self.albedos[1][i] = bsdf.specular.max_element();
+        (self.carried[i], self.medium[i]) = (path.history.carried, medium);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
-        self.is_glossy |= specular != Vec3::ZERO;
+        self.is_glossy |= bsdf.specular != Vec3::ZERO;
         self.is_bent |= shading.bend.is_some();
         self.used |= 1 << i;
     }
+
+    /// The lobes of a vertex.
+    #[inline(always)]
+    pub fn lobes(&self, i: usize) -> Lobes {
+        Lobes {
+            normal: lane(&self.normal, i),
+            mirrored_eye: lane(&self.mirrored_eye, i),
+            diffuse: self.albedos[0][i],
+            specular: self.albedos[1][i],
+            shininess: self.shininess[i],
+        }
+    }
+
+    /// What the vertices make of light from some directions.
+    #[inline(always)]
+    pub fn response(&self, directions: &Lanes3) -> Response {
+        let mut cosines = [0.0; LANES];
+        for i in 0..LANES {
+            cosines[i] = lane(&self.normal, i).dot(lane(directions, i));
+        }
+        if self.is_bent {
+            for i in 0..LANES {
+                let smooth = lane(&self.smooth_normal, i).dot(lane(directions, i));
+                cosines[i] *= terminator(cosines[i], smooth, self.bend[i]);
+            }
+        }
+        let (mut f, mut glosses) = (self.diffuse, [0.0; LANES]);
+        if self.is_glossy {
+            for i in 0..LANES {
+                let left = gloss(lane(&self.mirrored_eye, i), lane(directions, i), self.shininess[i]);
+                set_lane(&mut f, i, lane(&self.diffuse, i) + lane(&self.specular, i) * left);
+                glosses[i] = left;
+            }
+        }
+        Response { f, cosines, glosses }
+    }
+
+    /// A bit for each vertex that certainly sees nothing in a direction.
+    #[inline(always)]
+    pub fn hidden(&self, directions: &Lanes3) -> u32 {
+        let mut hidden = 0;
+        if self.is_bounded != 0 {
+            for i in 0..LANES {
+                let cosine = lane(&self.horizon, i).dot(lane(directions, i));
+                let bit = 1 << i;
+                hidden |= if cosine > 0.0 { 0 } else { bit };
+            }
+        }
+        hidden & self.is_bounded
+    }
+}
+
+/// What vertices make of light from directions.
+pub struct Response {
+    /// The BSDF in sr⁻¹, as far as it is shown.
+    pub f: Lanes3,
+    /// Cosines, times what is left of them at the terminator; not above 0 where nothing arrives.
+    pub cosines: Lanes,
+    /// [`gloss`].
+    pub glosses: Lanes,
 }
 
 /// A bit for each lane.
@@ -173,12 +276,16 @@ impl LitQueue {
         self.clear();
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
+        self.media.clear();
+        self.media.push(Medium::default());
     }
 
-    /// The round is over: the sink gets what lamps send, in the order of the paths, whose slots are told by their places.
-    pub fn settle(&mut self, slot: impl Fn(usize) -> u32, sink: &mut Sink<'_>) {
+    /// The round is over: the sink gets what lamps send, in the order of the paths; their slots, and whether the eye sees their
+    /// vertices, are told by their places.
+    pub fn settle(&mut self, path: impl Fn(usize) -> (u32, bool), sink: &mut Sink<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
-            sink.add_arrived(slot(place), *light);
+            let (slot, is_seen) = path(place);
+            sink.add_arrived(slot, *light, is_seen);
         }
     }
 
@@ -206,8 +313,13 @@ impl LitQueue {
 
     /// One more vertex.
     pub fn push(&mut self, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+        let mut medium = 0;
+        if !lit.path.medium.is_air() {
+            medium = self.media.len() as u32;
+            self.media.push(lit.path.medium);
+        }
         let (row, lane) = self.open_row();
-        row.put(lane, shot, lit, measure);
+        row.put(lane, shot, lit, measure, medium);
     }
 
     /// A row with a free lane.
@@ -227,16 +339,26 @@ impl LitQueue {
         (self.count, self.open) = (0, 0);
     }
 
-    /// Light all vertices and forget them; how many shadow rays that took.
-    pub fn light(&mut self, shot: &Shot<'_>, measure: Measure) -> Result<u64, Cancelled> {
+    /// Light all vertices and forget them; how many shadow rays that took. Where paths go on from them, the rays of the next round
+    /// are added to `next`.
+    pub fn light(
+        &mut self,
+        shot: &Shot<'_>,
+        measure: Measure,
+        onward: Option<Onward>,
+        next: &mut Vec<PathRay>,
+    ) -> Result<u64, Cancelled> {
         let mut rays = 0;
         for row in &self.rows[..self.count] {
             shot.token.check()?;
-            let work = Lighting { shot, row, used: row.used, measure };
+            let work = Lighting { shot, row, used: row.used, measure, is_weighted: onward.is_some() };
             let arrived = shot.world.geometry.instructions().run(work);
             rays += arrived.rays;
             for i in lanes(row.used) {
                 self.arrived[row.place[i] as usize] = lane(&arrived.light, i) * lane(&row.throughput, i);
+            }
+            if let Some(onward) = onward.filter(|onward| onward.leads_on) {
+                Scattering { shot, row, onward }.scatter(&self.media, next);
             }
         }
         self.clear();
@@ -250,6 +372,8 @@ struct Lighting<'a> {
     row: &'a LitRow,
     used: u32,
     measure: Measure,
+    /// Whether samples share with the rays that go on from the vertices and may meet lamps too.
+    is_weighted: bool,
 }
 
 /// What arrives at the vertices of a row.
@@ -287,13 +411,18 @@ impl Loops for Lighting<'_> {
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, self.used, &nowhere);
-                self.add(&samples, 1.0, &mut sums, &mut waiting);
+                let (values, active) = self.values(&samples, 1.0);
+                self.add(&samples, &values, active, &mut sums, &mut waiting);
             } else {
                 let count = render.shadow_samples;
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, self.used, &u);
-                    self.add(&samples, 1.0 / count as f32, &mut sums, &mut waiting);
+                    let (mut values, active) = self.values(&samples, 1.0 / count as f32);
+                    if self.is_weighted {
+                        self.weigh(light, &samples, count, &mut values);
+                    }
+                    self.add(&samples, &values, active, &mut sums, &mut waiting);
                 }
             }
             if waiting.active != 0 {
@@ -313,27 +442,30 @@ impl Loops for Lighting<'_> {
 impl Lighting<'_> {
     #[inline(always)]
     fn sampler(&self) -> SamplerRow<LANES> {
-        let (block, slots) = (self.shot.block, &self.row.slot);
-        let mut is_run = true;
-        for i in 0..LANES {
-            is_run &= slots[i] == slots[0] + i as u32;
-        }
-        let (xs, ys, samples) = if is_run {
-            block.places(slots[0])
-        } else {
-            let [mut xs, mut ys, mut samples] = [[0; LANES]; 3];
-            for i in (0..LANES).filter(|i| self.used & 1 << i != 0) {
-                (xs[i], ys[i], samples[i]) = block.place(slots[i]);
-            }
-            (xs, ys, samples)
-        };
-        SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples)
+        self.row.sampler(self.shot)
     }
 
-    /// Add samples of one light, each of which counts as this share of it; what waits for one ray is put beside.
+    /// Take of samples of one light, of which there are so many, what the rays that the lobes send do not bring.
     #[inline(always)]
-    fn add(&self, samples: &LightRow, share: f32, sums: &mut Sums, waiting: &mut Waiting) {
-        let (values, active) = self.values(samples, share);
+    fn weigh(&self, light: &Light, samples: &LightRow, count: u32, values: &mut Lanes3) {
+        let of_light = light.inverse_densities(samples);
+        let mut glosses = [0.0; LANES];
+        if self.row.is_glossy {
+            for i in 0..LANES {
+                let mirrored = lane(&self.row.mirrored_eye, i);
+                glosses[i] = gloss(mirrored, lane(&samples.directions, i), self.row.shininess[i]);
+            }
+        }
+        for i in 0..LANES {
+            let density = self.row.lobes(i).density(lane(&samples.directions, i), glosses[i]);
+            let weight = weight(density * of_light[i] / count as f32);
+            set_lane(values, i, lane(values, i) * weight);
+        }
+    }
+
+    /// Add what samples of one light bring, if they bring anything; what waits for one ray is put beside.
+    #[inline(always)]
+    fn add(&self, samples: &LightRow, values: &Lanes3, active: u32, sums: &mut Sums, waiting: &mut Waiting) {
         if active == 0 {
             return;
         }
@@ -342,26 +474,12 @@ impl Lighting<'_> {
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
         if self.shot.settings.render.shadows == Shadows::Soft {
-            let (rays, ends) = self.shadow_rays(samples, active & !self.hidden(&samples.directions));
-            self.add_seen(&rays, &ends, &samples.sources, &values, sums);
+            let (rays, ends) = self.shadow_rays(samples, active & !self.row.hidden(&samples.directions));
+            self.add_seen(&rays, &ends, &samples.sources, values, sums);
         } else {
             waiting.active |= active;
-            add_where(active, &values, &mut waiting.light);
+            add_where(active, values, &mut waiting.light);
         }
-    }
-
-    /// A bit for each vertex that certainly sees nothing in a direction.
-    #[inline(always)]
-    fn hidden(&self, directions: &Lanes3) -> u32 {
-        let mut hidden = 0;
-        if self.row.is_bounded != 0 {
-            for i in 0..LANES {
-                let cosine = lane(&self.row.horizon, i).dot(lane(directions, i));
-                let bit = 1 << i;
-                hidden |= if cosine > 0.0 { 0 } else { bit };
-            }
-        }
-        hidden & self.row.is_bounded
     }
 
     /// What waits for one ray to the middle of its light.
@@ -377,7 +495,7 @@ impl Lighting<'_> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
-        let traced = waiting.active & !self.hidden(&direction);
+        let traced = waiting.active & !self.row.hidden(&direction);
         for i in 0..LANES {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
@@ -401,25 +519,7 @@ impl Lighting<'_> {
     /// What each sample brings if nothing is in its way, and a bit for each that brings anything.
     #[inline(always)]
     fn values(&self, samples: &LightRow, share: f32) -> (Lanes3, u32) {
-        let row = self.row;
-        let mut cosines = [0.0; LANES];
-        for i in 0..LANES {
-            cosines[i] = lane(&row.normal, i).dot(lane(&samples.directions, i));
-        }
-        if row.is_bent {
-            for i in 0..LANES {
-                let smooth = lane(&row.smooth_normal, i).dot(lane(&samples.directions, i));
-                cosines[i] *= terminator(cosines[i], smooth, row.bend[i]);
-            }
-        }
-        let mut f = row.diffuse;
-        if row.is_glossy {
-            for i in 0..LANES {
-                let mirrored = lane(&row.mirrored_eye, i).dot(lane(&samples.directions, i));
-                let value = lane(&row.diffuse, i) + lane(&row.specular, i) * lobe(mirrored, row.shininess[i]);
-                set_lane(&mut f, i, value);
-            }
-        }
+        let Response { f, cosines, .. } = self.row.response(&samples.directions);
         let mut arriving = samples.weights;
         if self.measure == Measure::ArrivingShare {
             for i in 0..LANES {
@@ -453,6 +553,13 @@ impl Lighting<'_> {
         }
         (RayRows::of(self.row.from, direction), ends)
     }
+}
+
+/// What a sample counts where another way to find the same light has a density so many times as high (the power heuristic:
+/// Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
+#[inline(always)]
+pub fn weight(ratio: f32) -> f32 {
+    1.0 / (1.0 + ratio * ratio)
 }
 
 /// Add the values of the lanes whose bits are set.

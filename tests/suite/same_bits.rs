@@ -19,6 +19,7 @@ height = 30
 samples = 5
 shadow_samples = 2
 filter = "FILTER"
+integrator = "INTEGRATOR"
 ambient = [0.05, 0.06, 0.07]
 background = [0.2, 0.3, 0.5]
 [camera]
@@ -97,11 +98,12 @@ intensity = [9, 9, 9]
 #[test]
 fn known_pictures_have_their_bits_by_every_instruction_set() {
     let desk = Desk::new();
-    let known: [(&str, u64); 4] = [
-        ("box", 0xb1e5_2f0f_cdea_833d),
-        ("tent", 0xb5a3_02d4_a4d1_4b7e),
-        ("gaussian", 0x95d2_0d3c_7505_d619),
-        ("mitchell", 0x8f63_558f_f31b_c268),
+    let known: [(&str, &str, u64); 5] = [
+        ("box", "whitted", 0x8e67_03d9_53ca_9af2),
+        ("tent", "whitted", 0xb820_c661_b2cc_cedd),
+        ("gaussian", "whitted", 0x1dd6_ca5e_8b67_9706),
+        ("mitchell", "whitted", 0xcdf0_13a5_8719_af46),
+        ("box", "path", 0x7173_bce0_919f_ded9),
     ];
     let mut tried = Vec::new();
     let mut wrong = Vec::new();
@@ -112,14 +114,14 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
             continue;
         }
         tried.push(instructions);
-        for (filter, expected) in known {
-            desk.write("all.toml", EVERYTHING.replace("FILTER", filter));
+        for (filter, integrator, expected) in known {
+            desk.write("all.toml", EVERYTHING.replace("FILTER", filter).replace("INTEGRATOR", integrator));
             let mut process = desk.glimt("all.toml --once -o all.exr");
             let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
             assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
             let found = hash(&desk, "all.exr");
             if found != expected {
-                wrong.push(format!("{filter} by {name}: {found:#018x}"));
+                wrong.push(format!("{integrator}, {filter} by {name}: {found:#018x}"));
             }
         }
     }

@@ -6,6 +6,7 @@ mod facets;
 mod far;
 mod film;
 mod glass;
+mod global;
 mod hard;
 mod mirror;
 mod robust;
