@@ -19,7 +19,7 @@ use crate::math::color::luminance;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
-use crate::world::Loops;
+use crate::world::{Hit, Loops};
 
 /// Vertices that wait to be lit, side by side; each is lit alone, whatever it shares its row with.
 #[derive(Default)]
@@ -82,6 +82,23 @@ pub struct LitRow {
 const UNBENT: f32 = -2.0;
 
 impl LitRow {
+    /// The least α of lobes that are worth rays of their own.
+    const SHARP: f32 = 100.0;
+
+    /// A bit for each vertex whose highlights of lamps samples of the lamps alone would find too seldom.
+    fn sharp(&self, shot: &Shot<'_>, measure: Measure) -> u32 {
+        let shows = match measure {
+            Measure::Radiance(Parts { specular, .. }) => specular,
+            Measure::ArrivingShare => false,
+        };
+        let is_soft = shot.settings.render.shadows == Shadows::Soft;
+        if !(self.is_glossy && shows && is_soft && shot.world.lights.have_area()) {
+            return 0;
+        }
+        let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= Self::SHARP;
+        lanes(self.used).filter(is_sharp).fold(0, |sharp, i| sharp | 1 << i)
+    }
+
     /// The random numbers of the vertices.
     #[inline(always)]
     pub fn sampler(&self, shot: &Shot<'_>) -> SamplerRow<LANES> {
@@ -339,7 +356,7 @@ impl LitQueue {
         (self.count, self.open) = (0, 0);
     }
 
-    /// Light all vertices and forget them; how many shadow rays that took. Where paths go on from them, the rays of the next round
+    /// Light all vertices and forget them; what rays that took. Where paths go on from them, the rays of the next round
     /// are added to `next`.
     pub fn light(
         &mut self,
@@ -347,13 +364,16 @@ impl LitQueue {
         measure: Measure,
         onward: Option<Onward>,
         next: &mut Vec<PathRay>,
-    ) -> Result<u64, Cancelled> {
-        let mut rays = 0;
+    ) -> Result<LightRays, Cancelled> {
+        let mut rays = LightRays::default();
         for row in &self.rows[..self.count] {
             shot.token.check()?;
-            let work = Lighting { shot, row, used: row.used, measure, is_weighted: onward.is_some() };
+            let others =
+                if onward.is_some() { Others::Paths } else { Others::Lobes(row.sharp(shot, measure)) };
+            let work = Lighting { shot, row, used: row.used, measure, others };
             let arrived = shot.world.geometry.instructions().run(work);
-            rays += arrived.rays;
+            rays.shadow += arrived.rays.shadow;
+            rays.scattered += arrived.rays.scattered;
             for i in lanes(row.used) {
                 self.arrived[row.place[i] as usize] = lane(&arrived.light, i) * lane(&row.throughput, i);
             }
@@ -372,14 +392,31 @@ struct Lighting<'a> {
     row: &'a LitRow,
     used: u32,
     measure: Measure,
-    /// Whether samples share with the rays that go on from the vertices and may meet lamps too.
-    is_weighted: bool,
+    others: Others,
+}
+
+/// What finds light beside samples of the lamps.
+#[derive(Clone, Copy)]
+enum Others {
+    /// The rays of paths that go on from the vertices.
+    Paths,
+    /// Rays in the glossy lobes of the vertices whose bits are set.
+    Lobes(u32),
+}
+
+/// Rays that the light of vertices took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LightRays {
+    /// Towards lamps.
+    pub shadow: u64,
+    /// In lobes.
+    pub scattered: u64,
 }
 
 /// What arrives at the vertices of a row.
 struct Arrived {
     light: Lanes3,
-    rays: u64,
+    rays: LightRays,
 }
 
 /// Sums over the lights.
@@ -388,7 +425,7 @@ struct Sums {
     light: Lanes3,
     /// Of what could.
     total: Lanes,
-    rays: u64,
+    rays: LightRays,
 }
 
 /// What a light could send, before one ray tells whether it does.
@@ -404,7 +441,7 @@ impl Loops for Lighting<'_> {
     fn run(self) -> Arrived {
         let render = &self.shot.settings.render;
         let sampler = self.sampler();
-        let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: 0 };
+        let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: LightRays::default() };
         for (number, light) in self.shot.world.lights.iter() {
             // Where one ray decides for all of a light, what it could send waits for that.
             let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
@@ -419,8 +456,10 @@ impl Loops for Lighting<'_> {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32);
-                    if self.is_weighted {
-                        self.weigh(light, &samples, count, &mut values);
+                    match self.others {
+                        Others::Paths => self.weigh(light, &samples, 1.0 / count as f32, &mut values),
+                        Others::Lobes(0) => {}
+                        Others::Lobes(_) => self.weigh(light, &samples, 1.0, &mut values),
                     }
                     self.add(&samples, &values, active, &mut sums, &mut waiting);
                 }
@@ -428,6 +467,9 @@ impl Loops for Lighting<'_> {
             if waiting.active != 0 {
                 self.add_waiting(light, &waiting, &mut sums);
             }
+        }
+        if let Others::Lobes(sharp @ 1..) = self.others {
+            self.add_lobes(sharp, &sampler, &mut sums);
         }
         if self.measure == Measure::ArrivingShare {
             for i in 0..LANES {
@@ -445,9 +487,9 @@ impl Lighting<'_> {
         self.row.sampler(self.shot)
     }
 
-    /// Take of samples of one light, of which there are so many, what the rays that the lobes send do not bring.
+    /// Leave of samples of one light what rays in the lobes do not bring, of which there are so many for each sample.
     #[inline(always)]
-    fn weigh(&self, light: &Light, samples: &LightRow, count: u32, values: &mut Lanes3) {
+    fn weigh(&self, light: &Light, samples: &LightRow, others: f32, values: &mut Lanes3) {
         let of_light = light.inverse_densities(samples);
         let mut glosses = [0.0; LANES];
         if self.row.is_glossy {
@@ -457,9 +499,63 @@ impl Lighting<'_> {
             }
         }
         for i in 0..LANES {
-            let density = self.row.lobes(i).density(lane(&samples.directions, i), glosses[i]);
-            let weight = weight(density * of_light[i] / count as f32);
+            let density = self.lobes(i).density(lane(&samples.directions, i), glosses[i]);
+            let weight = weight(density * of_light[i] * others);
+            let weight = if self.shares(i) { weight } else { 1.0 };
             set_lane(values, i, lane(values, i) * weight);
+        }
+    }
+
+    /// The lobes in which rays are sent out from a vertex.
+    #[inline(always)]
+    fn lobes(&self, i: usize) -> Lobes {
+        let lobes = self.row.lobes(i);
+        match self.others {
+            Others::Paths => lobes,
+            Others::Lobes(_) => Lobes { diffuse: 0.0, specular: 1.0, ..lobes },
+        }
+    }
+
+    /// Whether rays are sent out from a vertex.
+    #[inline(always)]
+    fn shares(&self, i: usize) -> bool {
+        match self.others {
+            Others::Paths => true,
+            Others::Lobes(sharp) => sharp & 1 << i != 0,
+        }
+    }
+
+    /// Add what rays bring that are sent out in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp:
+    /// a narrow lobe finds in a wide lamp what samples of the lamp hardly ever meet.
+    #[inline(always)]
+    fn add_lobes(&self, sharp: u32, sampler: &SamplerRow<LANES>, sums: &mut Sums) {
+        let (row, count) = (self.row, self.shot.settings.render.shadow_samples);
+        for repetition in 0..count {
+            let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
+            let mut directions = [[0.0; LANES]; 3];
+            for i in 0..LANES {
+                set_lane(&mut directions, i, self.lobes(i).sample(1.0, [u[0][i], u[1][i]]));
+            }
+            let Response { f, cosines, glosses } = row.response(&directions);
+            let mut sent = sharp & !row.hidden(&directions);
+            let mut ends = [-1.0; LANES];
+            for i in 0..LANES {
+                let bit = 1 << i;
+                sent &= if cosines[i] > 0.0 { !0 } else { !bit };
+                ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
+            }
+            let rays = RayRows::of(row.from, directions);
+            let (hits, objects) = self.shot.world.geometry.closest_rows(&rays, &mut ends);
+            sums.rays.scattered += u64::from(sent.count_ones());
+            for i in lanes(sent) {
+                let Some(shape) = hits.get(i) else { continue };
+                let density = self.lobes(i).density(lane(&directions, i), glosses[i]);
+                let hit = Hit { shape, object: objects[i] };
+                let radiance = self.shot.lamp_radiance(&rays.ray(i), &hit, density);
+                let value = lane(&f, i) * radiance * (cosines[i] / (density * count as f32));
+                let sum = lane(&sums.light, i) + value;
+                set_lane(&mut sums.light, i, sum);
+            }
         }
     }
 
@@ -512,7 +608,7 @@ impl Lighting<'_> {
             traced |= if ends[i] >= 0.0 { bit } else { 0 };
         }
         let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
-        sums.rays += u64::from(traced.count_ones());
+        sums.rays.shadow += u64::from(traced.count_ones());
         add_where(traced & !occluded, values, &mut sums.light);
     }
 

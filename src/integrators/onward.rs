@@ -9,6 +9,7 @@ use super::specular::SCATTERED;
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
 use crate::lights::{Met, Source};
+use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::{Hit, Loops};
@@ -156,12 +157,30 @@ impl Shot<'_> {
         if !(density > 0.0) {
             return 1.0;
         }
+        let normal = self.world.geometry.surface(&path.ray, hit).normal;
+        let samples = self.settings.render.shadow_samples as f32;
+        weight(self.sample_density(&path.ray, hit, normal) * samples / density)
+    }
+
+    /// Density in sr⁻¹ of light samples that come from a hit; 0 where none do.
+    fn sample_density(&self, ray: &Ray, hit: &Hit, normal: Vec3) -> f32 {
+        let met = Met { direction: ray.direction, distance: hit.shape.t, normal };
+        let light = self.world.lights.of_hit(hit.object, hit.shape.primitive);
+        light.map_or(0.0, |(_, light)| light.pdf(ray.origin, &met))
+    }
+
+    /// What a ray from a lobe brings of the radiance that it meets; light samples, as many as there are such rays, bring the rest.
+    pub fn lamp_radiance(&self, ray: &Ray, hit: &Hit, density: f32) -> Vec3 {
         let world = self.world;
-        let Some((_, light)) = world.lights.of_hit(hit.object, hit.shape.primitive) else { return 1.0 };
-        let normal = world.geometry.surface(&path.ray, hit).normal;
-        let met = Met { direction: path.ray.direction, distance: hit.shape.t, normal };
-        let count = self.settings.render.shadow_samples as f32;
-        weight(light.pdf(path.ray.origin, &met) * count / density)
+        let emission = world.materials[world.material_index(hit)].emission;
+        if emission == Vec3::ZERO {
+            return emission;
+        }
+        let normal = world.geometry.surface(ray, hit).normal;
+        if !(normal.dot(ray.direction) < 0.0) {
+            return Vec3::ZERO;
+        }
+        emission * weight(self.sample_density(ray, hit, normal) / density)
     }
 
     /// The same of a lamp that touches glass which the path meets with it: whether light samples find it there is decided by

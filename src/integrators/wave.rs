@@ -98,8 +98,9 @@ struct Wave<'a, 's> {
 impl Wave<'_, '_> {
     fn light(&mut self) -> Result<(), Cancelled> {
         let before = self.next.len();
-        self.counters.shadow_rays += self.lit.light(self.shot, self.sink.measure, self.onward, self.next)?;
-        self.counters.scattered_rays += (self.next.len() - before) as u64;
+        let rays = self.lit.light(self.shot, self.sink.measure, self.onward, self.next)?;
+        self.counters.shadow_rays += rays.shadow;
+        self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
         Ok(())
     }
 

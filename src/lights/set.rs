@@ -65,6 +65,11 @@ impl Lights {
         self.all.is_empty()
     }
 
+    /// Whether a ray can meet any.
+    pub fn have_area(&self) -> bool {
+        !self.by_object.is_empty()
+    }
+
     /// All with their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {
         (0..).zip(&self.all)

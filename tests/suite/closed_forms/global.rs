@@ -2,10 +2,10 @@
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{ColorSource, Falloff, Integrator, MaterialKind};
+use glimt::scene::description::{ColorSource, Falloff, Integrator, MaterialKind, Shape};
 
-use super::scenes::{Build, emitter, glass, matte, mirror, phong, scene};
-use super::{mean_and_error, v};
+use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
+use super::{lambert, mean_and_error, v};
 
 /// A scene that is rendered by paths.
 pub fn by_paths(build: Build, max_depth: u32) -> Build {
@@ -165,6 +165,179 @@ fn the_parts_of_a_picture_by_paths_add_up_to_it() {
     assert!(
         parts[1..].iter().all(|part| part.iter().any(|pixel| pixel.x > 0.01)),
         "every part shows something"
+    );
+}
+
+/// Every kind of lamp, wide and near above a floor of these lobes.
+fn lamps_over_a_floor(diffuse: f32, specular: f32, shininess: f32) -> Vec<(&'static str, Build)> {
+    let floor = || {
+        let corner = v(-0.05, 0.0, 0.05);
+        let floor = scene().quad(
+            corner,
+            v(0.1, 0.0, 0.0),
+            v(0.0, 0.0, -0.1),
+            phong(diffuse, specular, shininess, 0.0),
+        );
+        // From −45°: the mirrored direction goes through (1, 1, 0).
+        floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
+    };
+    let at = v(0.8, 0.9, 0.1);
+    let ball = lat_long_sphere(5, 7, 0.6, DVec3::ZERO);
+    let shaped = |shape| floor().shape(shape, emitter(2.0));
+    vec![
+        ("quad", floor().quad(v(0.2, 1.2, -0.5), v(0.9, -0.5, 0.0), v(0.0, 0.0, 1.0), emitter(2.0))),
+        ("skewed quad", floor().quad(v(0.2, 1.2, -0.5), v(0.9, -0.5, 0.3), v(0.0, 0.2, 1.0), emitter(2.0))),
+        ("sphere", floor().sphere(at, 0.6, emitter(2.0))),
+        ("box", floor().cuboid(at, v(0.7, 0.5, 0.8), v(10.0, 30.0, 5.0), emitter(2.0))),
+        (
+            "triangle",
+            floor().triangle([v(0.2, 1.2, -0.8), v(1.3, 0.4, -0.2), v(0.6, 0.9, 1.0)], emitter(2.0)),
+        ),
+        ("disk", shaped(Shape::Disk { center: at, normal: v(-0.7, -1.0, 0.1), radius: 0.6 })),
+        (
+            "cylinder",
+            shaped(Shape::Cylinder { a: v(0.5, 0.8, -0.5), b: v(0.9, 0.9, 0.6), radius: 0.4, caps: true }),
+        ),
+        (
+            "cone",
+            shaped(Shape::Cone { base: v(1.0, 1.2, 0.0), tip: v(0.5, 0.4, 0.1), radius: 0.6, cap: true }),
+        ),
+        ("torus", shaped(Shape::Torus { center: at, axis: v(0.5, 1.0, 0.2), radius: 0.5, tube: 0.25 })),
+        ("mesh", floor().mesh(ball, [DVec3::ONE, DVec3::ZERO, at], emitter(2.0))),
+        ("two", floor().sphere(at, 0.4, emitter(2.0)).sphere(v(0.1, 0.6, 0.0), 0.3, emitter(1.0))),
+        (
+            "beside a point",
+            floor().sphere(at, 0.4, emitter(2.0)).point_light(v(0.1, 0.6, 0.0), 0.3, Falloff::Square),
+        ),
+    ]
+}
+
+#[test]
+fn direct_light_by_paths_is_that_of_whitted() {
+    // Both ways to find a lamp: the narrower the lobe, the more is found by its own samples.
+    for (diffuse, specular, shininess) in [(0.7, 0.0, 1.0), (0.3, 0.6, 10.0), (0.1, 0.8, 90.0)] {
+        for (what, build) in lamps_over_a_floor(diffuse, specular, shininess) {
+            let path = by_paths(build.clone(), 1).values(512, 16);
+            let whitted = build.depth(1).values(2048, 16);
+            let ((a, of_a), (b, of_b)) = (mean_and_error(&path), mean_and_error(&whitted));
+            let error = of_a.hypot(of_b);
+            assert!(error < 0.01 * b, "{what}, α {shininess}: ± {error} of {b} says nothing");
+            assert!(
+                (a - b).abs() < 5.0 * error + 1e-5 * b,
+                "{what}, α {shininess}: {a} ± {of_a}, {b} ± {of_b}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_sharp_highlight_of_a_lamp_has_little_noise() {
+    // All of the lobe is on the lamp: ∫(α + 2)/2π·cos^α·cos θ = cos θ of the mirrored direction, here 45°; and the diffuse part.
+    let corners = [v(0.2, 1.8, -0.9), v(1.8, 0.2, -0.9), v(1.8, 0.2, 0.9), v(0.2, 1.8, 0.9)];
+    let (u, w) = (corners[1] - corners[0], corners[3] - corners[0]);
+    for shininess in [1e3_f32, 1e5] {
+        let corner = v(-0.05, 0.0, 0.05);
+        let floor =
+            scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.2, 0.5, shininess, 0.0));
+        let lit = floor.quad(corners[0], u, w, emitter(3.0)).seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
+        let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &corners);
+        let exact = 3.0 * (diffuse + 0.5 * 0.5_f64.sqrt());
+        for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit.clone(), 1))] {
+            for value in build.values(256, 16) {
+                assert!((value / exact - 1.0).abs() < 0.02, "{what}, α {shininess}: {value} is not {exact}");
+            }
+            let mean = mean_and_error(&build.values(256, 64)).0;
+            assert!((mean / exact - 1.0).abs() < 3e-3, "{what}, α {shininess}: {mean} is not {exact}");
+        }
+        // At the edge of the lamp half of the lobe misses it.
+        let cut = lit.with(|scene| {
+            if let Some(Shape::Quad { v: side, corner, .. }) =
+                scene.objects.last_mut().map(|object| &mut object.shape)
+            {
+                (*corner, *side) = (corners[0] + v(0.0, 0.0, 0.9), v(0.0, 0.0, 0.9));
+            }
+        });
+        let half = [v(0.2, 1.8, 0.0), v(1.8, 0.2, 0.0), v(1.8, 0.2, 0.9), v(0.2, 1.8, 0.9)];
+        let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &half);
+        let exact = 3.0 * (diffuse + 0.25 * 0.5_f64.sqrt());
+        let mean = mean_and_error(&cut.values(256, 32)).0;
+        assert!((mean / exact - 1.0).abs() < 0.02, "α {shininess} at the edge: {mean} is not {exact}");
+    }
+}
+
+#[test]
+fn only_sharp_highlights_of_lamps_that_rays_can_meet_cost_rays() {
+    let scattered = |shininess: f32, lamp: bool, max_depth: u32| {
+        let floor = scene().quad(
+            v(-1.0, 0.0, 1.0),
+            v(2.0, 0.0, 0.0),
+            v(0.0, 0.0, -2.0),
+            phong(0.2, 0.5, shininess, 0.0),
+        );
+        let floor = floor.seen(v(-0.1, 0.1, 0.0), DVec3::ZERO).depth(max_depth);
+        let lit = if lamp {
+            floor.sphere(v(1.0, 1.0, 0.0), 0.3, emitter(1.0))
+        } else {
+            floor.point_light(v(1.0, 1.0, 0.0), 1.0, Falloff::Square)
+        };
+        let rect = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
+        let token = glimt::control::CancelToken::new();
+        let tile = glimt::integrators::render_tile(&lit.world(), &lit.settings(0), rect, 0..32, &token);
+        tile.expect("nobody cancels").1.scattered_rays
+    };
+    assert_eq!((scattered(99.0, true, 4), scattered(1e4, false, 4), scattered(1e4, true, 0)), (0, 0, 0));
+    assert!(scattered(1e4, true, 1) > 24);
+}
+
+#[test]
+fn mirrors_and_glass_are_followed_as_by_whitted() {
+    // Emission by δ lobes alone: whitted splits its rays, a path chooses; both count each surface as a scattering.
+    let build = || {
+        scene()
+            .quad(v(-9.0, -9.0, -9.0), v(18.0, 0.0, 0.0), v(0.0, 18.0, 0.0), emitter(1.0))
+            .quad(v(9.0, -9.0, 9.0), v(-18.0, 0.0, 0.0), v(0.0, 18.0, 0.0), emitter(3.0))
+            .sphere(v(-1.1, 0.0, 0.0), 1.0, glass(1.5))
+            .cuboid(v(1.1, 0.0, 0.0), v(1.2, 1.6, 1.0), v(20.0, 30.0, 0.0), glass(1.3))
+            .sphere(v(0.0, 1.3, -0.5), 0.6, mirror(0.7))
+            .background(0.25)
+            .pictured(v(0.0, 0.3, 6.0), DVec3::ZERO, 35.0, 12, 8)
+    };
+    for depth in [0, 1, 2, 3, 8] {
+        let mean = |build: Build| {
+            let values: Vec<f64> = (0..16)
+                .map(|seed| build.picture(64, seed).iter().map(|pixel| pixel.x).sum::<f64>() / 96.0)
+                .collect();
+            mean_and_error(&values)
+        };
+        let ((a, of_a), (b, of_b)) = (mean(by_paths(build(), depth)), mean(build().depth(depth)));
+        let error = of_a.hypot(of_b);
+        assert!(
+            error < 2e-3 * b && (a - b).abs() < 5.0 * error + 1e-6,
+            "depth {depth}: {a} ± {of_a}, {b} ± {of_b}"
+        );
+    }
+}
+
+#[test]
+fn light_behind_glass_is_found_by_paths_alone_and_counted_once() {
+    // A lamp that lies on a pane and one in the open: the pane's lamp reaches the floor through its glass, which light samples
+    // take for opaque. A slab passes (1 − R)/(1 + R); over all angles the floor gets what a numeric integral says. Here the
+    // check is by equality: glass of index 1 is no glass.
+    let lit = |ior: Option<f32>| {
+        let floor =
+            scene().quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.4, 0.4, 8.0, 0.0));
+        let floor = floor.quad(v(-1.0, 1.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(1.0));
+        let floor = match ior {
+            Some(ior) => floor.cuboid(v(0.0, 0.75, 0.0), v(4.0, 0.5, 4.0), DVec3::ZERO, glass(ior)),
+            None => floor,
+        };
+        mean_and_error(&by_paths(floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO), 6).values(1024, 32))
+    };
+    let ((open, of_open), (behind, of_behind)) = (lit(None), lit(Some(1.0)));
+    let error = of_open.hypot(of_behind);
+    assert!(
+        error < 0.02 * open && (open - behind).abs() < 5.0 * error,
+        "{open} ± {of_open}, {behind} ± {of_behind}"
     );
 }
 
