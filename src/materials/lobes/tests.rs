@@ -67,7 +67,7 @@ fn the_glossy_lobe_is_drawn_by_its_density_however_narrow() {
                 let frame = Frame::from_normal(lobes.mirrored_eye.normalize());
                 let n = f64::from(shininess) + 1.0;
                 let mut counts = vec![0; 256];
-                for _ in 0..SAMPLES {
+                for _ in 0..2 * SAMPLES {
                     let direction = sample(&lobes, &mut next);
                     let offset = (direction - lobes.mirrored_eye).as_dvec3();
                     let cosine = 1.0 - 0.5 * offset.length_squared();
@@ -81,7 +81,9 @@ fn the_glossy_lobe_is_drawn_by_its_density_however_narrow() {
                     assert!(is_near, "α {shininess} at {degrees}°: {density} is not {exact}");
                 }
                 let what = format!("α {shininess} at {degrees}° from {normal}");
-                assert_counts(&what, &counts, &[f64::from(SAMPLES) / 256.0; 256]);
+                assert_counts(&what, &counts, &[f64::from(SAMPLES) / 128.0; 256]);
+                let rings: Vec<u32> = counts.chunks(16).map(|ring| ring.iter().sum()).collect();
+                assert_counts(&what, &rings, &[f64::from(SAMPLES) / 8.0; 16]);
             }
         }
     }
