@@ -7,7 +7,7 @@ use super::view::{Measure, Parts};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{Light, LightRow, SourceRow};
+use crate::lights::{Light, LightRow, Middle, SourceRow};
 use crate::materials::phong::{PhongBsdf, lobe};
 use crate::math::Vec3;
 use crate::math::color::luminance;
@@ -373,7 +373,11 @@ impl Lighting<'_> {
         let (middle, source) = light.middle();
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
         for i in 0..LANES {
-            let ray = Ray::segment(lane(&self.row.from, i), middle);
+            let from = lane(&self.row.from, i);
+            let ray = match middle {
+                Middle::At(middle) => Ray::segment(from, middle),
+                Middle::Towards(direction) => Ray::new(from, direction),
+            };
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }

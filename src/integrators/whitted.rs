@@ -109,7 +109,8 @@ impl Wave<'_, '_> {
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let mut wanted = (met.any & !met.plain) | met.shining;
         wanted |= if render.ambient == Vec3::ZERO { 0 } else { met.plain };
-        wanted |= if render.background == Vec3::ZERO { 0 } else { all & !met.any };
+        let is_dark_beyond = render.background == Vec3::ZERO && !shot.world.lights.are_beyond();
+        wanted |= if is_dark_beyond { 0 } else { all & !met.any };
         // In the order of the paths: what a sample gets by several is added in that.
         for lane in lanes(wanted) {
             let (path, bit) = (met.path(shot, &rays, lane), 1 << lane);
@@ -141,7 +142,8 @@ impl Wave<'_, '_> {
     }
 
     fn leave(&mut self, path: &PathRay) {
-        let background = self.shot.settings.render.background;
+        let beyond = self.shot.world.lights.beyond(path.ray.direction);
+        let background = self.shot.settings.render.background + beyond;
         self.sink.add(path.slot, Part::Emitted, path.throughput * background);
     }
 

@@ -105,6 +105,25 @@ impl Light {
                 }
                 return row;
             }
+            Self::Spot(light) => {
+                let mut row = LightRow::dark(Source::Nothing);
+                for i in 0..LANES {
+                    let (direction, weight) = light.arriving(lane(points, i));
+                    set_lane(&mut row.directions, i, direction);
+                    set_lane(&mut row.weights, i, weight);
+                    set_lane(&mut row.targets, i, light.point.position.as_vec3());
+                }
+                return row;
+            }
+            Self::Directional(light) => {
+                let mut row = LightRow::dark(Source::Nothing);
+                for i in 0..LANES {
+                    let (direction, weight) = light.arriving([u[0][i], u[1][i]]);
+                    set_lane(&mut row.directions, i, direction);
+                    set_lane(&mut row.weights, i, weight);
+                }
+                return LightRow { beyond: u32::MAX, ..row };
+            }
             Self::Area(light) => light,
         };
         let mut row = LightRow::dark(Source::Object(light.object));

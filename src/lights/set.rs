@@ -3,13 +3,16 @@
 use std::collections::HashMap;
 
 use super::emitter::{Emitter, Part};
-use super::{AreaLight, Light};
+use super::{AreaLight, DirectionalLight, Light};
+use crate::math::Vec3;
 
 /// The lights of a scene, known by their index.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
     all: Vec<Light>,
     by_object: HashMap<u32, OfObject>,
+    /// Those that rays see which leave the scene.
+    suns: Vec<DirectionalLight>,
 }
 
 /// The lights that an object is.
@@ -27,7 +30,9 @@ impl Lights {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             match light {
-                Light::Point(_) => {}
+                Light::Point(_) | Light::Spot(_) => {}
+                Light::Directional(sun) if sun.is_sharp() => {}
+                Light::Directional(sun) => lights.suns.push(*sun),
                 Light::Area(light) => lights.note(number, light),
             }
         }
@@ -68,6 +73,16 @@ impl Lights {
     /// All with their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {
         (0..).zip(&self.all)
+    }
+
+    /// Whether a ray that leaves the scene may see light.
+    pub fn are_beyond(&self) -> bool {
+        !self.suns.is_empty()
+    }
+
+    /// Radiance that comes from beyond the scene, from a unit direction.
+    pub fn beyond(&self, direction: Vec3) -> Vec3 {
+        self.suns.iter().map(|sun| sun.radiance(direction)).sum()
     }
 
     /// The light that a primitive of an object is, with its number.

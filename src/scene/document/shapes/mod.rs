@@ -117,10 +117,10 @@ fn warn_about_no_inside(table: &Table<'_>, shape: &Shape, span: Option<Range<usi
     });
 }
 
-/// A direction of any length but 0, upwards by default; `what` is wrong without it.
-fn direction(table: &Table<'_>, name: &'static str, what: &str) -> Option<DVec3> {
+/// A direction of any length but 0; `what` is wrong without it.
+pub(super) fn direction(table: &Table<'_>, name: &'static str, what: &str, default: DVec3) -> Option<DVec3> {
     let key = table.optional(name);
-    let direction = key.vector_or(Limits::Any, DVec3::Y)?;
+    let direction = key.vector_or(Limits::Any, default)?;
     if !key.is_long(direction) {
         return None;
     }
