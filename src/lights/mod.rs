@@ -1,18 +1,24 @@
 //! Lights: where light comes from, as seen from a point.
 
+pub mod cuboid;
 pub mod directional;
+pub mod disk;
 pub mod emitter;
+mod linear;
+mod meridians;
+pub mod mesh;
 pub mod point;
 pub mod rectangle;
+pub mod round;
 mod row;
 mod set;
 pub mod sphere;
 pub mod spot;
-pub mod surface;
-pub mod triangles;
+pub mod torus;
+pub mod triangle;
 
 pub use directional::DirectionalLight;
-pub use emitter::{AreaLight, Part, area_lights};
+pub use emitter::{AreaLight, Part, area_light};
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
 pub use set::Lights;
@@ -137,5 +143,7 @@ impl Light {
     }
 }
 
+#[cfg(test)]
+mod shown_tests;
 #[cfg(test)]
 mod tests;

@@ -144,7 +144,27 @@ impl Light {
                     set_lane(&mut row.weights, i, light.radiance * sample.factor);
                 }
             }
-            Emitter::Triangles(_) | Emitter::Surface(_) => {
+            Emitter::Disk(disk) => {
+                for i in 0..LANES {
+                    let sample = disk.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    set_lane(&mut row.directions, i, sample.direction);
+                    set_lane(&mut row.targets, i, sample.target);
+                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
+                }
+            }
+            Emitter::Box(cuboid) => {
+                for i in 0..LANES {
+                    let sample = cuboid.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    set_lane(&mut row.directions, i, sample.direction);
+                    set_lane(&mut row.targets, i, sample.target);
+                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
+                }
+            }
+            Emitter::Triangle(_)
+            | Emitter::Cylinder(_)
+            | Emitter::Cone(_)
+            | Emitter::Torus(_)
+            | Emitter::Mesh(_) => {
                 return LightRow::one_by_one(points, used, |i, point| {
                     light.sample(point, [u[0][i], u[1][i]])
                 });

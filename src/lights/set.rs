@@ -40,7 +40,7 @@ impl Lights {
     }
 
     fn note(&mut self, number: u32, light: &AreaLight) {
-        let mut note = |primitive: u32| {
+        let note = |primitive: u32| {
             let place = primitive as usize;
             match self.by_object.entry(light.object).or_insert(OfObject::Primitives(Vec::new())) {
                 OfObject::Whole(_) => {}
@@ -54,9 +54,18 @@ impl Lights {
             (Part::Whole, _) => {
                 self.by_object.insert(light.object, OfObject::Whole(number));
             }
-            (Part::Primitive(primitive), _) => note(primitive),
-            (Part::Listed, Emitter::Triangles(triangles)) => triangles.primitives().for_each(note),
-            (Part::Listed, Emitter::Sphere(_) | Emitter::Quad(_) | Emitter::Surface(_)) => {}
+            (Part::Listed, Emitter::Mesh(mesh)) => mesh.primitives().for_each(note),
+            (
+                Part::Listed,
+                Emitter::Sphere(_)
+                | Emitter::Quad(_)
+                | Emitter::Box(_)
+                | Emitter::Triangle(_)
+                | Emitter::Disk(_)
+                | Emitter::Cylinder(_)
+                | Emitter::Cone(_)
+                | Emitter::Torus(_),
+            ) => {}
         }
     }
 

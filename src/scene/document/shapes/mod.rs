@@ -25,7 +25,7 @@ use mesh::MeshFiles;
 /// What reads the table of a shape; only meshes touch the list of files.
 type Reader = fn(&Table<'_>, &mut MeshFiles) -> Option<Shape>;
 
-/// The kinds in the order in which the description lists them.
+/// The kinds; the description has the shapes in the order of the file.
 const KINDS: [(&str, Reader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
@@ -57,6 +57,7 @@ pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Objec
             }
         }
     }
+    objects.sort_by_key(|object| object.span.start);
     (is_right.then_some(objects), files.into_list())
 }
 
