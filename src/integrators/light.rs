@@ -11,7 +11,7 @@ use crate::lights::{Light, LightRow, SourceRow};
 use crate::materials::phong::{PhongBsdf, lobe};
 use crate::math::Vec3;
 use crate::math::color::luminance;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
 use crate::world::Loops;
@@ -197,6 +197,9 @@ impl LitQueue {
             self.count += 1;
             return;
         }
+        if used == 0 {
+            return;
+        }
         let row = self.rows[self.count].clone();
         for lane in lanes(used) {
             let (own, i) = self.open_row();
@@ -279,7 +282,7 @@ impl Loops for Lighting<'_> {
     #[inline(always)]
     fn run(self) -> Arrived {
         let render = &self.shot.settings.render;
-        let sampler = self.sampler();
+        let mut sampler = None;
         let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: 0 };
         for (number, light) in self.shot.world.lights.iter() {
             // Where one ray decides for all of a light, what it could send waits for that.
@@ -290,6 +293,10 @@ impl Loops for Lighting<'_> {
                 self.add(&samples, 1.0, &mut sums, &mut waiting);
             } else {
                 let count = render.shadow_samples;
+                if sampler.is_none() {
+                    sampler = Some(self.sampler());
+                }
+                let Some(sampler) = &sampler else { continue };
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, self.used, &u);
@@ -353,15 +360,14 @@ impl Lighting<'_> {
     /// A bit for each vertex that certainly sees nothing in a direction.
     #[inline(always)]
     fn hidden(&self, directions: &Lanes3) -> u32 {
-        let mut hidden = 0;
+        let mut hidden = [0; LANES];
         if self.row.is_bounded != 0 {
             for i in 0..LANES {
                 let cosine = lane(&self.row.horizon, i).dot(lane(directions, i));
-                let bit = 1 << i;
-                hidden |= if cosine > 0.0 { 0 } else { bit };
+                hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
             }
         }
-        hidden & self.row.is_bounded
+        bits(hidden) & self.row.is_bounded
     }
 
     /// What waits for one ray to the middle of its light.
@@ -388,11 +394,11 @@ impl Lighting<'_> {
     /// Add what arrives on rays; those that are not traced end below 0.
     #[inline(always)]
     fn add_seen(&self, rays: &RayRows, ends: &Ends, sources: &SourceRow, values: &Lanes3, sums: &mut Sums) {
-        let mut traced = 0_u32;
+        let mut traced = [0; LANES];
         for i in 0..LANES {
-            let bit = 1 << i;
-            traced |= if ends[i] >= 0.0 { bit } else { 0 };
+            traced[i] = if ends[i] >= 0.0 { TRUE } else { 0 };
         }
+        let traced = bits(traced);
         let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
         sums.rays += u64::from(traced.count_ones());
         add_where(traced & !occluded, values, &mut sums.light);
@@ -427,15 +433,14 @@ impl Lighting<'_> {
                 set_lane(&mut arriving, i, light);
             }
         }
-        let (mut values, mut active) = (f, 0);
+        let (mut values, mut active) = (f, [0; LANES]);
         for i in 0..LANES {
             let value = lane(&f, i) * lane(&arriving, i) * (cosines[i] * share);
             set_lane(&mut values, i, value);
-            let bit = 1 << i;
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
-            active |= if brings { bit } else { 0 };
+            active[i] = if brings { TRUE } else { 0 };
         }
-        (values, active & self.used)
+        (values, bits(active) & self.used)
     }
 
     /// The rays on which the light of the samples in `active` arrives; the others have no end.

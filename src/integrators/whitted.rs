@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::RayCounters;
+use super::camera::CAMERA_ROWS;
 use super::crossing::{Crossing, CrossingMemory};
 use super::light::LitQueue;
 use super::medium::{Medium, absorption};
@@ -40,14 +41,17 @@ pub fn trace(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, crossing, .. } = queues;
+    let Queues { rays, next, lit, crossing, camera, .. } = queues;
     next.clear();
     let mut wave = Wave { depth: 0, shot, lit, sink, next, crossing, place: 0, counters };
     wave.lit.expect(slots.len());
-    for first in slots.clone().step_by(PACKET) {
-        let count = (slots.end - first).min(PACKET as u32) as usize;
-        let place = first - slots.start;
-        negative(first, wave.shade_packet(Rays::Camera(first, count), place)?);
+    for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
+        shot.camera_rows(start..slots.end, camera);
+        for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
+            negative(first, row.negative);
+            let count = (slots.end - first).min(PACKET as u32) as usize;
+            wave.shade_packet(Rays::Camera(row, first, count), first - slots.start)?;
+        }
     }
     wave.light()?;
     wave.lit.settle(|place| slots.start + place as u32, &mut wave.sink);
@@ -94,9 +98,8 @@ impl Wave<'_, '_> {
         self.depth += 1;
     }
 
-    /// What each ray of a packet meets; its places in the round's queue start at `first`. Which of the camera's have a negative
-    /// weight.
-    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<u32, Cancelled> {
+    /// What each ray of a packet meets; its places in the round's queue start at `first`.
+    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<(), Cancelled> {
         let shot = self.shot;
         if (first as usize).is_multiple_of(POLL_INTERVAL) {
             shot.token.check()?;
@@ -125,7 +128,7 @@ impl Wave<'_, '_> {
         if self.lit.is_full() {
             self.light()?;
         }
-        Ok(met.negative)
+        Ok(())
     }
 
     /// What a plain surface sends to the eye by itself.

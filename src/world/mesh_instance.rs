@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::mesh_tree::MeshTree;
 use crate::accel::{Ends, PACKET};
-use crate::geometry::rows::{HitRows, lanes};
+use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::surface::double_error;
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::Transform;
@@ -158,10 +158,9 @@ impl MeshInstance {
 
     /// The nearest hits of the rays in `met`; the others end below 0.
     #[inline(never)]
-    pub(super) fn closest_rows(&self, rays: &[Ray], met: u32, ends: &Ends, found: &mut HitRows) {
+    pub(super) fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         let mut hits = [None; PACKET];
-        let hits = &mut hits[..rays.len()];
-        self.in_mesh(rays, met, |local| self.tree.closest_packet(local, ends, hits));
+        self.tree.closest_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.put(lane, hit);
@@ -173,34 +172,27 @@ impl MeshInstance {
     #[inline(never)]
     pub(super) fn any_rows(
         &self,
-        rays: &[Ray],
+        rows: &RayRows,
         met: u32,
         ends: &Ends,
         except: Option<(u32, &[u32; PACKET])>,
     ) -> u32 {
+        let local = self.local_rays(rows, met);
+        let Some((own, numbers)) = except else { return self.tree.any_packet(&local, ends, &[]) };
         let mut parts = [None; PACKET];
-        let mut found = 0;
-        let except = match except {
-            Some((own, numbers)) => {
-                lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
-                &parts[..rays.len()]
-            }
-            None => &[],
-        };
-        self.in_mesh(rays, met, |local| found = self.tree.any_packet(local, ends, except));
-        found
+        lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
+        self.tree.any_packet(&local, ends, &parts)
     }
 
-    /// Those rays of a packet that are in `met` in a mesh's coordinates, the others as they are.
+    /// Those rays of a packet that are in `met` in the mesh's coordinates; in the place of each other one the first of them, which
+    /// goes the same way as they do.
     #[inline]
-    fn in_mesh(&self, rays: &[Ray], met: u32, trace: impl FnOnce(&[Ray])) {
-        if self.transform == Transform::IDENTITY {
-            return trace(rays);
+    fn local_rays(&self, rows: &RayRows, met: u32) -> [Ray; PACKET] {
+        let local = |lane: usize| self.local_ray(&rows.ray(lane % PACKET));
+        let mut rays = [local(met.trailing_zeros() as usize); PACKET];
+        for lane in lanes(met & met.wrapping_sub(1)) {
+            rays[lane] = local(lane);
         }
-        let mut local = [rays[0]; PACKET];
-        for lane in lanes(met) {
-            local[lane] = self.local_ray(&rays[lane]);
-        }
-        trace(&local[..rays.len()]);
+        rays
     }
 }

@@ -36,7 +36,7 @@ impl Object {
     pub fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         match self {
             Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found),
-            Self::Mesh(mesh) => mesh.closest_rows(rows.rays(), met, ends, found),
+            Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
         }
     }
 
@@ -52,15 +52,11 @@ impl Object {
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) => return mesh.any_rows(rows.rays(), met, ends, except),
+            Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
         let mut found = HitRows::none();
         shape.intersect_rows(rows, met, ends, &mut found);
-        let mut hit = 0;
-        for lane in 0..PACKET {
-            let bit = 1 << lane;
-            hit |= if found.t[lane].is_nan() { 0 } else { bit };
-        }
+        let mut hit = found.any();
         if let Some((own, parts)) = except {
             for (lane, &part) in parts.iter().enumerate() {
                 let bit = own & 1 << lane;
