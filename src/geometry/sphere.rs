@@ -78,6 +78,12 @@ impl Sphere {
         SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
     }
 
+    /// The same without texture coordinates.
+    pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        SurfacePoint::exact(point, normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, reach)
+    }
+
     /// The box around it.
     pub fn bounds(&self) -> Aabb {
         Aabb::around_f64([self.center - DVec3::splat(self.radius), self.center + DVec3::splat(self.radius)])
@@ -105,6 +111,11 @@ impl Sphere {
 
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
+        let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);
+        // The root, which takes long, decides what is nearer than its rounding and that of the squares.
+        if (distance - radius).abs() > radius * (16.0 * f64::EPSILON) {
+            return distance < radius;
+        }
         (point - self.center).length() < self.radius
     }
 

@@ -2,19 +2,19 @@
 
 use super::shot::Shot;
 use super::sink::Sink;
-use super::vertices::LitVertex;
+use super::vertices::{Lift, LitVertex};
 use super::view::{Measure, Parts};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{Light, LightRow, SourceRow};
+use crate::lights::{Light, LightRow, Source, SourceRow};
 use crate::materials::phong::{PhongBsdf, lobe};
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
-use crate::world::Loops;
+use crate::world::{Geometry, Loops};
 
 /// Vertices that wait to be lit, side by side; each is lit alone, whatever it shares its row with.
 #[derive(Default)]
@@ -38,6 +38,11 @@ pub struct LitRow {
     /// Normals behind which nothing is seen, of the lanes whose bits are set.
     horizon: Lanes3,
     is_bounded: u32,
+    /// Points from which lights are seen all around where nothing is on the way there, of the lanes whose bits are set, and the
+    /// ends of the ways.
+    lifted: Lanes3,
+    lift_end: Lanes,
+    may_lift: u32,
     /// Normals that the cosines are of.
     pub normal: Lanes3,
     /// Those before a normal map bent them, and the cosine between; [`UNBENT`] where none did.
@@ -75,6 +80,9 @@ impl LitRow {
         from: [[0.0; LANES]; 3],
         horizon: [[0.0; LANES]; 3],
         is_bounded: 0,
+        lifted: [[0.0; LANES]; 3],
+        lift_end: [0.0; LANES],
+        may_lift: 0,
         normal: [[0.0; LANES]; 3],
         smooth_normal: [[0.0; LANES]; 3],
         bend: [UNBENT; LANES],
@@ -93,7 +101,8 @@ impl LitRow {
     /// For other vertices, with normals as they are.
     #[inline(always)]
     pub fn reset(&mut self) {
-        (self.used, self.is_bounded, self.is_glossy, self.is_bent) = (0, 0, false, false);
+        (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
+        (self.is_glossy, self.is_bent) = (false, false);
         self.bend = [UNBENT; LANES];
     }
 
@@ -102,6 +111,7 @@ impl LitRow {
         for (own, other) in [
             (&mut self.from, &other.from),
             (&mut self.horizon, &other.horizon),
+            (&mut self.lifted, &other.lifted),
             (&mut self.normal, &other.normal),
             (&mut self.smooth_normal, &other.smooth_normal),
             (&mut self.mirrored_eye, &other.mirrored_eye),
@@ -116,6 +126,8 @@ impl LitRow {
         self.is_glossy |= other.is_glossy;
         self.is_bent |= other.is_bent;
         self.is_bounded |= (other.is_bounded >> from & 1) << i;
+        self.lift_end[i] = other.lift_end[from];
+        self.may_lift |= (other.may_lift >> from & 1) << i;
         self.used |= 1 << i;
     }
 
@@ -125,6 +137,11 @@ impl LitRow {
         set_lane(&mut self.from, i, outlook.point);
         set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
         self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;
+        if let Some(Lift { to, end }) = outlook.lift {
+            set_lane(&mut self.lifted, i, to);
+            self.lift_end[i] = end;
+            self.may_lift |= 1 << i;
+        }
         set_lane(&mut self.normal, i, shading.normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
@@ -233,8 +250,11 @@ impl LitQueue {
     /// Light all vertices and forget them; how many shadow rays that took.
     pub fn light(&mut self, shot: &Shot<'_>, measure: Measure) -> Result<u64, Cancelled> {
         let mut rays = 0;
-        for row in &self.rows[..self.count] {
+        for row in &mut self.rows[..self.count] {
             shot.token.check()?;
+            if row.may_lift != 0 {
+                shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
+            }
             let work = Lighting { shot, row, used: row.used, measure };
             let arrived = shot.world.geometry.instructions().run(work);
             rays += arrived.rays;
@@ -244,6 +264,41 @@ impl LitQueue {
         }
         self.clear();
         Ok(rays)
+    }
+}
+
+/// Lifts the vertices of a row to where nothing is on the way.
+struct Lifting<'a> {
+    geometry: &'a Geometry,
+    row: &'a mut LitRow,
+}
+
+impl Loops for Lifting<'_> {
+    type Done = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { geometry, row } = self;
+        let mut direction = row.lifted;
+        for axis in 0..3 {
+            for i in 0..LANES {
+                direction[axis][i] = row.lifted[axis][i] - row.from[axis][i];
+            }
+        }
+        let mut ends = [-1.0; LANES];
+        for i in 0..LANES {
+            ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
+        }
+        let rays = RayRows::of(row.from, direction);
+        let blocked = geometry.occluded_rows(&rays, &ends, &SourceRow::of(Source::Nothing));
+        let lifted = row.may_lift & !blocked;
+        row.is_bounded &= !lifted;
+        for axis in 0..3 {
+            for i in 0..LANES {
+                let (from, to) = (row.from[axis][i], row.lifted[axis][i]);
+                row.from[axis][i] = if lifted & 1 << i != 0 { to } else { from };
+            }
+        }
     }
 }
 

@@ -152,7 +152,7 @@ impl Wave<'_, '_> {
     fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
         let shot = self.shot;
         for _ in 0..MOST_HIDDEN {
-            let vertex = Vertex::new(shot, &path, &hit);
+            let vertex = Vertex::to_shade(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
                 return self.shade_surface(path, &vertex, hit.shape.t);
             }

@@ -6,7 +6,7 @@ use super::mesh_tree::MeshTree;
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::surface::double_error;
-use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Asked, Ray, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -53,8 +53,8 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
-    /// The surface at a hit.
-    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    /// The surface at a hit, as far as it is asked for.
+    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
@@ -64,10 +64,19 @@ impl MeshInstance {
         let normal = self.transform.normal(ab.cross(ac)).normalize().as_vec3();
         let point = self.transform.point(local).as_vec3();
         let barycentric = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-        let (uv, dpdu, dpdv) = self.parametrisation(vertices, barycentric, ab, ac);
+        let (uv, dpdu, dpdv) = if asked.uv {
+            self.parametrisation(vertices, barycentric, ab, ac)
+        } else {
+            (Vec2::ZERO, Vec3::ZERO, Vec3::ZERO)
+        };
+        let shadow_point = if asked.shadow_point {
+            self.shadow_point(vertices, barycentric, normal, local, ray.direction)
+        } else {
+            point
+        };
         SurfacePoint {
             point,
-            shadow_point: self.shadow_point(vertices, barycentric, normal, local, ray.direction),
+            shadow_point,
             error: self.error(point, local, [a, b, c]),
             normal,
             shading_normal: self.shading_normal(vertices, barycentric, normal),

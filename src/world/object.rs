@@ -3,7 +3,7 @@
 use super::mesh_instance::MeshInstance;
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows};
-use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Asked, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
 
 /// A thing that rays can hit.
 #[derive(Clone, Debug)]
@@ -66,12 +66,12 @@ impl Object {
         hit
     }
 
-    /// The surface at a hit.
-    pub fn surface(&self, ray: &Ray, hit: &ShapeHit) -> SurfacePoint {
+    /// The surface at a hit, as far as it is asked for.
+    pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
-            Self::Shape(shape) => shape.surface(&ray, hit),
-            Self::Mesh(mesh) => mesh.surface(&ray, hit),
+            Self::Shape(shape) => shape.asked_surface(&ray, hit, asked),
+            Self::Mesh(mesh) => mesh.surface(&ray, hit, asked),
         }
     }
 

@@ -65,6 +65,19 @@ impl Crown {
         (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
     }
 
+    /// A bit for each subtree whose box has a point in common with another one.
+    pub(super) fn meeting(&self, other: &Aabb) -> u32 {
+        let mut met = [TRUE; PACKET];
+        for axis in 0..3 {
+            let (least, greatest) = (other.min[axis], other.max[axis]);
+            for i in 0..PACKET {
+                let meets = (self.min[axis][i] <= greatest) & (least <= self.max[axis][i]);
+                met[i] = if meets { met[i] } else { 0 };
+            }
+        }
+        bits(met) & self.used
+    }
+
     /// A bit for each subtree that the rays of a beam may meet, and where they enter it at the earliest.
     #[inline(always)]
     pub(super) fn met(&self, beam: &Beam) -> (u32, Row) {
