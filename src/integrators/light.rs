@@ -199,6 +199,11 @@ impl LitQueue {
         }
     }
 
+    /// The same where the slots of the paths are those from one on.
+    pub fn settle_run(&mut self, first: u32, sink: &mut Sink<'_>) {
+        sink.add_arrived_run(first, &self.arrived);
+    }
+
     /// A row to be filled, to be kept by [`LitQueue::keep`] or forgotten.
     pub fn spare(&mut self) -> &mut LitRow {
         if self.count == self.rows.len() {
@@ -259,7 +264,7 @@ impl LitQueue {
             let arrived = shot.world.geometry.instructions().run(work);
             rays += arrived.rays;
             for i in lanes(row.used) {
-                self.arrived[row.place[i] as usize] = lane(&arrived.light, i) * lane(&row.throughput, i);
+                self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
             }
         }
         self.clear();
@@ -310,7 +315,7 @@ struct Lighting<'a> {
     measure: Measure,
 }
 
-/// What arrives at the vertices of a row.
+/// What of the light that arrives at the vertices of a row gets to the eye.
 struct Arrived {
     light: Lanes3,
     rays: u64,
@@ -366,6 +371,11 @@ impl Loops for Lighting<'_> {
             for i in 0..LANES {
                 let share = if sums.total[i] > 0.0 { sums.light[0][i] / sums.total[i] } else { 0.0 };
                 set_lane(&mut sums.light, i, Vec3::splat(share));
+            }
+        }
+        for axis in 0..3 {
+            for i in 0..LANES {
+                sums.light[axis][i] *= self.row.throughput[axis][i];
             }
         }
         Arrived { light: sums.light, rays: sums.rays }

@@ -54,7 +54,7 @@ pub fn trace(
         }
     }
     wave.light()?;
-    wave.lit.settle(|place| slots.start + place as u32, &mut wave.sink);
+    wave.lit.settle_run(slots.start, &mut wave.sink);
     wave.next_round(rays);
     while !rays.is_empty() {
         wave.lit.expect(rays.len());

@@ -27,6 +27,11 @@ impl MeshInstance {
         if self.transform == Transform::IDENTITY {
             return *ray;
         }
+        self.moved(ray)
+    }
+
+    /// The same where the mesh is elsewhere.
+    fn moved(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
             direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
@@ -197,7 +202,11 @@ impl MeshInstance {
     /// goes the same way as they do.
     #[inline]
     fn local_rays(&self, rows: &RayRows, met: u32) -> [Ray; PACKET] {
-        let local = |lane: usize| self.local_ray(&rows.ray(lane % PACKET));
+        let is_there = self.transform == Transform::IDENTITY;
+        let local = |lane: usize| {
+            let ray = rows.ray(lane % PACKET);
+            if is_there { ray } else { self.moved(&ray) }
+        };
         let mut rays = [local(met.trailing_zeros() as usize); PACKET];
         for lane in lanes(met & met.wrapping_sub(1)) {
             rays[lane] = local(lane);
