@@ -34,7 +34,7 @@ impl<'a> Vertex<'a> {
     /// Where a ray hits.
     pub fn new(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
         let material = &shot.world.materials[shot.world.material_index(hit)];
-        Self::met(path, material, shot.world.geometry.surface(&path.ray, hit, Asked::ALL))
+        Self::met(path, material, shot.world.geometry.surface(&path.ray, hit))
     }
 
     /// The same, with no more of the surface than its material asks for.
@@ -54,7 +54,7 @@ impl<'a> Vertex<'a> {
             Bsdf::Mirror(_) | Bsdf::Glass(_) => (false, false),
         };
         let asked = Asked { uv: is_textured || material.normal_map.is_some(), shadow_point: is_lit };
-        Self::met(path, material, shot.world.geometry.surface(by, hit, asked))
+        Self::met(path, material, shot.world.geometry.asked_surface(by, hit, asked))
     }
 
     fn met(path: &PathRay, material: &'a Material, surface: SurfacePoint) -> Self {

@@ -145,8 +145,13 @@ impl Geometry {
         self.unbounded.iter().any(|&id| test(id)) || self.tree.any(ray, test)
     }
 
+    /// The surface at a hit of this ray.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        self.asked_surface(ray, hit, Asked::ALL)
+    }
+
     /// The surface at a hit of this ray, as far as it is asked for.
-    pub fn surface(&self, ray: &Ray, hit: &Hit, asked: Asked) -> SurfacePoint {
+    pub fn asked_surface(&self, ray: &Ray, hit: &Hit, asked: Asked) -> SurfacePoint {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 
