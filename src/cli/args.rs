@@ -65,6 +65,9 @@ pub enum Subcommand {
     Check {
         /// The scene file
         scene: PathBuf,
+        /// Another value for a key of the scene, as in a render
+        #[arg(long = "set", value_name = "TABLE.KEY=VALUE")]
+        sets: Vec<String>,
         /// Colours of the messages
         #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
         color: ColorChoice,
@@ -117,6 +120,11 @@ pub struct RenderArgs {
     /// Render once without the terminal UI, write the picture, exit
     #[arg(long)]
     pub once: bool,
+
+    /// Another value for a key of the scene, as in render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3
+    /// (the second one) or sphere.ball.radius=.3 (by name); may be given several times. Options come after it
+    #[arg(long = "set", value_name = "TABLE.KEY=VALUE")]
+    pub sets: Vec<String>,
 
     /// Where the picture goes; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
     /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
@@ -191,6 +199,7 @@ impl RenderArgs {
     /// What they change of a scene.
     pub(super) fn overrides(&self) -> Overrides {
         Overrides {
+            sets: self.sets.clone(),
             outputs: self.outputs.clone(),
             report: self.report.clone(),
             width: self.width,

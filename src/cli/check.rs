@@ -7,8 +7,8 @@ use super::exit::Exit;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{Checked, check};
 
-pub(super) fn run(scene: &Path, console: &Console) -> Exit {
-    match check(scene) {
+pub(super) fn run(scene: &Path, sets: &[String], console: &Console) -> Exit {
+    match check(scene, sets) {
         Ok(checked) => {
             console.diagnostics(&checked.warnings);
             console.answer(&summary(scene, &checked));

@@ -150,7 +150,7 @@ mod tests {
     fn a_scene_that_is_gone_is_waited_for() {
         let folder = tempfile::tempdir().expect("a folder");
         let said = |name: &str| {
-            let [mut problem] = crate::scene::load(&folder.path().join(name))
+            let [mut problem] = crate::scene::load(&folder.path().join(name), &[])
                 .expect_err("there is none")
                 .try_into()
                 .expect("one problem");

@@ -80,12 +80,13 @@ mod tests {
     #[test]
     fn every_option_arrives() {
         let order = lowered(
-            "a.toml --once -o a.png --output b.exr --width 3 --height 4 --samples 5 --time 0.5 --max-depth 0 \
+            "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --time 0.5 --max-depth 0 \
              --integrator whitted --shadows hard --photons on --dof off --accel bvh --view normal --seed 7 \
              --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --progress json --color 256 --poll",
         )
         .expect("right");
         let expected = Overrides {
+            sets: vec!["a.b=1".into(), "a.c=x".into()],
             outputs: vec!["a.png".into(), "b.exr".into()],
             report: Some("r.json".into()),
             width: Some(3),

@@ -33,7 +33,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     };
     let console = Console::new(args.color());
     match args.command {
-        Some(Subcommand::Check { scene, .. }) => check::run(&scene, &console),
+        Some(Subcommand::Check { scene, sets, .. }) => check::run(&scene, &sets, &console),
         Some(Subcommand::New { file }) => new::run(&file, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         None => match lower::lower(args.render) {

@@ -31,11 +31,11 @@ pub struct Checked {
 ///
 /// # Errors
 /// All errors and warnings of the scene and its files.
-pub fn check(path: &Path) -> Result<Checked, Failure> {
+pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
     let (events, _) = mpsc::channel();
     let sink = Sink { generation: 0, events, previews: PreviewSlot::default() };
     let (parsed, meshes, textures, warnings) =
-        Engine::new(Means::default(), Arc::default()).read_all(path, &sink)?;
+        Engine::new(Means::default(), Arc::default()).read_all(path, sets, &sink)?;
     let scene = &parsed.loaded.scene;
     let triangles = |shape: &Shape| match shape.lowered(DVec3::ZERO) {
         Lowered::Shape(shape) => shape.triangle_count(),

@@ -198,7 +198,7 @@ mod tests {
         let load = |ending: &str| {
             let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             std::fs::write(&path, format!("[render]\noutput = \"a.{ending}\"\n{camera}")).expect("written");
-            crate::scene::load(&path)
+            crate::scene::load(&path, &[])
         };
         for ending in Format::endings() {
             assert!(load(ending).is_ok(), "{ending}");

@@ -11,6 +11,8 @@ use crate::scene::description::{Accel, Integrator, Render, Shadows};
 /// Changes to a scene's settings for this run; `None` leaves the scene's own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
+    /// Values in place of those in the file: texts `TABLE.KEY=VALUE`. The other changes come after these.
+    pub sets: Vec<String>,
     /// Files to write; empty: the scene's own.
     pub outputs: Vec<PathBuf>,
     /// Where the report of each finished request is written, as JSON.

@@ -11,6 +11,7 @@ mod nearest;
 mod read;
 pub mod report;
 pub mod sanitize;
+mod source;
 mod toml;
 
 use std::ops::Range;
@@ -18,7 +19,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use description::Scene;
-use diagnostic::{Diagnostic, Place, Severity};
+use diagnostic::{Diagnostic, Severity};
+pub use source::Source;
 
 /// Scene files over this size, in bytes, are refused.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -35,8 +37,8 @@ const MAX_PARTS: usize = 32 << 20;
 pub struct Loaded {
     /// What it means.
     pub scene: Arc<Scene>,
-    /// Its text, which every span in [`Self::scene`] points into.
-    pub source: Arc<str>,
+    /// Its text, and what the call sets, which every span in [`Self::scene`] points into.
+    pub source: Source,
     /// The file, as named by the caller.
     pub path: PathBuf,
     /// What is probably not meant, in the order of the file.
@@ -53,8 +55,8 @@ impl Loaded {
         message: impl Into<String>,
         help: Option<String>,
     ) -> Diagnostic {
-        let place = Place { source: Arc::clone(&self.source), span, label: String::new() };
-        Diagnostic { severity, message: message.into(), path: self.path.clone(), place: Some(place), help }
+        let (path, place) = self.source.place(&self.path, span, String::new());
+        Diagnostic { severity, message: message.into(), path, place: Some(place), help }
     }
 }
 
@@ -67,14 +69,15 @@ pub struct Outcome {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Reads and validates a scene file.
+/// Reads and validates a scene file, with values in place of its own: texts of the form `TABLE.KEY=VALUE`.
 ///
 /// # Errors
 /// Everything that is wrong with it, and its warnings, in the order of the file. Anything but a regular file
 /// of at most [`MAX_FILE_BYTES`] bytes of UTF-8 text is refused without blocking.
-pub fn load(path: &Path) -> Result<Loaded, Vec<Diagnostic>> {
-    let source = read::text(path).map_err(|problem| vec![*problem])?;
-    let Outcome { scene, diagnostics } = parse(Arc::clone(&source), path);
+pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
+    let text = read::text(path).map_err(|problem| vec![*problem])?;
+    let source = Source::with_sets(text, sets)?;
+    let Outcome { scene, diagnostics } = document::lower(&source, path);
     match scene {
         Some(scene) => {
             Ok(Loaded { scene: Arc::new(scene), source, path: path.to_owned(), warnings: diagnostics })
@@ -85,9 +88,8 @@ pub fn load(path: &Path) -> Result<Loaded, Vec<Diagnostic>> {
 
 /// Validates the text of a scene file. Of the files that it names only the metadata are looked at; they are
 /// searched for beside `path`, which names the scene in diagnostics and is not read.
-#[allow(clippy::needless_pass_by_value, reason = "the diagnostics share the text")]
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
-    document::lower(&text, path)
+    document::lower(&Source::file(text), path)
 }
 
 /// The commented scene that a new file starts with.

@@ -49,14 +49,26 @@ const BROKEN: &[(&str, &[Said])] = &[
         "colours",
         &[
             (3, 15, "`ambient` must be at least 0; found -0.1"),
-            (4, 14, r##"`background` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
-            (11, 11, r##"`diffuse` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
+            (
+                4,
+                14,
+                r##"`background` must be a colour: [r, g, b], a number, "#rrggbb" or a name; this is not #rrggbb"##,
+            ),
+            (
+                11,
+                11,
+                r##"`diffuse` must be a colour: [r, g, b], a number, "#rrggbb" or a name; this is not #rrggbb"##,
+            ),
             (
                 12,
                 12,
-                r##"`specular` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found an array of 2 values"##,
+                r##"`specular` must be a colour, [r, g, b], a number, "#rrggbb" or a name, or { texture = "name" }; found an array of 2 values"##,
             ),
-            (13, 12, r##"`emission` must be a colour: [r, g, b] or "#rrggbb"; this is not #rrggbb"##),
+            (
+                13,
+                12,
+                r##"`emission` must be a colour: [r, g, b], a number, "#rrggbb" or a name; did you mean "white"?"##,
+            ),
             (17, 21, "`reflectance` must be between 0 and 1; found 1.1"),
             (21, 7, "`ior` must be between 0.1 and 10; found 0.09"),
             (22, 15, "`tint` must be between 0 and 1; found 2"),
@@ -145,7 +157,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (
                 21,
                 11,
-                r##"`diffuse` must be a colour, [r, g, b] or "#rrggbb", or { texture = "name" }; found the name of a texture"##,
+                r##"`diffuse` must be a colour, [r, g, b], a number, "#rrggbb" or a name, or { texture = "name" }; found the name of a texture"##,
             ),
             (22, 13, "`shininess` must be between 0 and 1000000; found -1"),
             (23, 14, "`normal_map` must be the name of a texture; found a table"),
@@ -329,7 +341,7 @@ const BROKEN: &[(&str, &[Said])] = &[
         &[
             (3, 9, r#"`width` must be a whole number; found the string "wide""#),
             (4, 11, "`samples` must be a whole number; found 1.5"),
-            (5, 11, r##"`ambient` must be a colour: [r, g, b] or "#rrggbb"; found 1"##),
+            (5, 11, r##"`ambient` must be a colour: [r, g, b], a number, "#rrggbb" or a name; found true"##),
             (6, 8, "`seed` must be a whole number; found true"),
             (9, 12, "`position` must be three numbers, [x, y, z]; found an array of 2 values"),
             (10, 15, r#"`look_at` must be three numbers, [x, y, z]; found the string "1""#),
@@ -344,7 +356,7 @@ fn folder() -> PathBuf {
 }
 
 fn diagnostics(path: &Path) -> Vec<Diagnostic> {
-    match glimt::scene::load(path) {
+    match glimt::scene::load(path, &[]) {
         Ok(loaded) => loaded.warnings,
         Err(diagnostics) => diagnostics,
     }

@@ -116,6 +116,25 @@ fn each_option_changes_the_picture_and_is_told_by_the_report() {
 }
 
 #[test]
+fn what_the_call_sets_is_rendered_as_if_the_file_said_it() {
+    let desk = room();
+    let sets = "--set materials.ball.diffuse=[0.1,0.2,0.3] --set sphere.2.radius=.4 --set render.samples=3";
+    let by_call = picture(&desk, sets);
+    let edited = ROOM.replace("[0.8, 0.2, 0.1]", "[0.1, 0.2, 0.3]").replace("samples = 2", "samples = 3");
+    let (first, second) = edited.split_at(edited.rfind("[[sphere]]").expect("a ball"));
+    desk.write("room.toml", format!("{first}{}", second.replacen("radius = 0.5", "radius = 0.4", 1)));
+    assert_eq!(by_call, picture(&desk, ""));
+    desk.write("room.toml", ROOM);
+    assert_ne!(by_call, picture(&desk, ""));
+    // Options come after it.
+    assert_eq!(picture(&desk, "--set render.samples=5 --samples 2"), picture(&desk, ""));
+    let checked = desk.run("check room.toml --set materials.ball.diffuse=tomatoe");
+    let words = String::from_utf8(checked.stderr).expect("UTF-8");
+    assert_eq!(checked.status.code(), Some(2));
+    assert!(words.contains("did you mean \"tomato\"?") && words.contains("--set:1:26"), "{words}");
+}
+
+#[test]
 fn depth_decides_which_rays_there_are() {
     let desk = room();
     let counters = |depth: u32| desk.report(&format!("room.toml --max-depth {depth}"))["counters"].clone();
@@ -206,6 +225,9 @@ fn wrong_values_are_answered_with_what_is_expected() {
         ("-o a.webp", "use one of .png, .exr"),
         ("-o a", "use one of .png, .exr"),
         ("-o a.png -o a.png", "twice"),
+        ("--set render.samples=0", "--set:1:18"),
+        ("--set sphere.2.radius=1", "expected a number from 1 to 1"),
+        ("--set samples=3", "such as render.samples=3"),
         ("other.toml", "glimt renders one at a time"),
     ] {
         let stderr = desk.expect(&format!("ball.toml --once {option}"), 2);
@@ -261,6 +283,7 @@ fn help_fits_and_names_every_option() {
         "--preview",
         "--color",
         "--bit-depth",
+        "--set",
     ] {
         assert!(text.contains(option), "{option}");
     }

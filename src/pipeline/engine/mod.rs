@@ -212,8 +212,9 @@ impl Engine {
         (contents, token): (&Snapshot, &CancelToken),
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
-        let parsed =
-            table.run(Stage::Parse, || parse(&request.scene, contents, &mut self.parsed, findings, token))?;
+        let parsed = table.run(Stage::Parse, || {
+            parse(&request.scene, &request.overrides.sets, contents, &mut self.parsed, findings, token)
+        })?;
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         let settings = Box::new(plan.effective.clone());
@@ -351,13 +352,14 @@ impl Engine {
     pub(super) fn read_all(
         &mut self,
         path: &Path,
+        sets: &[String],
         sink: &Sink,
     ) -> Result<(Arc<Parsed>, Meshes, Textures, Vec<Diagnostic>), Failure> {
         let token = CancelToken::new();
         let mut findings = Findings::default();
         let mut all = || {
             let contents = &Snapshot::of(Arc::clone(&self.contents));
-            let parsed = parse(path, contents, &mut self.parsed, &mut findings, &token)?.value;
+            let parsed = parse(path, sets, contents, &mut self.parsed, &mut findings, &token)?.value;
             let pool = self.pool(cores())?;
             let reading = Reading { sink, token: &token, contents, pool: &pool };
             let loaded = &parsed.loaded;

@@ -245,7 +245,7 @@ mod tests {
         fn read(&mut self, contents: &Snapshot) -> (Arc<KeptMesh>, Vec<FileRead>) {
             let text = "[[mesh]]\nfile = \"a.obj\"\n[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             self.write("scene.toml", text);
-            let loaded = crate::scene::load(&self.folder.path().join("scene.toml")).expect("a scene");
+            let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");
             let token = CancelToken::new();
             let reading = Reading { sink: &self.sink, token: &token, contents, pool: &self.pool };
             let mut findings = Findings::default();

@@ -22,12 +22,13 @@ pub(in crate::pipeline) struct Parsed {
     orbiter_content: Option<Content>,
 }
 
-/// Read and validate the scene.
+/// Read and validate the scene, with what the call sets in it.
 ///
 /// # Errors
 /// All errors of the scene file.
 pub(in crate::pipeline) fn parse(
     path: &Path,
+    sets: &[String],
     contents: &Snapshot,
     memo: &mut Memo<Arc<Parsed>>,
     findings: &mut Findings,
@@ -37,11 +38,14 @@ pub(in crate::pipeline) fn parse(
     findings.read(FileRead { path: path.to_owned(), content });
     let mut key = Fingerprint::new("parse");
     content.add_to(key.path(path));
+    sets.iter().for_each(|set| {
+        key.text(set);
+    });
     let key = key.finish();
     let known = memo.get(key).cloned();
     let loaded = match &known {
         Some(parsed) => parsed.loaded.clone(),
-        None => Arc::new(scene::load(path).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?),
+        None => Arc::new(scene::load(path, sets).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?),
     };
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(loaded.warnings.iter().cloned());

@@ -28,7 +28,7 @@ pub(in crate::pipeline) fn loaded_of(text: &str) -> Loaded {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    crate::scene::load(&path).expect("a scene that is right")
+    crate::scene::load(&path, &[]).expect("a scene that is right")
 }
 
 pub(super) const SCENE: &str = r#"

@@ -22,6 +22,8 @@ pub struct Object {
     pub shape: Shape,
     /// Index into [`Scene::materials`](super::Scene::materials); none: the mesh file's own.
     pub material: Option<usize>,
+    /// What the file calls it.
+    pub name: Option<Box<str>>,
     /// The table in the file.
     pub span: Range<usize>,
 }

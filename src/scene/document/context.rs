@@ -3,14 +3,14 @@
 use std::cell::{Cell, OnceCell, RefCell};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use super::super::diagnostic::{Diagnostic, Place, Severity};
+use super::super::diagnostic::{Diagnostic, Severity};
 use super::super::report::LineIndex;
+use super::super::source::Source;
 
 /// A file that is being read.
 pub(super) struct Context<'a> {
-    source: Arc<str>,
+    source: Source,
     path: &'a Path,
     lines: OnceCell<LineIndex>,
     issues: RefCell<Vec<Issue>>,
@@ -92,7 +92,7 @@ impl Issue {
 }
 
 impl<'a> Context<'a> {
-    pub(super) fn new(source: Arc<str>, path: &'a Path) -> Self {
+    pub(super) fn new(source: Source, path: &'a Path) -> Self {
         let (lines, issues, uncollected, searches) = Default::default();
         Self { source, path, lines, issues, uncollected, searches }
     }
@@ -118,7 +118,7 @@ impl<'a> Context<'a> {
 
     /// The text at a place; empty where the place is not in the text.
     pub(super) fn text(&self, span: &Range<usize>) -> &str {
-        self.source.get(span.clone()).unwrap_or_default()
+        self.source.all().get(span.clone()).unwrap_or_default()
     }
 
     /// Looks for a name in what may be a long list. Each search costs as much as the list is long, so that only the
@@ -145,12 +145,12 @@ impl<'a> Context<'a> {
 
     /// The text of a line, counted from 1.
     pub(super) fn line_text(&self, line: usize) -> Option<&str> {
-        let span = self.lines().span(line.checked_sub(1)?, &self.source)?;
-        self.source.get(span)
+        let text = self.source.all();
+        text.get(self.lines().span(line.checked_sub(1)?, text)?)
     }
 
     fn lines(&self) -> &LineIndex {
-        self.lines.get_or_init(|| LineIndex::new(&self.source))
+        self.lines.get_or_init(|| LineIndex::new(self.source.all()))
     }
 
     /// A path in the scene, seen from the scene's folder.
@@ -178,7 +178,8 @@ impl<'a> Context<'a> {
         issues.truncate(MOST_ISSUES);
         if unshown > 0 {
             let message = format!("and {unshown} more like these");
-            issues.push(Issue::error(self.source.len()..self.source.len(), message));
+            let end = self.source.text().len();
+            issues.push(Issue::error(end..end, message));
         }
         let (path, source) = (self.path, self.source);
         issues.into_iter().map(|issue| issue.into_diagnostic(path, &source)).collect()
@@ -198,11 +199,9 @@ const MOST_COMPARISONS: usize = 200_000;
 const MOST_COLLECTED: usize = 10_000;
 
 impl Issue {
-    fn into_diagnostic(self, path: &Path, source: &Arc<str>) -> Diagnostic {
-        let inside = source.get(self.span.clone()).is_some();
-        let span = if inside { self.span } else { 0..0 };
-        let place = Place { source: Arc::clone(source), span, label: self.label };
+    fn into_diagnostic(self, path: &Path, source: &Source) -> Diagnostic {
+        let (path, place) = source.place(path, self.span, self.label);
         let (severity, message, help) = (self.severity, self.message, self.help);
-        Diagnostic { severity, message, path: path.to_owned(), place: Some(place), help }
+        Diagnostic { severity, message, path, place: Some(place), help }
     }
 }

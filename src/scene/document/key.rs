@@ -102,6 +102,22 @@ impl<'a> Key<'a> {
         None
     }
 
+    /// What a shape is called, if it has a name: one that cannot be taken for a number.
+    pub(super) fn shape_name(&self) -> Option<Option<Box<str>>> {
+        if !self.is_given() {
+            return Some(None);
+        }
+        let text = self.text("the name of this shape")?;
+        if text.bytes().any(|byte| !byte.is_ascii_digit()) {
+            return Some(Some(text.into()));
+        }
+        let issue = Issue::error(self.span()?, format!("`{}` must be more than a number", self.name));
+        self.context.report(
+            issue.help("shapes are also known by their numbers, from 1, so that a name has a letter"),
+        );
+        None
+    }
+
     /// Whether its value is a table.
     pub(super) fn is_table(&self) -> bool {
         self.value.is_some_and(|value| matches!(value.item(), Item::Table(_)))

@@ -101,7 +101,7 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
 fn emission(key: &Key<'_>) -> Vec3 {
     if let Some(span) = key.span().filter(|_| key.is_table()) {
         let issue = Issue::error(span, "a texture in `emission` is not supported yet")
-            .help("give it a colour, [r, g, b] or \"#rrggbb\"");
+            .help("give it a colour, such as [r, g, b], \"#rrggbb\" or a name");
         key.context.report(issue);
         return Vec3::ZERO;
     }

@@ -10,6 +10,7 @@ mod materials;
 mod names;
 mod photons;
 mod render;
+mod sets;
 mod shapes;
 mod syntax;
 mod table;
@@ -17,9 +18,9 @@ mod textures;
 mod value;
 
 use std::path::Path;
-use std::sync::Arc;
 
 use super::description::Scene;
+use super::source::Source;
 use super::{MAX_FILE_BYTES, Outcome, toml};
 use crate::math::Vec3;
 use context::{Context, Issue};
@@ -27,21 +28,23 @@ use table::Table;
 
 pub(super) use shapes::is_mesh;
 
-/// Reads and validates the text of a scene; `path` says where the files are that it names.
-pub(super) fn lower(source: &Arc<str>, path: &Path) -> Outcome {
-    let context = Context::new(Arc::clone(source), path);
-    if source.trim_start_matches('\u{feff}').trim().is_empty() {
+/// Reads and validates a scene; `path` says where the files are that it names.
+pub(super) fn lower(source: &Source, path: &Path) -> Outcome {
+    let context = Context::new(source.clone(), path);
+    let text = source.text();
+    if text.trim_start_matches('\u{feff}').trim().is_empty() {
         let help = "`glimt new FILE` writes a scene to start from";
         context.report(Issue::error(0..0, "the scene file is empty").help(help));
         return Outcome { scene: None, diagnostics: context.finish(&[]) };
     }
-    if source.len() as u64 > MAX_FILE_BYTES {
+    if text.len() as u64 > MAX_FILE_BYTES {
         let message = format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20);
         context.report(Issue::error(0..0, message));
         return Outcome { scene: None, diagnostics: context.finish(&[]) };
     }
-    let (document, errors) = toml::parse(source);
+    let (document, errors) = toml::parse(text);
     let broken_lines = syntax::report(&context, errors);
+    let document = sets::put(&context, source, document);
     let scene = scene(&Table::root(&context, document.root()));
     let has_errors = context.has_errors();
     Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines) }

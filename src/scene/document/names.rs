@@ -70,11 +70,12 @@ impl Names {
 mod tests {
     use std::path::Path;
 
+    use super::super::super::source::Source;
     use super::*;
 
     /// Comparisons that as many wrong names cost as there are names.
     fn comparisons(count: usize) -> usize {
-        let context = Context::new("".into(), Path::new("scene.toml"));
+        let context = Context::new(Source::file("".into()), Path::new("scene.toml"));
         let names = Names::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));
         for number in 0..count {
             names.advise(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));

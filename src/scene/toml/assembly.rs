@@ -51,8 +51,18 @@ impl ErrorSink for Sink<'_> {
 
 impl<'s> Assembly<'s> {
     pub(super) fn new(source: &'s str) -> Self {
+        Self::of(Document::new(source))
+    }
+
+    /// Goes on with a document, in a table that is in no other.
+    pub(super) fn apart(mut document: Document<'s>) -> (Self, TableId) {
+        let table = document.add_table(Origin::default());
+        (Self { table, ..Self::of(document) }, table)
+    }
+
+    fn of(document: Document<'s>) -> Self {
         Self {
-            document: Document::new(source),
+            document,
             table: Document::ROOT,
             header: None,
             open: None,

@@ -10,21 +10,48 @@ mod error;
 mod events;
 mod expression;
 mod plain;
+mod set;
 mod tree;
 
 use assembly::Assembly;
 use expression::Expressions;
 
 pub(super) use error::SyntaxError;
-pub(super) use tree::{Entries, Item, KeyValue, Value};
-
-use tree::Document;
+pub(super) use set::{Layout, NoPlace, Why};
+pub(super) use tree::{Document, Entries, Item, KeyValue, Value};
 
 /// Arrays and tables may lie in each other this deep, and dotted keys have at most this many parts.
 const DEEPEST: u32 = 80;
 
 /// A byte order mark, which may begin a text and is no part of it.
 const MARK: &str = "\u{feff}";
+
+/// Whether a text is one value with a key that leads into a table, and nothing else.
+pub(super) fn is_key_value(text: &str) -> bool {
+    let (document, errors) = parse(text);
+    errors.is_empty() && document.only_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
+}
+
+/// Puts what stands at byte `at`, a key and its value, in place of the value that the document has for that key. `source`
+/// begins with the text of the document.
+///
+/// # Errors
+/// The part of the key that leads nowhere.
+pub(super) fn set<'s>(
+    document: Document<'s>,
+    source: &'s str,
+    at: usize,
+    layout: Layout,
+) -> (Document<'s>, Result<(), NoPlace>) {
+    let (mut assembly, apart) = Assembly::apart(document.within(source));
+    Expressions::default().read(source, at, &mut assembly);
+    let (mut document, _) = assembly.finish();
+    let placed = match document.only_value(apart) {
+        Some((keys, value)) => document.put_at(&keys, value, layout),
+        None => Ok(()),
+    };
+    (document, placed)
+}
 
 /// The tree of a text of less than 4 GiB, and its first errors: those of the syntax, then those of keys and values,
 /// each in the order of the text.

@@ -62,6 +62,13 @@ pub(super) enum Kind {
     Table(TableId),
 }
 
+impl Kind {
+    /// Which table it is.
+    pub(super) fn table(self) -> Option<TableId> {
+        if let Self::Table(table) = self { Some(table) } else { None }
+    }
+}
+
 /// A value and its place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
@@ -146,6 +153,11 @@ impl<'s> Document<'s> {
         };
         document.add_table(Origin::default());
         document
+    }
+
+    /// The same document, with places in a text that begins with its own.
+    pub(super) fn within(self, source: &'s str) -> Self {
+        Self { source, ..self }
     }
 
     /// The top of the document.
@@ -258,6 +270,70 @@ impl<'s> Document<'s> {
     /// The value of a key.
     pub(super) fn find(&self, table: TableId, name: &str) -> Option<Node> {
         self.find_entry(table, name).map(|entry| self.entries[entry as usize].node)
+    }
+
+    /// Gives a key of a table another value; adds it where there is none.
+    pub(super) fn put(&mut self, table: TableId, name: Name<'s>, node: Node) {
+        let Some(found) = self.find_entry(table, &name.text) else {
+            return self.add_entry(table, name, node);
+        };
+        let text = self.add_text(name.span, name.text);
+        let entry = &mut self.entries[found as usize];
+        (entry.key, entry.text, entry.node) = (name.span, text, node);
+    }
+
+    /// The only value below a table, and the dotted key that leads to it; none where there are several, or headers.
+    pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, Node)> {
+        let mut keys = Vec::new();
+        let mut table = Some(table);
+        let mut value = None;
+        while let Some(above) = table {
+            let Table { first, length, .. } = self.tables[above.0 as usize];
+            let Entry { key, text, node, .. } = *self.entries.get(first as usize).filter(|_| length == 1)?;
+            keys.push(Name { span: key, text: Cow::Owned(self.text(key, text).to_owned()) });
+            table = node.kind.table().filter(|table| self.origin(*table).is_dotted);
+            value = Some(node);
+        }
+        value
+            .filter(|node| node.kind.table().is_none_or(|table| self.origin(table).is_inline))
+            .map(|node| (keys, node))
+    }
+
+    /// The keys of a table.
+    pub(super) fn keys(&self, table: TableId) -> Vec<String> {
+        Entries { document: self, table }.iter().map(|entry| entry.key.to_owned()).collect()
+    }
+
+    /// The value of a key that is a text.
+    pub(super) fn find_text(&self, table: TableId, name: &str) -> Option<&str> {
+        let node = self.find(table, name)?;
+        if let Kind::String(text) = node.kind { Some(self.text(node.span, text)) } else { None }
+    }
+
+    /// The elements of an array or a list; none where it is something else.
+    pub(super) fn elements_of(&self, kind: Kind) -> Vec<Node> {
+        let value = Value { document: self, node: Node { span: Span::default(), kind } };
+        value.array().map_or_else(Vec::new, |elements| elements.nodes.to_vec())
+    }
+
+    /// Puts another value into an array or a list.
+    pub(super) fn set_element(&mut self, kind: Kind, index: usize, node: Node) {
+        let element = match kind {
+            Kind::Array(array) => {
+                let start = self.arrays[array as usize].start as usize;
+                self.elements.get_mut(start + index)
+            }
+            Kind::List(list) => self.lists[list as usize].get_mut(index),
+            Kind::String(_)
+            | Kind::Integer(..)
+            | Kind::Float(_)
+            | Kind::Boolean(_)
+            | Kind::Datetime
+            | Kind::Table(_) => None,
+        };
+        if let Some(element) = element {
+            *element = node;
+        }
     }
 
     /// Takes an entry out of its table.

@@ -114,7 +114,7 @@ impl Build {
     pub fn shape(mut self, shape: Shape, material: Material) -> Self {
         self.scene.materials.push(material);
         let material = Some(self.scene.materials.len() - 1);
-        self.scene.objects.push(Object { shape, material, span: 0..0 });
+        self.scene.objects.push(Object { shape, material, name: None, span: 0..0 });
         self
     }
 

@@ -158,10 +158,13 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// The library silences panics that it contains, from its first work on; this hook hears them all.
 fn listen_to_panics(desk: &Desk) {
-    let _ = check(&desk.lay(
-        Case { kind: Kind::Asset, seed: 0, number: 0 },
-        &Seed { file: "case.obj".to_owned(), bytes: b"v".to_vec() },
-    ));
+    let _ = check(
+        &desk.lay(
+            Case { kind: Kind::Asset, seed: 0, number: 0 },
+            &Seed { file: "case.obj".to_owned(), bytes: b"v".to_vec() },
+        ),
+        &[],
+    );
     panic::set_hook(Box::new(|info| {
         let place = info.location().map_or(String::new(), ToString::to_string);
         *PANIC.lock().expect("no panic") = Some(format!("{info} at {place}"));
@@ -169,7 +172,7 @@ fn listen_to_panics(desk: &Desk) {
 }
 
 fn one(scene: &Path) -> Result<(), String> {
-    let checked = panic::catch_unwind(AssertUnwindSafe(|| check(scene)));
+    let checked = panic::catch_unwind(AssertUnwindSafe(|| check(scene, &[])));
     if let Some(panic) = PANIC.lock().expect("no panic").take() {
         // Decoders of others may panic: it is contained, and an error of the file.
         let is_foreign = panic.contains("/.cargo/registry/") || panic.contains("/registry/src/");

@@ -1,16 +1,20 @@
 //! Colours, and colours or textures.
 
+use csscolorparser::NAMED_COLORS;
+
 use super::super::super::description::ColorSource;
+use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::Names;
-use super::super::value::{Item, wrong_type};
+use super::super::value::{Item, limited, wrong_type};
 use super::Key;
 use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
 
-const COLOR: &str = "a colour: [r, g, b] or \"#rrggbb\"";
-const COLOR_OR_TEXTURE: &str = "a colour, [r, g, b] or \"#rrggbb\", or { texture = \"name\" }";
+const COLOR: &str = "a colour: [r, g, b], a number, \"#rrggbb\" or a name";
+const COLOR_OR_TEXTURE: &str =
+    "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
 
 impl Key<'_> {
     /// A colour ≥ 0, decoded to linear.
@@ -32,6 +36,7 @@ impl Key<'_> {
             return texture.map(ColorSource::Texture);
         }
         if let Item::String(text) = self.value?.item()
+            && named(text).is_none()
             && textures.find(text).is_some()
         {
             let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR_OR_TEXTURE}", self.name))
@@ -45,8 +50,13 @@ impl Key<'_> {
 
     fn color_of(&self, limits: Limits, expected: &str) -> Option<Vec3> {
         let value = self.value?;
-        if let Item::String(text) = value.item() {
-            return self.hexadecimal(text);
+        match value.item() {
+            Item::String(text) => return self.written_color(text),
+            Item::Integer { .. } | Item::Float(_) => {
+                return limited(self.context, self.name, value, limits, expected)
+                    .map(|grey| Vec3::splat(grey as f32));
+            }
+            Item::Boolean(_) | Item::Datetime | Item::Array(_) | Item::Table(_) => {}
         }
         if value.array().is_some_and(|array| array.len() == 3) {
             let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
@@ -56,18 +66,37 @@ impl Key<'_> {
         None
     }
 
-    fn hexadecimal(&self, text: &str) -> Option<Vec3> {
-        let color = rgb_bytes(text).map(srgb8_to_linear);
-        if color.is_none() {
-            let help = match long_form(text) {
-                Some(long) => format!("write all six digits: \"{long}\""),
-                None => "six hexadecimal digits after a #, such as \"#ffcc00\"".to_owned(),
-            };
-            let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR}", self.name));
-            self.context.report(issue.label("this is not #rrggbb").help(help));
+    /// `#rrggbb`, or a name in any case, decoded from sRGB.
+    fn written_color(&self, text: &str) -> Option<Vec3> {
+        if let Some(bytes) = rgb_bytes(text).or_else(|| named(text)) {
+            return Some(srgb8_to_linear(bytes));
         }
-        color
+        let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR}", self.name));
+        let small = text.to_ascii_lowercase();
+        let issue = match (long_form(text), nearest(&small, names())) {
+            (Some(long), _) => {
+                issue.label("this is not #rrggbb").help(format!("write all six digits: \"{long}\""))
+            }
+            (None, _) if text.starts_with('#') => issue
+                .label("this is not #rrggbb")
+                .help("six hexadecimal digits after a #, such as \"#ffcc00\""),
+            (None, Some(near)) => issue.label(format!("did you mean \"{near}\"?")),
+            (None, None) => issue.label("there is no colour of this name").help("the names are those of CSS"),
+        };
+        self.context.report(issue);
+        None
     }
+}
+
+/// The names of colours, in small letters (CSS Color Module Level 4, 6.1).
+fn names() -> impl Iterator<Item = &'static str> {
+    NAMED_COLORS.keys().map(|name| name.as_str())
+}
+
+/// The bytes of a colour by its name, in any case.
+fn named(text: &str) -> Option<[u8; 3]> {
+    let found = NAMED_COLORS.entries().find(|(name, _)| name.as_str().eq_ignore_ascii_case(text));
+    found.map(|(_, bytes)| *bytes)
 }
 
 /// The bytes of `#rrggbb`.
@@ -96,6 +125,16 @@ fn hex_digits(text: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_those_of_css_in_any_case() {
+        assert_eq!(named("rebeccapurple"), Some([0x66, 0x33, 0x99]));
+        assert_eq!(named("DarkSlateGrey"), named("darkslategray"));
+        assert_eq!(names().count(), 148);
+        for wrong in ["", "transparent", "fff", "bad", "rgb(0,0,0)", "red "] {
+            assert_eq!(named(wrong), None, "{wrong}");
+        }
+    }
 
     #[test]
     fn only_six_digits_are_a_colour() {

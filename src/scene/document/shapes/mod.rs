@@ -39,6 +39,11 @@ const KINDS: [(&str, Reader); 10] = [
     ("mesh", mesh::read),
 ];
 
+/// Whether a list of tables of this name is of shapes.
+pub(super) fn is_kind(name: &str) -> bool {
+    KINDS.iter().any(|(kind, _)| *kind == name)
+}
+
 /// Every shape of the file, and the mesh files they name; no shapes if one of them is wrong.
 pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Object>>, Vec<Located<PathBuf>>) {
     let mut files = MeshFiles::default();
@@ -68,6 +73,7 @@ fn object(
         _ => table.required("material", "\"name\""),
     };
     let material = key.name_in(&materials.names);
+    let name = table.optional("name").shape_name();
     table.finish();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
         let issue = Issue::error(key.span()?, "an infinite plane cannot be a light")
@@ -83,7 +89,7 @@ fn object(
     if material.is_some_and(|index| materials.is_glass(index)) {
         warn_about_no_inside(table, &shape, key.span());
     }
-    Some(Object { shape, material, span: table.span.clone() })
+    Some(Object { shape, material, name: name?, span: table.span.clone() })
 }
 
 /// Warns about glass that a ray enters and never leaves, or leaves and never entered; `span` is where the material is named.
