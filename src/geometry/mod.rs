@@ -23,7 +23,7 @@ pub mod watertight;
 
 pub use aabb::Aabb;
 pub use ray::{Ray, RayF64};
-pub use surface::{AreaPoint, ShapeHit, SurfacePoint};
+pub use surface::{AreaPoint, Asked, ShapeHit, SurfacePoint};
 
 use crate::math::{DVec3, Vec2};
 use cone::Cone;
@@ -110,6 +110,14 @@ impl Shape {
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         of_any!(self, it => it.surface(ray, hit))
+    }
+
+    /// The surface at a hit, as far as it is asked for.
+    pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
+        match self {
+            Self::Sphere(sphere) if !asked.uv => sphere.bare_surface(ray, hit),
+            shape => shape.surface(ray, hit),
+        }
     }
 
     /// The box around it; none where it has no end.

@@ -50,6 +50,13 @@ impl Sink<'_> {
         }
     }
 
+    /// What lamps send to the eye by the vertices of the slots from one on.
+    pub fn add_arrived_run(&mut self, first: u32, contributions: &[Vec3]) {
+        for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
+            *sum += *contribution;
+        }
+    }
+
     /// What lamps send to the eye by a vertex.
     pub fn add_arrived(&mut self, slot: u32, contribution: Vec3) {
         self.radiance[slot as usize] += contribution;

@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::RayCounters;
+use super::camera::CAMERA_ROWS;
 use super::crossing::{Crossing, CrossingMemory};
 use super::light::LitQueue;
 use super::medium::{Medium, absorption};
@@ -40,17 +41,20 @@ pub fn trace(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, crossing, .. } = queues;
+    let Queues { rays, next, lit, crossing, camera, .. } = queues;
     next.clear();
     let mut wave = Wave { depth: 0, shot, lit, sink, next, crossing, place: 0, counters };
     wave.lit.expect(slots.len());
-    for first in slots.clone().step_by(PACKET) {
-        let count = (slots.end - first).min(PACKET as u32) as usize;
-        let place = first - slots.start;
-        negative(first, wave.shade_packet(Rays::Camera(first, count), place)?);
+    for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
+        shot.camera_rows(start..slots.end, camera);
+        for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
+            negative(first, row.negative);
+            let count = (slots.end - first).min(PACKET as u32) as usize;
+            wave.shade_packet(Rays::Camera(row, first, count), first - slots.start)?;
+        }
     }
     wave.light()?;
-    wave.lit.settle(|place| slots.start + place as u32, &mut wave.sink);
+    wave.lit.settle_run(slots.start, &mut wave.sink);
     wave.next_round(rays);
     while !rays.is_empty() {
         wave.lit.expect(rays.len());
@@ -94,9 +98,8 @@ impl Wave<'_, '_> {
         self.depth += 1;
     }
 
-    /// What each ray of a packet meets; its places in the round's queue start at `first`. Which of the camera's have a negative
-    /// weight.
-    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<u32, Cancelled> {
+    /// What each ray of a packet meets; its places in the round's queue start at `first`.
+    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<(), Cancelled> {
         let shot = self.shot;
         if (first as usize).is_multiple_of(POLL_INTERVAL) {
             shot.token.check()?;
@@ -126,7 +129,7 @@ impl Wave<'_, '_> {
         if self.lit.is_full() {
             self.light()?;
         }
-        Ok(met.negative)
+        Ok(())
     }
 
     /// What a plain surface sends to the eye by itself.
@@ -151,7 +154,7 @@ impl Wave<'_, '_> {
     fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
         let shot = self.shot;
         for _ in 0..MOST_HIDDEN {
-            let vertex = Vertex::new(shot, &path, &hit);
+            let vertex = Vertex::to_shade(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
                 return self.shade_surface(path, &vertex, hit.shape.t);
             }
