@@ -141,6 +141,11 @@ impl Cone {
         ring_shown(side, cosine * across(along), -sine * along) + cap * along.max(0.0)
     }
 
+    /// Its tip.
+    pub fn tip(&self) -> DVec3 {
+        self.frame.origin
+    }
+
     /// Whether it is closed.
     pub fn is_capped(&self) -> bool {
         self.capped

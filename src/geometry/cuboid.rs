@@ -136,6 +136,16 @@ impl Cuboid {
         )
     }
 
+    /// Half the lengths along its axes.
+    pub fn half(&self) -> DVec3 {
+        self.half
+    }
+
+    /// Its axes in the world.
+    pub fn axes(&self) -> DMat3 {
+        self.axes
+    }
+
     /// Areas of the faces.
     pub fn areas(&self) -> [f64; 6] {
         let [x, y, z] = (self.half * 2.0).to_array();

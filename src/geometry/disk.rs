@@ -83,6 +83,11 @@ impl Disk {
         self.frame.origin
     }
 
+    /// Of its border.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
     /// Unit normal of the front.
     pub fn normal(&self) -> DVec3 {
         self.frame.axis()

@@ -3,6 +3,7 @@
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use crate::math::lanes::{TRUE, bits};
 use crate::math::{DVec3, Vec2};
 
 /// Room given to a quad's border in units of its edges, so that two quads which share an edge leave no gap between
@@ -53,14 +54,14 @@ impl Parallelogram {
     /// [`Parallelogram::intersect`] side by side.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
-        let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], false);
+        let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], [0; PACKET]);
         for lane in 0..PACKET {
             let ray = rays.line(lane);
             above[lane] = self.normal.dot(self.corner - ray.origin);
             along[lane] = self.normal.dot(ray.direction);
-            may_hit |= may_accept(above[lane], along[lane], ends[lane]);
+            may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
         }
-        if !may_hit {
+        if bits(may_hit) == 0 {
             return;
         }
         for lane in 0..PACKET {

@@ -1,10 +1,8 @@
 //! Up to sixteen rays side by side, a row for each coordinate: what a shape tests in a loop without branches, which
 //! compilers turn into vector instructions. Every lane gets the bits that its ray gets alone.
 
-use std::cell::OnceCell;
-
 use super::{Ray, RayF64, ShapeHit};
-use crate::math::lanes::LANES;
+use crate::math::lanes::{LANES, TRUE, bits};
 use crate::math::{DVec3, Vec3};
 
 /// Rays that are traced together.
@@ -34,21 +32,13 @@ pub struct RayRows {
     pub origin: [Row; 3],
     /// Coordinates of where they go.
     pub direction: [Row; 3],
-    /// The same one by one, for what has no loop; made when it is asked for.
-    list: OnceCell<[Ray; PACKET]>,
 }
 
 impl RayRows {
     /// From coordinates.
     #[inline(always)]
     pub fn of(origin: [Row; 3], direction: [Row; 3]) -> Self {
-        Self { origin, direction, list: OnceCell::new() }
-    }
-
-    /// The rays one by one, without ends.
-    #[inline]
-    pub fn rays(&self) -> &[Ray; PACKET] {
-        self.list.get_or_init(|| std::array::from_fn(|lane| self.ray(lane)))
+        Self { origin, direction }
     }
 
     /// The ray in a lane, without an end.
@@ -112,6 +102,16 @@ impl HitRows {
     #[inline(always)]
     pub fn none() -> Self {
         Self { t: [f32::NAN; PACKET], primitive: [0; PACKET], u: [0.0; PACKET], v: [0.0; PACKET] }
+    }
+
+    /// A bit for each ray that hits.
+    #[inline(always)]
+    pub fn any(&self) -> u32 {
+        let mut any = [0; PACKET];
+        for lane in 0..PACKET {
+            any[lane] = if self.t[lane].is_nan() { 0 } else { TRUE };
+        }
+        bits(any)
     }
 
     /// Write down a hit.

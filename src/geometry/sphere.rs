@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use crate::math::lanes::{TRUE, bits};
 use crate::math::{DVec3, Vec2};
 
 /// All points at one distance from a centre; the front is outside.
@@ -40,7 +41,7 @@ impl Sphere {
     /// [`Sphere::intersect`] side by side.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
-        let (mut discriminants, mut may_hit) = ([0.0; PACKET], false);
+        let (mut discriminants, mut may_hit) = ([0.0; PACKET], [0; PACKET]);
         for lane in 0..PACKET {
             let ray = rays.line(lane);
             let to_origin = ray.origin - self.center;
@@ -48,9 +49,9 @@ impl Sphere {
             let b = -to_origin.dot(ray.direction);
             let foot = to_origin + ray.direction * (b / a);
             discriminants[lane] = self.radius * self.radius - foot.length_squared();
-            may_hit |= (discriminants[lane] >= 0.0) & (ends[lane] >= 0.0);
+            may_hit[lane] = if (discriminants[lane] >= 0.0) & (ends[lane] >= 0.0) { TRUE } else { 0 };
         }
-        if !may_hit {
+        if bits(may_hit) == 0 {
             return;
         }
         for lane in 0..PACKET {
@@ -75,6 +76,12 @@ impl Sphere {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         let (uv, dpdu, dpdv) = sphere_parametrisation(normal);
         SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
+    }
+
+    /// The same without texture coordinates.
+    pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        SurfacePoint::exact(point, normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, reach)
     }
 
     /// The box around it.
@@ -104,6 +111,11 @@ impl Sphere {
 
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
+        let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);
+        // The root, which takes long, decides what is nearer than its rounding and that of the squares.
+        if (distance - radius).abs() > radius * (16.0 * f64::EPSILON) {
+            return distance < radius;
+        }
         (point - self.center).length() < self.radius
     }
 

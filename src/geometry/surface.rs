@@ -46,6 +46,20 @@ pub struct SurfacePoint {
     pub barycentric: Vec3,
 }
 
+/// What of a [`SurfacePoint`] is asked for beside the point and its normals; the rest may stay 0, or be the point itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Texture coordinates and their tangents.
+    pub uv: bool,
+    /// [`SurfacePoint::shadow_point`].
+    pub shadow_point: bool,
+}
+
+impl Asked {
+    /// Everything.
+    pub const ALL: Self = Self { uv: true, shadow_point: true };
+}
+
 /// A point of a surface that light leaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AreaPoint {

@@ -13,7 +13,11 @@ use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow, warp};
 use crate::world::{Loops, PACKET};
 
+/// Packets of camera rays that are made in one loop: each waits long for its numbers, and not for those of the others.
+pub const CAMERA_ROWS: usize = 8;
+
 /// Rays through the pixels of some slots.
+#[derive(Clone)]
 pub struct CameraRow {
     /// The rays.
     pub rays: RayRows,
@@ -30,12 +34,22 @@ impl Shot<'_> {
         mut negative: impl FnMut(u32, u32),
     ) {
         queue.clear();
-        for first in slots.clone().step_by(PACKET) {
-            let row = self.world.geometry.instructions().run(Camera { shot: self, first });
-            negative(first, row.negative);
-            let slots = first..slots.end.min(first + PACKET as u32);
-            queue.extend(slots.zip(0..).map(|(slot, lane)| self.camera_path(row.rays.ray(lane), slot)));
+        let mut rows = Vec::new();
+        for first in slots.clone().step_by(CAMERA_ROWS * PACKET) {
+            self.camera_rows(first..slots.end, &mut rows);
+            for (first, row) in (first..).step_by(PACKET).zip(&rows) {
+                negative(first, row.negative);
+                let slots = first..slots.end.min(first + PACKET as u32);
+                queue.extend(slots.zip(0..).map(|(slot, lane)| self.camera_path(row.rays.ray(lane), slot)));
+            }
         }
+    }
+
+    /// The rays of the first of some slots, at most [`CAMERA_ROWS`] packets, in place of what is in `rows`.
+    pub fn camera_rows(&self, slots: Range<u32>, rows: &mut Vec<CameraRow>) {
+        rows.clear();
+        let count = slots.len().div_ceil(PACKET).min(CAMERA_ROWS);
+        self.world.geometry.instructions().run(Camera { shot: self, first: slots.start, count, rows });
     }
 
     /// The path that a ray of the camera is.
@@ -49,7 +63,7 @@ impl Shot<'_> {
 
     /// The rays of the slots from `first` on, also beyond the last. To be called inside of loops for each instruction set.
     #[inline(always)]
-    pub fn camera_row(&self, first: u32) -> CameraRow {
+    fn camera_row(&self, first: u32) -> CameraRow {
         let paths = [CAMERA_PATH; PACKET];
         let (settings, camera) = (self.settings, &self.world.camera);
         let (xs, ys, samples) = self.block.places(first);
@@ -80,14 +94,18 @@ impl Shot<'_> {
 struct Camera<'a> {
     shot: &'a Shot<'a>,
     first: u32,
+    count: usize,
+    rows: &'a mut Vec<CameraRow>,
 }
 
 impl Loops for Camera<'_> {
-    type Done = CameraRow;
+    type Done = ();
 
     #[inline(always)]
-    fn run(self) -> CameraRow {
-        self.shot.camera_row(self.first)
+    fn run(self) {
+        for number in 0..self.count as u32 {
+            self.rows.push(self.shot.camera_row(self.first + number * PACKET as u32));
+        }
     }
 }
 

@@ -5,21 +5,21 @@ use super::onward::{Onward, Scattering};
 use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
-use super::vertices::LitVertex;
+use super::vertices::{Lift, LitVertex};
 use super::view::{Measure, Parts};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{Light, LightRow, SourceRow};
+use crate::lights::{Light, LightRow, Middle, Source, SourceRow};
 use crate::materials::Lobes;
 use crate::materials::lobes::gloss;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::color::luminance;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
-use crate::world::{Hit, Loops};
+use crate::world::{Geometry, Hit, Loops};
 
 /// Vertices that wait to be lit, side by side; each is lit alone, whatever it shares its row with.
 #[derive(Default)]
@@ -45,6 +45,11 @@ pub struct LitRow {
     /// Normals behind which nothing is seen, of the lanes whose bits are set.
     horizon: Lanes3,
     is_bounded: u32,
+    /// Points from which lights are seen all around where nothing is on the way there, of the lanes whose bits are set, and the
+    /// ends of the ways.
+    lifted: Lanes3,
+    lift_end: Lanes,
+    may_lift: u32,
     /// Normals that the cosines are of.
     pub normal: Lanes3,
     /// Those before a normal map bent them, and the cosine between; [`UNBENT`] where none did.
@@ -92,7 +97,7 @@ impl LitRow {
             Measure::ArrivingShare => false,
         };
         let is_soft = shot.settings.render.shadows == Shadows::Soft;
-        if !(self.is_glossy && shows && is_soft && shot.world.lights.have_area()) {
+        if !(self.is_glossy && shows && is_soft && shot.world.lights.can_be_found()) {
             return 0;
         }
         let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= Self::SHARP;
@@ -125,6 +130,9 @@ impl LitRow {
         from: [[0.0; LANES]; 3],
         horizon: [[0.0; LANES]; 3],
         is_bounded: 0,
+        lifted: [[0.0; LANES]; 3],
+        lift_end: [0.0; LANES],
+        may_lift: 0,
         normal: [[0.0; LANES]; 3],
         smooth_normal: [[0.0; LANES]; 3],
         bend: [UNBENT; LANES],
@@ -146,7 +154,8 @@ impl LitRow {
     /// For other vertices, with normals as they are.
     #[inline(always)]
     pub fn reset(&mut self) {
-        (self.used, self.is_bounded, self.is_glossy, self.is_bent) = (0, 0, false, false);
+        (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
+        (self.is_glossy, self.is_bent) = (false, false);
         self.bend = [UNBENT; LANES];
     }
 
@@ -155,6 +164,7 @@ impl LitRow {
         for (own, other) in [
             (&mut self.from, &other.from),
             (&mut self.horizon, &other.horizon),
+            (&mut self.lifted, &other.lifted),
             (&mut self.normal, &other.normal),
             (&mut self.smooth_normal, &other.smooth_normal),
             (&mut self.mirrored_eye, &other.mirrored_eye),
@@ -173,6 +183,8 @@ impl LitRow {
         self.is_glossy |= other.is_glossy;
         self.is_bent |= other.is_bent;
         self.is_bounded |= (other.is_bounded >> from & 1) << i;
+        self.lift_end[i] = other.lift_end[from];
+        self.may_lift |= (other.may_lift >> from & 1) << i;
         self.used |= 1 << i;
     }
 
@@ -182,6 +194,11 @@ impl LitRow {
         set_lane(&mut self.from, i, outlook.point);
         set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
         self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;
+        if let Some(Lift { to, end }) = outlook.lift {
+            set_lane(&mut self.lifted, i, to);
+            self.lift_end[i] = end;
+            self.may_lift |= 1 << i;
+        }
         set_lane(&mut self.normal, i, shading.normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
@@ -239,15 +256,14 @@ impl LitRow {
     /// A bit for each vertex that certainly sees nothing in a direction.
     #[inline(always)]
     pub fn hidden(&self, directions: &Lanes3) -> u32 {
-        let mut hidden = 0;
+        let mut hidden = [0; LANES];
         if self.is_bounded != 0 {
             for i in 0..LANES {
                 let cosine = lane(&self.horizon, i).dot(lane(directions, i));
-                let bit = 1 << i;
-                hidden |= if cosine > 0.0 { 0 } else { bit };
+                hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
             }
         }
-        hidden & self.is_bounded
+        bits(hidden) & self.is_bounded
     }
 }
 
@@ -306,6 +322,11 @@ impl LitQueue {
         }
     }
 
+    /// The same where the slots of the paths are those from one on.
+    pub fn settle_run(&mut self, first: u32, sink: &mut Sink<'_>) {
+        sink.add_arrived_run(first, &self.arrived);
+    }
+
     /// A row to be filled, to be kept by [`LitQueue::keep`] or forgotten.
     pub fn spare(&mut self) -> &mut LitRow {
         if self.count == self.rows.len() {
@@ -319,6 +340,9 @@ impl LitQueue {
         let used = self.rows[self.count].used;
         if used.count_ones() >= Self::WORTH_A_ROW {
             self.count += 1;
+            return;
+        }
+        if used == 0 {
             return;
         }
         let row = self.rows[self.count].clone();
@@ -366,8 +390,12 @@ impl LitQueue {
         next: &mut Vec<PathRay>,
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
-        for row in &self.rows[..self.count] {
+        for row in &mut self.rows[..self.count] {
             shot.token.check()?;
+            if row.may_lift != 0 {
+                shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
+            }
+            let row = &*row;
             let others =
                 if onward.is_some() { Others::Paths } else { Others::Lobes(row.sharp(shot, measure)) };
             let work = Lighting { shot, row, used: row.used, measure, others };
@@ -375,7 +403,7 @@ impl LitQueue {
             rays.shadow += arrived.rays.shadow;
             rays.scattered += arrived.rays.scattered;
             for i in lanes(row.used) {
-                self.arrived[row.place[i] as usize] = lane(&arrived.light, i) * lane(&row.throughput, i);
+                self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
             }
             if let Some(onward) = onward.filter(|onward| onward.leads_on) {
                 Scattering { shot, row, onward }.scatter(&self.media, next);
@@ -383,6 +411,41 @@ impl LitQueue {
         }
         self.clear();
         Ok(rays)
+    }
+}
+
+/// Lifts the vertices of a row to where nothing is on the way.
+struct Lifting<'a> {
+    geometry: &'a Geometry,
+    row: &'a mut LitRow,
+}
+
+impl Loops for Lifting<'_> {
+    type Done = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { geometry, row } = self;
+        let mut direction = row.lifted;
+        for axis in 0..3 {
+            for i in 0..LANES {
+                direction[axis][i] = row.lifted[axis][i] - row.from[axis][i];
+            }
+        }
+        let mut ends = [-1.0; LANES];
+        for i in 0..LANES {
+            ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
+        }
+        let rays = RayRows::of(row.from, direction);
+        let blocked = geometry.occluded_rows(&rays, &ends, &SourceRow::of(Source::Nothing));
+        let lifted = row.may_lift & !blocked;
+        row.is_bounded &= !lifted;
+        for axis in 0..3 {
+            for i in 0..LANES {
+                let (from, to) = (row.from[axis][i], row.lifted[axis][i]);
+                row.from[axis][i] = if lifted & 1 << i != 0 { to } else { from };
+            }
+        }
     }
 }
 
@@ -413,7 +476,7 @@ pub struct LightRays {
     pub scattered: u64,
 }
 
-/// What arrives at the vertices of a row.
+/// What of the light that arrives at the vertices of a row gets to the eye.
 struct Arrived {
     light: Lanes3,
     rays: LightRays,
@@ -440,7 +503,7 @@ impl Loops for Lighting<'_> {
     #[inline(always)]
     fn run(self) -> Arrived {
         let render = &self.shot.settings.render;
-        let sampler = self.sampler();
+        let mut sampler = None;
         let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: LightRays::default() };
         for (number, light) in self.shot.world.lights.iter() {
             // Where one ray decides for all of a light, what it could send waits for that.
@@ -452,6 +515,10 @@ impl Loops for Lighting<'_> {
                 self.add(&samples, &values, active, &mut sums, &mut waiting);
             } else {
                 let count = render.shadow_samples;
+                if sampler.is_none() {
+                    sampler = Some(self.sampler());
+                }
+                let Some(sampler) = &sampler else { continue };
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, self.used, &u);
@@ -469,12 +536,17 @@ impl Loops for Lighting<'_> {
             }
         }
         if let Others::Lobes(sharp @ 1..) = self.others {
-            self.add_lobes(sharp, &sampler, &mut sums);
+            self.add_lobes(sharp, &sampler.unwrap_or_else(|| self.sampler()), &mut sums);
         }
         if self.measure == Measure::ArrivingShare {
             for i in 0..LANES {
                 let share = if sums.total[i] > 0.0 { sums.light[0][i] / sums.total[i] } else { 0.0 };
                 set_lane(&mut sums.light, i, Vec3::splat(share));
+            }
+        }
+        for axis in 0..3 {
+            for i in 0..LANES {
+                sums.light[axis][i] *= self.row.throughput[axis][i];
             }
         }
         Arrived { light: sums.light, rays: sums.rays }
@@ -548,10 +620,14 @@ impl Lighting<'_> {
             let (hits, objects) = self.shot.world.geometry.closest_rows(&rays, &mut ends);
             sums.rays.scattered += u64::from(sent.count_ones());
             for i in lanes(sent) {
-                let Some(shape) = hits.get(i) else { continue };
                 let density = self.lobes(i).density(lane(&directions, i), glosses[i]);
-                let hit = Hit { shape, object: objects[i] };
-                let radiance = self.shot.lamp_radiance(&rays.ray(i), &hit, density);
+                let radiance = match hits.get(i) {
+                    Some(shape) => {
+                        let hit = Hit { shape, object: objects[i] };
+                        self.shot.lamp_radiance(&rays.ray(i), &hit, density)
+                    }
+                    None => self.shot.radiance_beyond(lane(&directions, i), density),
+                };
                 let value = lane(&f, i) * radiance * (cosines[i] / (density * count as f32));
                 let sum = lane(&sums.light, i) + value;
                 set_lane(&mut sums.light, i, sum);
@@ -587,7 +663,11 @@ impl Lighting<'_> {
         let (middle, source) = light.middle();
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
         for i in 0..LANES {
-            let ray = Ray::segment(lane(&self.row.from, i), middle);
+            let from = lane(&self.row.from, i);
+            let ray = match middle {
+                Middle::At(middle) => Ray::segment(from, middle),
+                Middle::Towards(direction) => Ray::new(from, direction),
+            };
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
@@ -602,11 +682,11 @@ impl Lighting<'_> {
     /// Add what arrives on rays; those that are not traced end below 0.
     #[inline(always)]
     fn add_seen(&self, rays: &RayRows, ends: &Ends, sources: &SourceRow, values: &Lanes3, sums: &mut Sums) {
-        let mut traced = 0_u32;
+        let mut traced = [0; LANES];
         for i in 0..LANES {
-            let bit = 1 << i;
-            traced |= if ends[i] >= 0.0 { bit } else { 0 };
+            traced[i] = if ends[i] >= 0.0 { TRUE } else { 0 };
         }
+        let traced = bits(traced);
         let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
         sums.rays.shadow += u64::from(traced.count_ones());
         add_where(traced & !occluded, values, &mut sums.light);
@@ -623,15 +703,14 @@ impl Lighting<'_> {
                 set_lane(&mut arriving, i, light);
             }
         }
-        let (mut values, mut active) = (f, 0);
+        let (mut values, mut active) = (f, [0; LANES]);
         for i in 0..LANES {
             let value = lane(&f, i) * lane(&arriving, i) * (cosines[i] * share);
             set_lane(&mut values, i, value);
-            let bit = 1 << i;
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
-            active |= if brings { bit } else { 0 };
+            active[i] = if brings { TRUE } else { 0 };
         }
-        (values, active & self.used)
+        (values, bits(active) & self.used)
     }
 
     /// The rays on which the light of the samples in `active` arrives; the others have no end.

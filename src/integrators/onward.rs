@@ -31,7 +31,8 @@ impl Onward {
     pub fn new(shot: &Shot<'_>, depth: u32) -> Self {
         let emits = || shot.world.materials.iter().any(|material| material.emission.max_element() > 0.0);
         let max_depth = shot.settings.render.max_depth;
-        let leads_on = depth + 1 < max_depth || depth + 1 == max_depth && emits();
+        let shines = || shot.world.lights.are_beyond() || emits();
+        let leads_on = depth + 1 < max_depth || depth + 1 == max_depth && shines();
         Self { leads_on, is_risked: depth >= Self::SURE }
     }
 
@@ -160,6 +161,19 @@ impl Shot<'_> {
         let normal = self.world.geometry.surface(&path.ray, hit).normal;
         let samples = self.settings.render.shadow_samples as f32;
         weight(self.sample_density(&path.ray, hit, normal) * samples / density)
+    }
+
+    /// What a path brings of the radiance that comes from beyond the scene; light samples bring the rest.
+    pub fn light_beyond(&self, path: &PathRay) -> Vec3 {
+        let (lights, density) = (&self.world.lights, path.history.density);
+        let samples = self.settings.render.shadow_samples as f32;
+        let share = |of_light: f32| if density > 0.0 { weight(of_light * samples / density) } else { 1.0 };
+        lights.beyond_by_density(path.ray.direction, share)
+    }
+
+    /// [`Shot::lamp_radiance`] of a ray that leaves the scene.
+    pub fn radiance_beyond(&self, direction: Vec3, density: f32) -> Vec3 {
+        self.world.lights.beyond_by_density(direction, |of_light| weight(of_light / density))
     }
 
     /// Density in sr⁻¹ of light samples that come from a hit; 0 where none do.

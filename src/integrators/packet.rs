@@ -11,7 +11,7 @@ use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
-use crate::math::lanes::{lane, set_lane};
+use crate::math::lanes::{TRUE, bits, lane, set_lane};
 use crate::sampling::CAMERA_PATH;
 use crate::world::{Hit, Loops, Object, PACKET};
 
@@ -19,7 +19,7 @@ use crate::world::{Hit, Loops, Object, PACKET};
 #[derive(Clone, Copy)]
 pub enum Rays<'a> {
     /// Those of the camera, from a slot on, so many.
-    Camera(u32, usize),
+    Camera(&'a CameraRow, u32, usize),
     /// Of a queue.
     Paths(&'a [PathRay]),
 }
@@ -28,7 +28,7 @@ impl Rays<'_> {
     /// How many.
     pub fn count(&self) -> usize {
         match self {
-            Self::Camera(_, count) => *count,
+            Self::Camera(_, _, count) => *count,
             Self::Paths(paths) => paths.len(),
         }
     }
@@ -37,7 +37,6 @@ impl Rays<'_> {
 /// The hits of a packet. A surface is plain where its shape has a loop for its surface, its material is Phong without textures,
 /// and its ray is in no glass.
 pub struct Met {
-    rays: RayRows,
     hits: HitRows,
     object: [u32; PACKET],
     /// A bit for each ray that meets anything.
@@ -46,8 +45,6 @@ pub struct Met {
     pub plain: u32,
     /// A bit for each plain surface that sends out light towards the ray.
     pub shining: u32,
-    /// A bit for each whose place in the pixel has a negative weight, of the camera's.
-    pub negative: u32,
 }
 
 impl Met {
@@ -59,7 +56,7 @@ impl Met {
     /// One of the rays.
     pub fn path(&self, shot: &Shot<'_>, rays: &Rays<'_>, lane: usize) -> PathRay {
         match rays {
-            Rays::Camera(first, _) => shot.camera_path(self.rays.ray(lane), first + lane as u32),
+            Rays::Camera(row, first, _) => shot.camera_path(row.rays.ray(lane), first + lane as u32),
             Rays::Paths(paths) => paths[lane],
         }
     }
@@ -89,32 +86,28 @@ impl Loops for Meeting<'_> {
         let Self { shot, rays, first, measure, row } = self;
         let world = shot.world;
         row.reset();
-        let (rows, mut ends, negative) = match rays {
-            Rays::Camera(slot, count) => {
-                let CameraRow { rays, negative } = shot.camera_row(slot);
-                let mut ends = [-1.0; PACKET];
+        let of_paths;
+        let mut ends = [-1.0; PACKET];
+        let rows = match rays {
+            Rays::Camera(row, _, count) => {
                 ends[..count].fill(f32::INFINITY);
-                (rays, ends, negative)
+                &row.rays
             }
             Rays::Paths(paths) => {
                 let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
-                let mut ends = [-1.0; PACKET];
                 for (lane, path) in paths.iter().enumerate().take(PACKET) {
                     set_lane(&mut origin, lane, path.ray.origin);
                     set_lane(&mut direction, lane, path.ray.direction);
                     ends[lane] = path.ray.t_max;
                 }
-                (RayRows::of(origin, direction), ends, 0)
+                of_paths = RayRows::of(origin, direction);
+                &of_paths
             }
         };
-        let (hits, object) = world.geometry.closest_rows(&rows, &mut ends);
+        let (hits, object) = world.geometry.closest_rows(rows, &mut ends);
         let mut surface = SurfaceRow::EMPTY;
-        let (mut left, mut plain, mut shining) = (0_u32, 0, 0);
-        for lane in 0..PACKET {
-            let bit = 1 << lane;
-            left |= if hits.t[lane].is_nan() { 0 } else { bit };
-        }
-        let any = left;
+        let any = hits.any();
+        let (mut left, mut plain, mut shining) = (any, 0, 0);
         let mut seen = !0;
         match rays {
             Rays::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
@@ -127,16 +120,15 @@ impl Loops for Meeting<'_> {
         }
         while left != 0 {
             let id = object[left.trailing_zeros() as usize % PACKET];
-            let mut of = 0;
+            let mut of = [0; PACKET];
             for lane in 0..PACKET {
-                let bit = 1 << lane;
-                of |= if object[lane] == id { bit } else { 0 };
+                of[lane] = if object[lane] == id { TRUE } else { 0 };
             }
-            of &= left;
+            let of = bits(of) & left;
             left &= !of;
             let Object::Shape(shape) = &world.geometry.objects()[id as usize] else { continue };
             let Some((material, bsdf)) = world.plain_phong(id) else { continue };
-            if surface.fill(shape, &rows, &hits, of) {
+            if surface.fill(shape, rows, &hits, of) {
                 plain |= of;
                 shining |= if material.emission.max_element() > 0.0 { of } else { 0 };
                 row.used |= if bsdf.is_black() { 0 } else { of };
@@ -147,8 +139,8 @@ impl Loops for Meeting<'_> {
                 }
             }
         }
-        let front = if plain == 0 { 0 } else { row.place(&rays, first, &rows, &surface) };
-        Met { rays: rows, hits, object, any, plain, shining: shining & front, negative }
+        let front = if plain == 0 { 0 } else { row.place(&rays, first, rows, &surface) };
+        Met { hits, object, any, plain, shining: shining & front }
     }
 }
 
@@ -175,13 +167,12 @@ impl LitRow {
     /// Where paths meet plain surfaces; a bit for each that comes to the front.
     #[inline(always)]
     fn place(&mut self, paths: &Rays<'_>, first: u32, rays: &RayRows, surface: &SurfaceRow) -> u32 {
-        let mut front = 0;
+        let mut front = [0; PACKET];
         self.medium = [0; PACKET];
         for i in 0..PACKET {
             let (normal, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
             let cosine = normal.dot(direction);
-            let bit = 1 << i;
-            front |= if cosine < 0.0 { bit } else { 0 };
+            front[i] = if cosine < 0.0 { TRUE } else { 0 };
             let normal = normal * if cosine > 0.0 { -1.0 } else { 1.0 };
             let from = offset_origin(lane(&surface.point, i), lane(&surface.error, i), normal, normal);
             set_lane(&mut self.from, i, from);
@@ -190,7 +181,7 @@ impl LitRow {
             set_lane(&mut self.mirrored_eye, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
         }
         match paths {
-            Rays::Camera(slot, _) => {
+            Rays::Camera(_, slot, _) => {
                 self.throughput = [[1.0; PACKET]; 3];
                 self.path = [CAMERA_PATH + 1; PACKET];
                 self.carried = [1.0; PACKET];
@@ -206,6 +197,6 @@ impl LitRow {
                 }
             }
         }
-        front
+        bits(front)
     }
 }

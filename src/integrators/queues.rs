@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use super::camera::CameraRow;
 use super::crossing::CrossingMemory;
 use super::light::LitQueue;
 use super::medium::Medium;
@@ -68,6 +69,8 @@ pub struct Queues {
     pub rays: Vec<PathRay>,
     /// Rays of the next round.
     pub next: Vec<PathRay>,
+    /// Rays of the camera that are next.
+    pub camera: Vec<CameraRow>,
     /// Vertices of this round that are not lit yet.
     pub lit: LitQueue,
     /// What the rays of this round hit.

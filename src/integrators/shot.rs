@@ -55,6 +55,12 @@ impl SampleBlock {
     pub fn places(&self, first: u32) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
         let (mut x, mut y, mut sample) = self.place(first);
+        if self.samples.end - sample >= PACKET as u32 {
+            for lane in 0..PACKET {
+                samples[lane] = sample + lane as u32;
+            }
+            return ([x; PACKET], [y; PACKET], samples);
+        }
         for lane in 0..PACKET {
             (xs[lane], ys[lane], samples[lane]) = (x, y, sample);
             sample += 1;

@@ -52,6 +52,13 @@ impl Sink<'_> {
         }
     }
 
+    /// What lamps send to the eye by the vertices of the slots from one on, which the eye sees itself.
+    pub fn add_arrived_run(&mut self, first: u32, contributions: &[Vec3]) {
+        for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
+            *sum += *contribution;
+        }
+    }
+
     /// What lamps send to the eye by a vertex, which the eye sees itself or not.
     pub fn add_arrived(&mut self, slot: u32, contribution: Vec3, is_seen: bool) {
         let largest = contribution.max_element();

@@ -5,10 +5,9 @@ use super::RayCounters;
 use super::queues::PathRay;
 use super::shot::Shot;
 use crate::geometry::ray::offset_origin;
-use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::Source;
-use crate::materials::Material;
+use crate::geometry::{Asked, Ray, SurfacePoint};
 use crate::materials::phong::PhongBsdf;
+use crate::materials::{Bsdf, Material};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
@@ -34,21 +33,35 @@ pub struct Vertex<'a> {
 impl<'a> Vertex<'a> {
     /// Where a ray hits.
     pub fn new(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
-        Self::met(shot, path, &path.ray, hit)
+        let material = &shot.world.materials[shot.world.material_index(hit)];
+        Self::met(path, material, shot.world.geometry.surface(&path.ray, hit))
+    }
+
+    /// The same, with no more of the surface than its material asks for.
+    pub fn to_shade(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
+        Self::shaded(shot, path, &path.ray, hit)
     }
 
     /// What touches the surface that a ray hits, as the way between the sides of both meets it.
     pub fn touching(shot: &Shot<'a>, path: &PathRay, sides: Sides, hit: &Hit) -> Self {
-        Self { sides: Some(sides), ..Self::met(shot, path, &sides.ray(), hit) }
+        Self { sides: Some(sides), ..Self::shaded(shot, path, &sides.ray(), hit) }
     }
 
-    fn met(shot: &Shot<'a>, path: &PathRay, by: &Ray, hit: &Hit) -> Self {
-        let surface = shot.world.geometry.surface(by, hit);
-        let index = shot.world.material_index(hit);
+    fn shaded(shot: &Shot<'a>, path: &PathRay, by: &Ray, hit: &Hit) -> Self {
+        let material = &shot.world.materials[shot.world.material_index(hit)];
+        let (is_textured, is_lit) = match &material.bsdf {
+            Bsdf::Phong(phong) => (phong.constant().is_none(), true),
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => (false, false),
+        };
+        let asked = Asked { uv: is_textured || material.normal_map.is_some(), shadow_point: is_lit };
+        Self::met(path, material, shot.world.geometry.asked_surface(by, hit, asked))
+    }
+
+    fn met(path: &PathRay, material: &'a Material, surface: SurfacePoint) -> Self {
         let to_eye = -path.ray.direction;
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         Self {
-            material: &shot.world.materials[index],
+            material,
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             to_eye,
             normal: surface.normal * side,
@@ -100,18 +113,19 @@ impl<'a> Vertex<'a> {
     /// corner of a closed surface. Else it looks from the facet itself, and sees nothing behind that.
     pub fn outlook(&self, shot: &Shot<'_>) -> Outlook {
         if let Some(sides) = self.sides {
-            return Outlook { point: sides.before, horizon: None };
+            return Outlook { point: sides.before, horizon: None, lift: None };
         }
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = shot.settings.render.shadows != Shadows::Off;
         let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, shadow_point - on_facet) };
         let is_above = lift.direction.dot(self.normal) > LEAST_LIFT * self.normal.abs().dot(error);
-        if is_above && !(is_traced && shot.world.geometry.occluded(&lift.beyond(error), Source::Nothing)) {
-            return Outlook { point: shadow_point, horizon: None };
+        if is_above && !is_traced {
+            return Outlook { point: shadow_point, horizon: None, lift: None };
         }
         let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
-        Outlook { point: on_facet, horizon }
+        let lift = is_above.then(|| Lift { to: shadow_point, end: lift.beyond(error).t_max });
+        Outlook { point: on_facet, horizon, lift }
     }
 }
 
@@ -125,6 +139,17 @@ pub struct Outlook {
     pub point: Vec3,
     /// A normal: nothing is seen behind it. None where the cosines say so anyway, or the shadow rays.
     pub horizon: Option<Vec3>,
+    /// If nothing is on the way to another point, lights are seen from there, and all around.
+    pub lift: Option<Lift>,
+}
+
+/// The way to a point above a facet.
+#[derive(Clone, Copy, Debug)]
+pub struct Lift {
+    /// The point.
+    pub to: Vec3,
+    /// The end of the way: 1 at the point, and what that may be off.
+    pub end: f32,
 }
 
 /// The normals that shading goes by, on the eye's side.

@@ -5,6 +5,7 @@
 use std::ops::Range;
 
 use super::RayCounters;
+use super::camera::CAMERA_ROWS;
 use super::crossing::{Crossing, CrossingMemory};
 use super::light::LitQueue;
 use super::medium::{Medium, absorption};
@@ -44,7 +45,7 @@ pub fn trace(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, crossing, .. } = queues;
+    let Queues { rays, next, lit, crossing, camera, .. } = queues;
     next.clear();
     let is_path = match shot.settings.render.integrator {
         Integrator::Whitted => false,
@@ -55,13 +56,16 @@ pub fn trace(
         Wave { depth: 0, is_path, onward: None, shot, lit, sink, next, crossing, place: 0, counters };
     wave.begin_round();
     wave.lit.expect(slots.len());
-    for first in slots.clone().step_by(PACKET) {
-        let count = (slots.end - first).min(PACKET as u32) as usize;
-        let place = first - slots.start;
-        negative(first, wave.shade_packet(Rays::Camera(first, count), place)?);
+    for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
+        shot.camera_rows(start..slots.end, camera);
+        for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
+            negative(first, row.negative);
+            let count = (slots.end - first).min(PACKET as u32) as usize;
+            wave.shade_packet(Rays::Camera(row, first, count), first - slots.start)?;
+        }
     }
     wave.light()?;
-    wave.lit.settle(|place| (slots.start + place as u32, true), &mut wave.sink);
+    wave.lit.settle_run(slots.start, &mut wave.sink);
     wave.next_round(rays);
     while !rays.is_empty() {
         wave.lit.expect(rays.len());
@@ -116,9 +120,8 @@ impl Wave<'_, '_> {
         self.begin_round();
     }
 
-    /// What each ray of a packet meets; its places in the round's queue start at `first`. Which of the camera's have a negative
-    /// weight.
-    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<u32, Cancelled> {
+    /// What each ray of a packet meets; its places in the round's queue start at `first`.
+    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<(), Cancelled> {
         let shot = self.shot;
         if (first as usize).is_multiple_of(POLL_INTERVAL) {
             shot.token.check()?;
@@ -131,7 +134,8 @@ impl Wave<'_, '_> {
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let mut wanted = (met.any & !met.plain) | met.shining;
         wanted |= if render.ambient == Vec3::ZERO { 0 } else { met.plain };
-        wanted |= if render.background == Vec3::ZERO { 0 } else { all & !met.any };
+        let is_dark_beyond = render.background == Vec3::ZERO && !shot.world.lights.are_beyond();
+        wanted |= if is_dark_beyond { 0 } else { all & !met.any };
         // In the order of the paths: what a sample gets by several is added in that.
         for lane in lanes(wanted) {
             let (path, bit) = (met.path(shot, &rays, lane), 1 << lane);
@@ -147,7 +151,7 @@ impl Wave<'_, '_> {
         if self.lit.is_full() {
             self.light()?;
         }
-        Ok(met.negative)
+        Ok(())
     }
 
     /// What a plain surface sends to the eye by itself.
@@ -173,9 +177,12 @@ impl Wave<'_, '_> {
 
     /// The background lights nothing.
     fn leave(&mut self, path: &PathRay) {
+        let beyond = self.shot.light_beyond(path);
         if path.history.is_seen {
             let background = self.shot.settings.render.background;
-            self.sink.add(path.slot, Part::Emitted, path.throughput * background);
+            self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
+        } else if beyond != Vec3::ZERO {
+            self.sink.add_arrived(path.slot, path.throughput * beyond, false);
         }
     }
 
@@ -183,7 +190,7 @@ impl Wave<'_, '_> {
     fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
         let shot = self.shot;
         for _ in 0..MOST_HIDDEN {
-            let vertex = Vertex::new(shot, &path, &hit);
+            let vertex = Vertex::to_shade(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
                 let weight = if vertex.emits() { shot.lamp_weight(&path, &hit) } else { 1.0 };
                 return self.shade_surface(path, &vertex, hit.shape.t, weight);

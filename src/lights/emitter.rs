@@ -1,9 +1,13 @@
 //! Shapes that emit.
 
+use super::cuboid::BoxEmitter;
+use super::disk::DiskEmitter;
+use super::mesh::MeshEmitter;
 use super::rectangle::QuadEmitter;
+use super::round::{ConeSide, CylinderSide, RoundEmitter};
 use super::sphere::SphereEmitter;
-use super::surface::SurfaceEmitter;
-use super::triangles::TriangleEmitter;
+use super::torus::TorusEmitter;
+use super::triangle::TriangleEmitter;
 use super::{End, LightSample, Met, Source};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
@@ -27,8 +31,6 @@ pub struct AreaLight {
 pub enum Part {
     /// All of it.
     Whole,
-    /// One primitive.
-    Primitive(u32),
     /// The triangles that the emitter lists.
     Listed,
 }
@@ -38,39 +40,41 @@ pub enum Part {
 pub enum Emitter {
     /// A sphere.
     Sphere(SphereEmitter),
-    /// A parallelogram: a quad, or a face of a box.
+    /// A parallelogram.
     Quad(QuadEmitter),
-    /// Triangles.
-    Triangles(TriangleEmitter),
-    /// A shape of any other kind.
-    Surface(SurfaceEmitter),
+    /// A box.
+    Box(BoxEmitter),
+    /// A triangle.
+    Triangle(TriangleEmitter),
+    /// A disk.
+    Disk(DiskEmitter),
+    /// A cylinder.
+    Cylinder(Box<RoundEmitter<CylinderSide>>),
+    /// A cone.
+    Cone(Box<RoundEmitter<ConeSide>>),
+    /// A torus.
+    Torus(TorusEmitter),
+    /// Triangles of a mesh.
+    Mesh(MeshEmitter),
 }
 
-/// The lights that a shape is where all of it shines; none where it has no end.
-pub fn area_lights(shape: &Shape, radiance: Vec3, object: u32) -> Vec<AreaLight> {
-    let light = |part, shape| AreaLight { shape, radiance, object, part };
-    let whole = |shape: Option<Emitter>| shape.map(|shape| light(Part::Whole, shape)).into_iter().collect();
-    match shape {
+/// The light that a shape is where all of it shines; none where it has no end, or no area.
+pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
+    let emitter = match shape {
         Shape::Sphere(sphere) => {
             let Sphere { center, radius } = *sphere;
-            whole(Some(Emitter::Sphere(SphereEmitter { center, radius })))
+            Emitter::Sphere(SphereEmitter { center, radius })
         }
-        Shape::Quad(quad) => whole(Some(Emitter::Quad(QuadEmitter::new(quad.corner, quad.u, quad.v)))),
-        Shape::Box(cuboid) => {
-            let face = |number| {
-                let (corner, u, v) = cuboid.face(number);
-                light(Part::Primitive(number), Emitter::Quad(QuadEmitter::new(corner, u, v)))
-            };
-            (0..6).map(face).collect()
-        }
-        Shape::Triangle(triangle) => {
-            let corners = [triangle.a, triangle.b, triangle.c];
-            whole(TriangleEmitter::new(vec![(corners, 0)]).map(Emitter::Triangles))
-        }
-        Shape::Plane(_) | Shape::Disk(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => {
-            whole(SurfaceEmitter::new(*shape).map(Emitter::Surface))
-        }
-    }
+        Shape::Quad(quad) => Emitter::Quad(QuadEmitter::new(quad.corner, quad.u, quad.v)),
+        Shape::Box(cuboid) => Emitter::Box(BoxEmitter::new(cuboid)),
+        Shape::Triangle(triangle) => Emitter::Triangle(TriangleEmitter::new(triangle)?),
+        Shape::Disk(disk) => Emitter::Disk(DiskEmitter::new(disk)),
+        Shape::Cylinder(cylinder) => Emitter::Cylinder(Box::new(RoundEmitter::of_cylinder(cylinder))),
+        Shape::Cone(cone) => Emitter::Cone(Box::new(RoundEmitter::of_cone(cone))),
+        Shape::Torus(torus) => Emitter::Torus(TorusEmitter::new(*torus)),
+        Shape::Plane(_) => return None,
+    };
+    Some(AreaLight { shape: emitter, radiance, object, part: Part::Whole })
 }
 
 impl AreaLight {
@@ -84,8 +88,13 @@ impl AreaLight {
         match &self.shape {
             Emitter::Sphere(sphere) => own(sphere.sample(point, u)),
             Emitter::Quad(quad) => own(quad.sample(point, u)),
-            Emitter::Triangles(triangles) => triangles.sample(point, u, self.radiance, self.object),
-            Emitter::Surface(surface) => surface.sample(point, u, self.radiance, self.object),
+            Emitter::Box(cuboid) => own(cuboid.sample(point, u)),
+            Emitter::Triangle(triangle) => own(triangle.sample(point, u)),
+            Emitter::Disk(disk) => own(disk.sample(point, u)),
+            Emitter::Cylinder(cylinder) => own(cylinder.sample(point, u)),
+            Emitter::Cone(cone) => own(cone.sample(point, u)),
+            Emitter::Torus(torus) => own(torus.sample(point, u)),
+            Emitter::Mesh(mesh) => mesh.sample(point, u, self.radiance, self.object),
         }
     }
 
@@ -97,8 +106,13 @@ impl AreaLight {
         match &self.shape {
             Emitter::Sphere(sphere) => sphere.pdf(from),
             Emitter::Quad(quad) => quad.pdf(from, met),
-            Emitter::Triangles(triangles) => met.pdf_by_area(triangles.area()),
-            Emitter::Surface(surface) => met.pdf_by_area(surface.area()),
+            Emitter::Box(cuboid) => cuboid.pdf(from, met),
+            Emitter::Triangle(triangle) => triangle.pdf(from, met),
+            Emitter::Disk(disk) => disk.pdf(from, met.direction) as f32,
+            Emitter::Cylinder(cylinder) => cylinder.pdf(from, met),
+            Emitter::Cone(cone) => cone.pdf(from, met),
+            Emitter::Torus(torus) => torus.pdf(from, met),
+            Emitter::Mesh(mesh) => met.pdf_by_area(mesh.area()),
         }
     }
 
@@ -107,8 +121,13 @@ impl AreaLight {
         match &self.shape {
             Emitter::Sphere(sphere) => sphere.center,
             Emitter::Quad(quad) => quad.middle(),
-            Emitter::Triangles(triangles) => triangles.middle(),
-            Emitter::Surface(surface) => surface.middle(),
+            Emitter::Box(cuboid) => cuboid.middle(),
+            Emitter::Triangle(triangle) => triangle.middle(),
+            Emitter::Disk(disk) => disk.middle(),
+            Emitter::Cylinder(cylinder) => cylinder.middle(),
+            Emitter::Cone(cone) => cone.middle(),
+            Emitter::Torus(torus) => torus.middle(),
+            Emitter::Mesh(mesh) => mesh.middle(),
         }
     }
 }
@@ -122,4 +141,9 @@ pub struct Arrival {
     pub target: Vec3,
     /// One over the density of the direction, in sr; 0 where the light is seen from behind or from inside.
     pub factor: f32,
+}
+
+impl Arrival {
+    /// Where nothing is seen of a light.
+    pub const NOTHING: Self = Self { direction: Vec3::ZERO, target: Vec3::ZERO, factor: 0.0 };
 }

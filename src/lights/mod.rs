@@ -1,18 +1,28 @@
 //! Lights: where light comes from, as seen from a point.
 
+pub mod cuboid;
+pub mod directional;
+pub mod disk;
 pub mod emitter;
+mod linear;
+mod meridians;
+pub mod mesh;
 pub mod point;
 pub mod rectangle;
+pub mod round;
 mod row;
 mod set;
 pub mod sphere;
-pub mod surface;
-pub mod triangles;
+pub mod spot;
+pub mod torus;
+pub mod triangle;
 
-pub use emitter::{AreaLight, Part, area_lights};
+pub use directional::DirectionalLight;
+pub use emitter::{AreaLight, Part, area_light};
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
 pub use set::Lights;
+pub use spot::SpotLight;
 
 use crate::math::Vec3;
 
@@ -21,6 +31,10 @@ use crate::math::Vec3;
 pub enum Light {
     /// Without extent.
     Point(PointLight),
+    /// Without extent, into a cone.
+    Spot(SpotLight),
+    /// From beyond the scene.
+    Directional(DirectionalLight),
     /// A shape that emits.
     Area(AreaLight),
 }
@@ -46,6 +60,15 @@ pub enum End {
     At(Vec3),
     /// From beyond everything in the scene.
     Beyond,
+}
+
+/// Where the middle of a light is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Middle {
+    /// A point, in world coordinates.
+    At(Vec3),
+    /// Beyond everything, in this unit direction.
+    Towards(Vec3),
 }
 
 /// The part of the scene that a light is.
@@ -80,10 +103,10 @@ impl Met {
 
 impl Light {
     /// Density in sr⁻¹ with which its samples for the point `from` come from what a ray from there met; 0 where none does, and
-    /// of a light without extent, which no ray meets.
+    /// of lights that no ray meets.
     pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
         match self {
-            Self::Point(_) => 0.0,
+            Self::Point(_) | Self::Spot(_) | Self::Directional(_) => 0.0,
             Self::Area(light) => light.pdf(from, met),
         }
     }
@@ -92,6 +115,8 @@ impl Light {
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Point(light) => light.sample(point),
+            Self::Spot(light) => light.sample(point),
+            Self::Directional(light) => light.sample(u),
             Self::Area(light) => light.sample(point, u),
         }
     }
@@ -99,19 +124,26 @@ impl Light {
     /// Whether there is but one way.
     pub fn is_single(&self) -> bool {
         match self {
-            Self::Point(_) => true,
+            Self::Point(_) | Self::Spot(_) => true,
+            Self::Directional(light) => light.is_sharp(),
             Self::Area(_) => false,
         }
     }
 
     /// The middle of the light, and what a ray to there need not hit: the light itself.
-    pub fn middle(&self) -> (Vec3, Source) {
+    pub fn middle(&self) -> (Middle, Source) {
         match self {
-            Self::Point(light) => (light.position.as_vec3(), Source::Nothing),
-            Self::Area(light) => (light.middle().as_vec3(), Source::Object(light.object)),
+            Self::Point(PointLight { position, .. })
+            | Self::Spot(SpotLight { point: PointLight { position, .. }, .. }) => {
+                (Middle::At(position.as_vec3()), Source::Nothing)
+            }
+            Self::Directional(light) => (Middle::Towards(light.to_light), Source::Nothing),
+            Self::Area(light) => (Middle::At(light.middle().as_vec3()), Source::Object(light.object)),
         }
     }
 }
 
+#[cfg(test)]
+mod shown_tests;
 #[cfg(test)]
 mod tests;

@@ -60,7 +60,8 @@ impl QuadEmitter {
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
                 let spherical = rectangle.seen_from(to_corner, self.normal);
-                let offset = spherical.sample(u, rectangle, self.normal);
+                let [x, y] = spherical.sample(u);
+                let offset = rectangle.x * x + rectangle.y * y + self.normal * spherical.z;
                 let is_told = spherical.is_told();
                 let x = if is_told { offset.x } else { by_area.0.x };
                 let y = if is_told { offset.y } else { by_area.0.y };
@@ -105,7 +106,7 @@ impl QuadEmitter {
 /// A rectangle on the sphere of directions (Ureña, Fajardo, King, *An Area-Preserving Parametrization for Spherical
 /// Rectangles*, 2013): its sides along x and y, its plane at z < 0.
 #[derive(Clone, Copy, Debug)]
-struct SphericalRectangle {
+pub struct SphericalRectangle {
     x: [f32; 2],
     y: [f32; 2],
     z: f32,
@@ -121,21 +122,7 @@ impl Rectangle {
     #[inline(always)]
     fn seen_from(&self, to_corner: Vec3, normal: Vec3) -> SphericalRectangle {
         let (x0, y0, z) = (to_corner.dot(self.x), to_corner.dot(self.y), to_corner.dot(normal));
-        let (x1, y1) = (x0 + self.width, y0 + self.height);
-        let z2 = z * z;
-        let (lower, right) = (-towards(y0, z2), towards(x1, z2));
-        let (upper, left) = (towards(y1, z2), -towards(x0, z2));
-        let (g0, g1) = (angle(lower, right), angle(right, upper));
-        let (g2, g3) = (angle(upper, left), angle(left, lower));
-        SphericalRectangle {
-            x: [x0, x1],
-            y: [y0, y1],
-            z,
-            lower,
-            upper,
-            start: 2.0 * PI - g2 - g3,
-            solid_angle: (g0 + g1 - PI) + (g2 + g3 - PI),
-        }
+        SphericalRectangle::new([x0, x0 + self.width], [y0, y0 + self.height], z)
     }
 }
 
@@ -152,15 +139,69 @@ fn angle(a: f32, b: f32) -> f32 {
 }
 
 impl SphericalRectangle {
+    /// Between coordinates, in a plane at z.
+    #[inline(always)]
+    pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
+        let z2 = z * z;
+        let (lower, right) = (-towards(y0, z2), towards(x1, z2));
+        let (upper, left) = (towards(y1, z2), -towards(x0, z2));
+        let (g0, g1) = (angle(lower, right), angle(right, upper));
+        let (g2, g3) = (angle(upper, left), angle(left, lower));
+        Self {
+            x: [x0, x1],
+            y: [y0, y1],
+            z,
+            lower,
+            upper,
+            start: 2.0 * PI - g2 - g3,
+            solid_angle: (g0 + g1 - PI) + (g2 + g3 - PI),
+        }
+    }
+
+    /// One of three, which is chosen number by number.
+    #[inline(always)]
+    pub fn each(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
+        Self {
+            x: [of(three.map(|one| one.x[0])), of(three.map(|one| one.x[1]))],
+            y: [of(three.map(|one| one.y[0])), of(three.map(|one| one.y[1]))],
+            z: of(three.map(|one| one.z)),
+            lower: of(three.map(|one| one.lower)),
+            upper: of(three.map(|one| one.upper)),
+            start: of(three.map(|one| one.start)),
+            solid_angle: of(three.map(|one| one.solid_angle)),
+        }
+    }
+
+    /// In sr.
+    #[inline(always)]
+    pub fn solid_angle(&self) -> f32 {
+        self.solid_angle
+    }
+
+    /// Of its plane.
+    #[inline(always)]
+    pub fn z(&self) -> f32 {
+        self.z
+    }
+
+    /// A point uniform over the area, and that area as solid angle.
+    #[inline(always)]
+    pub fn by_area(&self, u: [f32; 2]) -> (f32, f32, f32) {
+        let (width, height) = (self.x[1] - self.x[0], self.y[1] - self.y[0]);
+        let (x, y) = (self.x[0] + width * u[0], self.y[0] + height * u[1]);
+        let nearness = 1.0 / (x * x + y * y + self.z * self.z).sqrt();
+        (x, y, -self.z * width * height * (nearness * nearness * nearness))
+    }
+
     /// Whether the solid angle has kept its digits.
     #[inline(always)]
-    fn is_told(&self) -> bool {
+    pub fn is_told(&self) -> bool {
         self.solid_angle >= LEAST_SOLID_ANGLE
     }
 
-    /// To a point uniform over the solid angle.
+    /// Coordinates of a point uniform over the solid angle.
     #[inline(always)]
-    fn sample(&self, u: [f32; 2], rectangle: &Rectangle, normal: Vec3) -> Vec3 {
+    pub fn sample(&self, u: [f32; 2]) -> [f32; 2] {
         // A slice of the sphere up to x takes its share of the solid angle.
         let (sin, cos) = sin_cos(u[0] * self.solid_angle + self.start);
         // sin² of the angle that the lower plane stands at.
@@ -176,6 +217,6 @@ impl SphericalRectangle {
         let h = h0 + u[1] * (h1 - h0);
         let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
         let y = (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1]);
-        rectangle.x * x + rectangle.y * y + normal * self.z
+        [x, y]
     }
 }

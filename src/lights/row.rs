@@ -105,6 +105,25 @@ impl Light {
                 }
                 return row;
             }
+            Self::Spot(light) => {
+                let mut row = LightRow::dark(Source::Nothing);
+                for i in 0..LANES {
+                    let (direction, weight) = light.arriving(lane(points, i));
+                    set_lane(&mut row.directions, i, direction);
+                    set_lane(&mut row.weights, i, weight);
+                    set_lane(&mut row.targets, i, light.point.position.as_vec3());
+                }
+                return row;
+            }
+            Self::Directional(light) => {
+                let mut row = LightRow::dark(Source::Nothing);
+                for i in 0..LANES {
+                    let (direction, weight) = light.arriving([u[0][i], u[1][i]]);
+                    set_lane(&mut row.directions, i, direction);
+                    set_lane(&mut row.weights, i, weight);
+                }
+                return LightRow { beyond: u32::MAX, ..row };
+            }
             Self::Area(light) => light,
         };
         let mut row = LightRow::dark(Source::Object(light.object));
@@ -125,7 +144,27 @@ impl Light {
                     set_lane(&mut row.weights, i, light.radiance * sample.factor);
                 }
             }
-            Emitter::Triangles(_) | Emitter::Surface(_) => {
+            Emitter::Disk(disk) => {
+                for i in 0..LANES {
+                    let sample = disk.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    set_lane(&mut row.directions, i, sample.direction);
+                    set_lane(&mut row.targets, i, sample.target);
+                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
+                }
+            }
+            Emitter::Box(cuboid) => {
+                for i in 0..LANES {
+                    let sample = cuboid.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    set_lane(&mut row.directions, i, sample.direction);
+                    set_lane(&mut row.targets, i, sample.target);
+                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
+                }
+            }
+            Emitter::Triangle(_)
+            | Emitter::Cylinder(_)
+            | Emitter::Cone(_)
+            | Emitter::Torus(_)
+            | Emitter::Mesh(_) => {
                 return LightRow::one_by_one(points, used, |i, point| {
                     light.sample(point, [u[0][i], u[1][i]])
                 });
@@ -142,7 +181,8 @@ impl Light {
     pub fn inverse_densities(&self, samples: &LightRow) -> Lanes {
         let mut inverse = [0.0; LANES];
         match self {
-            Self::Point(_) => {}
+            Self::Point(_) | Self::Spot(_) => {}
+            Self::Directional(light) => inverse = [light.inverse_density(); LANES],
             Self::Area(light) => {
                 let of_radiance = 1.0 / light.radiance.max_element();
                 for i in 0..LANES {

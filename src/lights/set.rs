@@ -3,13 +3,16 @@
 use std::collections::HashMap;
 
 use super::emitter::{Emitter, Part};
-use super::{AreaLight, Light};
+use super::{AreaLight, DirectionalLight, Light};
+use crate::math::Vec3;
 
 /// The lights of a scene, known by their index.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
     all: Vec<Light>,
     by_object: HashMap<u32, OfObject>,
+    /// Those that rays see which leave the scene.
+    suns: Vec<DirectionalLight>,
 }
 
 /// The lights that an object is.
@@ -27,7 +30,9 @@ impl Lights {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             match light {
-                Light::Point(_) => {}
+                Light::Point(_) | Light::Spot(_) => {}
+                Light::Directional(sun) if sun.is_sharp() => {}
+                Light::Directional(sun) => lights.suns.push(*sun),
                 Light::Area(light) => lights.note(number, light),
             }
         }
@@ -35,7 +40,7 @@ impl Lights {
     }
 
     fn note(&mut self, number: u32, light: &AreaLight) {
-        let mut note = |primitive: u32| {
+        let note = |primitive: u32| {
             let place = primitive as usize;
             match self.by_object.entry(light.object).or_insert(OfObject::Primitives(Vec::new())) {
                 OfObject::Whole(_) => {}
@@ -49,9 +54,18 @@ impl Lights {
             (Part::Whole, _) => {
                 self.by_object.insert(light.object, OfObject::Whole(number));
             }
-            (Part::Primitive(primitive), _) => note(primitive),
-            (Part::Listed, Emitter::Triangles(triangles)) => triangles.primitives().for_each(note),
-            (Part::Listed, Emitter::Sphere(_) | Emitter::Quad(_) | Emitter::Surface(_)) => {}
+            (Part::Listed, Emitter::Mesh(mesh)) => mesh.primitives().for_each(note),
+            (
+                Part::Listed,
+                Emitter::Sphere(_)
+                | Emitter::Quad(_)
+                | Emitter::Box(_)
+                | Emitter::Triangle(_)
+                | Emitter::Disk(_)
+                | Emitter::Cylinder(_)
+                | Emitter::Cone(_)
+                | Emitter::Torus(_),
+            ) => {}
         }
     }
 
@@ -65,14 +79,29 @@ impl Lights {
         self.all.is_empty()
     }
 
-    /// Whether a ray can meet any.
-    pub fn have_area(&self) -> bool {
-        !self.by_object.is_empty()
+    /// Whether a ray can find any.
+    pub fn can_be_found(&self) -> bool {
+        !self.by_object.is_empty() || self.are_beyond()
     }
 
     /// All with their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {
         (0..).zip(&self.all)
+    }
+
+    /// Whether a ray that leaves the scene may see light.
+    pub fn are_beyond(&self) -> bool {
+        !self.suns.is_empty()
+    }
+
+    /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by the density in
+    /// sr⁻¹ of its samples from there.
+    pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
+        let of_sun = |sun: &DirectionalLight| match sun.radiance(direction) {
+            Vec3::ZERO => Vec3::ZERO,
+            radiance => radiance * share(sun.pdf(direction)),
+        };
+        self.suns.iter().map(of_sun).sum()
     }
 
     /// The light that a primitive of an object is, with its number.

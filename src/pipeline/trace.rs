@@ -1,4 +1,4 @@
-//! Tiles on a pool: claimed one by one in the order given, handed back to the thread that asked.
+//! Tiles on a pool: claimed one by one in the order given, kept by the thread that made them, told to the thread that asked.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -43,21 +43,23 @@ pub(super) struct Job {
 }
 
 impl Tracer<'_> {
-    /// Do the jobs. `each` gets every result, in the order in which they end, and every now and then nothing; it
-    /// says whether to go on. Jobs that have begun are finished.
+    /// Do the jobs. `keep` takes the samples of every job that is finished, on the thread that made them, in whose cache they
+    /// are; `each` is then told on this one, in the order in which they end, and every now and then nothing; it says whether
+    /// to go on. Jobs that have begun are finished.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub(super) fn run(
+    pub(super) fn run<K: Send>(
         &self,
         jobs: &[Job],
-        mut each: impl FnMut(Option<(&Job, TileSamples, RayCounters)>) -> bool,
+        keep: impl Fn(&Job, TileSamples) -> K + Sync,
+        mut each: impl FnMut(Option<(&Job, K, RayCounters)>) -> bool,
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
         // Bounded, so that results do not pile up while a preview is made.
         let (sender, results) = mpsc::sync_channel(2 * threads);
-        let (next, stopped) = (&next, &stopped);
+        let (next, stopped, keep) = (&next, &stopped, &keep);
         self.pool.in_place_scope(move |scope| {
             for _ in 0..threads.min(jobs.len()) {
                 let sender = sender.clone();
@@ -72,14 +74,14 @@ impl Tracer<'_> {
                             job.samples.clone(),
                             self.token,
                         )
-                        && sender.send((job, samples, rays)).is_ok()
+                        && sender.send((job, keep(job, samples), rays)).is_ok()
                     {}
                 });
             }
             drop(sender);
             loop {
                 let go_on = match results.recv_timeout(TICK) {
-                    Ok((job, samples, rays)) => each(Some((job, samples, rays))),
+                    Ok(result) => each(Some(result)),
                     Err(RecvTimeoutError::Timeout) => each(None),
                     Err(RecvTimeoutError::Disconnected) => break,
                 };

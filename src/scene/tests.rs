@@ -76,7 +76,7 @@ fn numbers_and_colours_come_in_every_spelling() {
 }
 
 #[test]
-fn things_keep_the_order_of_the_file_and_shapes_that_of_their_kinds() {
+fn things_keep_the_order_of_the_file() {
     let scene = scene(
         "[materials.z]\n[materials.a]\n[materials.m]\n\
          [[box]]\ncenter=[0,0,0]\nmaterial='m'\n\
@@ -87,13 +87,13 @@ fn things_keep_the_order_of_the_file_and_shapes_that_of_their_kinds() {
     assert_eq!(scene.materials.iter().map(|one| one.name.as_str()).collect::<Vec<_>>(), ["z", "a", "m"]);
     assert_eq!(
         scene.objects.iter().map(|one| one.material).collect::<Vec<_>>(),
-        [Some(0), Some(1), Some(1), Some(2)]
+        [Some(2), Some(0), Some(1), Some(1)]
     );
     let sphere = |radius| Shape::Sphere { center: DVec3::ZERO, radius };
-    assert_eq!((&scene.objects[0].shape, &scene.objects[1].shape), (&sphere(2.0), &sphere(1.0)));
+    assert_eq!((&scene.objects[1].shape, &scene.objects[3].shape), (&sphere(2.0), &sphere(1.0)));
     assert_eq!(scene.objects[2].shape, Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y });
     let unit = Shape::Box { center: DVec3::ZERO, size: DVec3::ONE, rotate: DVec3::ZERO };
-    assert_eq!(scene.objects[3].shape, unit);
+    assert_eq!(scene.objects[0].shape, unit);
 }
 
 #[test]
@@ -108,14 +108,14 @@ fn round_shapes_and_their_defaults() {
     let (zero, up) = (DVec3::ZERO, DVec3::Y);
     let shapes: Vec<_> = scene.objects.into_iter().map(|object| object.shape).collect();
     let expected = [
-        Shape::Disk { center: zero, normal: up, radius: 0.5 },
-        Shape::Disk { center: DVec3::new(1.0, 2.0, 3.0), normal: DVec3::Z * 5.0, radius: 4.0 },
-        Shape::Cylinder { a: zero, b: up, radius: 0.5, caps: true },
-        Shape::Cylinder { a: zero, b: DVec3::Z * 2.0, radius: 3.0, caps: false },
-        Shape::Cone { base: zero, tip: up, radius: 0.5, cap: true },
-        Shape::Cone { base: up, tip: DVec3::Z, radius: 0.5, cap: false },
         Shape::Torus { center: zero, axis: up, radius: 0.5, tube: 0.125 },
         Shape::Torus { center: zero, axis: DVec3::X, radius: 2.0, tube: 0.5 },
+        Shape::Cone { base: zero, tip: up, radius: 0.5, cap: true },
+        Shape::Cone { base: up, tip: DVec3::Z, radius: 0.5, cap: false },
+        Shape::Cylinder { a: zero, b: up, radius: 0.5, caps: true },
+        Shape::Cylinder { a: zero, b: DVec3::Z * 2.0, radius: 3.0, caps: false },
+        Shape::Disk { center: zero, normal: up, radius: 0.5 },
+        Shape::Disk { center: DVec3::new(1.0, 2.0, 3.0), normal: DVec3::Z * 5.0, radius: 4.0 },
     ];
     assert_eq!(shapes, expected);
 }
@@ -345,6 +345,35 @@ fn glass_without_an_inside_is_warned_about() {
     ] {
         assert_eq!(warnings(closed, glass), [""; 0], "{closed}");
     }
+}
+
+#[test]
+fn objects_have_the_order_of_the_file_whatever_their_kinds() {
+    let radii = |text: &str| -> Vec<i64> {
+        let size = |object: &Object| match object.shape {
+            Shape::Sphere { radius, .. } | Shape::Disk { radius, .. } => radius,
+            Shape::Box { size, .. } => size.x,
+            ref other => panic!("{other:?}"),
+        };
+        scene(text).objects.iter().map(|object| size(object).round() as i64).collect()
+    };
+    let sphere = |n| format!("[[sphere]]\ncenter = [0, 0, 0]\nradius = {n}\nmaterial = 'a'\n");
+    let cube = |n| format!("[[box]]\ncenter = [0, 0, 0]\nsize = [{n}, 1, 1]\nmaterial = 'a'\n");
+    let disk = |n| format!("[[disk]]\nradius = {n}\nmaterial = 'a'\n");
+    let mixed = [disk(1), cube(2), sphere(3), cube(4), sphere(5), disk(6)].concat();
+    assert_eq!(radii(&format!("[materials.a]\n{mixed}")), [1, 2, 3, 4, 5, 6]);
+    // Tables in braces stand where their braces do.
+    let inline = |kind: &str, a: u32, b: u32| {
+        let [a, b] = [a, b].map(|n| format!("{{ center = [0, 0, 0], radius = {n}, material = 'a' }}"));
+        format!("{kind} = [{a},\n{b}]\n")
+    };
+    let braces = [
+        inline("disk", 1, 2),
+        inline("sphere", 3, 4),
+        "[materials]\na.diffuse = [1, 1, 1]\n".into(),
+        cube(5),
+    ];
+    assert_eq!(radii(&braces.concat()), [1, 2, 3, 4, 5]);
 }
 
 #[test]

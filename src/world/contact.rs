@@ -6,7 +6,7 @@
 
 use super::{Geometry, Hit, MeshInstance, Object, World};
 use crate::geometry::ray::offset_origin;
-use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Asked, Ray, Shape, ShapeHit, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
 /// The points on both sides of surfaces that touch.
@@ -121,8 +121,9 @@ impl World {
             return is_around.then_some(Near::Around { object, material });
         }
         let ray = sides.ray().to_f64();
+        let bare = Asked { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
-        let is_front = shape.surface(&ray, &own).normal.as_dvec3().dot(ray.direction) < 0.0;
+        let is_front = shape.asked_surface(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
         Some(Near::Surface { hit: Hit { shape: own, object }, material, is_front })
     }
 
@@ -189,6 +190,9 @@ impl Geometry {
     fn near_triangles(&self, at: &Meeting, triangles: &mut NearTriangles) -> Vec3 {
         triangles.clear();
         let mut error = at.surface.error;
+        if !self.has_meshes() {
+            return error;
+        }
         let near = self.near_box(at);
         self.near_objects(at, |id, object| {
             let Object::Mesh(mesh) = object else { return };

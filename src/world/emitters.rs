@@ -5,30 +5,49 @@ use std::sync::Arc;
 use super::lower::file_emission;
 use super::{Geometry, MeshInstance, Object};
 use crate::lights::emitter::{Emitter, Part};
-use crate::lights::triangles::TriangleEmitter;
-use crate::lights::{AreaLight, Light, Lights, PointLight, area_lights};
-use crate::math::Vec3;
+use crate::lights::mesh::MeshEmitter;
+use crate::lights::{AreaLight, DirectionalLight, Light, Lights, PointLight, SpotLight, area_light};
+use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
-/// The lights of a scene with these objects: those without extent first, then the objects that emit. A box is a light for each
-/// face, a mesh one for each of its emitting materials.
+/// The lights of a scene with these objects: those without extent first, then the objects that emit. A mesh is
+/// a light for each of its emitting materials.
 pub fn lights(scene: &Scene, geometry: &Geometry) -> Arc<Lights> {
-    let points = scene.lights.iter().map(|light| {
-        let description::PointLight { position, intensity, falloff } = *light;
-        Light::Point(PointLight { position: position - geometry.origin(), intensity, falloff })
-    });
+    let points = scene.lights.iter().map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let areas = objects.flat_map(|((id, object), described)| {
         let emission = described.material.map(|index| scene.materials[index].emission);
         match object {
             Object::Shape(shape) => match emission {
-                Some(radiance) if radiance != Vec3::ZERO => area_lights(shape, radiance, id),
+                Some(radiance) if radiance != Vec3::ZERO => {
+                    area_light(shape, radiance, id).into_iter().collect()
+                }
                 Some(_) | None => Vec::new(),
             },
             Object::Mesh(mesh) => mesh_lights(id, mesh, emission),
         }
     });
     Arc::new(Lights::new(points.chain(areas.map(Light::Area)).collect()))
+}
+
+/// A light that is no shape, in coordinates that start at `origin`.
+fn described(light: &description::Light, origin: DVec3) -> Light {
+    let point = |light: &description::PointLight| {
+        let description::PointLight { position, intensity, falloff } = *light;
+        PointLight { position: position - origin, intensity, falloff }
+    };
+    match light {
+        description::Light::Point(light) => Light::Point(point(light)),
+        description::Light::Spot(light) => {
+            let axis = (light.look_at - light.point.position).normalize().as_vec3();
+            let half_angle = (light.angle.to_radians() * 0.5) as f32;
+            Light::Spot(SpotLight { point: point(&light.point), axis, half_angle, blend: light.blend })
+        }
+        description::Light::Directional(light) => {
+            let to_light = -light.direction.normalize().as_vec3();
+            Light::Directional(DirectionalLight::new(to_light, light.irradiance, light.angle.to_radians()))
+        }
+    }
 }
 
 /// Of a mesh whose triangles all emit this; none: what their own materials emit.
@@ -42,7 +61,7 @@ fn mesh_lights(object: u32, mesh: &MeshInstance, emission: Option<Vec3>) -> Vec<
     };
     let light = |(own, radiance): (Option<u32>, Vec3)| {
         let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
-        let shape = Emitter::Triangles(TriangleEmitter::new(triangles)?);
+        let shape = Emitter::Mesh(MeshEmitter::new(triangles)?);
         Some(AreaLight { shape, radiance, object, part: Part::Listed })
     };
     emissions.into_iter().filter(|(_, radiance)| *radiance != Vec3::ZERO).filter_map(light).collect()

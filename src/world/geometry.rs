@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::accel::{Bvh, Instructions};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Asked, Ray, ShapeHit, SurfacePoint};
 use crate::lights::Source;
 use crate::math::DVec3;
 use crate::math::transform::Transform;
@@ -32,6 +32,7 @@ pub struct Geometry {
     unbounded: Vec<u32>,
     /// What the triangles of any mesh may be off, and room for the tests of rays there.
     mesh_rounding: f32,
+    has_meshes: bool,
     instructions: Instructions,
 }
 
@@ -62,7 +63,9 @@ impl Geometry {
         let (tree, instructions) = (Bvh::build(&boxes, token)?, Instructions::best());
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
         let mesh_rounding = rounding.fold(0.0, f32::max);
-        Ok(Self { objects, origin: DVec3::ZERO, tree, unbounded, mesh_rounding, instructions })
+        let has_meshes = objects.iter().any(|object| object.mesh().is_some());
+        let origin = DVec3::ZERO;
+        Ok(Self { objects, origin, tree, unbounded, mesh_rounding, has_meshes, instructions })
     }
 
     /// The objects, known by their index.
@@ -95,6 +98,11 @@ impl Geometry {
     pub(super) fn with(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions;
         self
+    }
+
+    /// Whether any of the objects is a mesh.
+    pub(super) fn has_meshes(&self) -> bool {
+        self.has_meshes
     }
 
     /// What packets are traced by.
@@ -139,7 +147,12 @@ impl Geometry {
 
     /// The surface at a hit of this ray.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        self.objects[hit.object as usize].surface(ray, &hit.shape)
+        self.asked_surface(ray, hit, Asked::ALL)
+    }
+
+    /// The surface at a hit of this ray, as far as it is asked for.
+    pub fn asked_surface(&self, ray: &Ray, hit: &Hit, asked: Asked) -> SurfacePoint {
+        self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 
     /// The material that a mesh file gives the triangle that was hit, by the file's own count.

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::mesh_tree::MeshTree;
 use crate::accel::{Ends, PACKET};
-use crate::geometry::rows::{HitRows, lanes};
+use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::surface::double_error;
-use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Asked, Ray, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -27,6 +27,11 @@ impl MeshInstance {
         if self.transform == Transform::IDENTITY {
             return *ray;
         }
+        self.moved(ray)
+    }
+
+    /// The same where the mesh is elsewhere.
+    fn moved(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
             direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
@@ -53,8 +58,8 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
-    /// The surface at a hit.
-    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    /// The surface at a hit, as far as it is asked for.
+    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
@@ -64,10 +69,19 @@ impl MeshInstance {
         let normal = self.transform.normal(ab.cross(ac)).normalize().as_vec3();
         let point = self.transform.point(local).as_vec3();
         let barycentric = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-        let (uv, dpdu, dpdv) = self.parametrisation(vertices, barycentric, ab, ac);
+        let (uv, dpdu, dpdv) = if asked.uv {
+            self.parametrisation(vertices, barycentric, ab, ac)
+        } else {
+            (Vec2::ZERO, Vec3::ZERO, Vec3::ZERO)
+        };
+        let shadow_point = if asked.shadow_point {
+            self.shadow_point(vertices, barycentric, normal, local, ray.direction)
+        } else {
+            point
+        };
         SurfacePoint {
             point,
-            shadow_point: self.shadow_point(vertices, barycentric, normal, local, ray.direction),
+            shadow_point,
             error: self.error(point, local, [a, b, c]),
             normal,
             shading_normal: self.shading_normal(vertices, barycentric, normal),
@@ -158,10 +172,9 @@ impl MeshInstance {
 
     /// The nearest hits of the rays in `met`; the others end below 0.
     #[inline(never)]
-    pub(super) fn closest_rows(&self, rays: &[Ray], met: u32, ends: &Ends, found: &mut HitRows) {
+    pub(super) fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         let mut hits = [None; PACKET];
-        let hits = &mut hits[..rays.len()];
-        self.in_mesh(rays, met, |local| self.tree.closest_packet(local, ends, hits));
+        self.tree.closest_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.put(lane, hit);
@@ -173,34 +186,31 @@ impl MeshInstance {
     #[inline(never)]
     pub(super) fn any_rows(
         &self,
-        rays: &[Ray],
+        rows: &RayRows,
         met: u32,
         ends: &Ends,
         except: Option<(u32, &[u32; PACKET])>,
     ) -> u32 {
+        let local = self.local_rays(rows, met);
+        let Some((own, numbers)) = except else { return self.tree.any_packet(&local, ends, &[]) };
         let mut parts = [None; PACKET];
-        let mut found = 0;
-        let except = match except {
-            Some((own, numbers)) => {
-                lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
-                &parts[..rays.len()]
-            }
-            None => &[],
-        };
-        self.in_mesh(rays, met, |local| found = self.tree.any_packet(local, ends, except));
-        found
+        lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
+        self.tree.any_packet(&local, ends, &parts)
     }
 
-    /// Those rays of a packet that are in `met` in a mesh's coordinates, the others as they are.
+    /// Those rays of a packet that are in `met` in the mesh's coordinates; in the place of each other one the first of them, which
+    /// goes the same way as they do.
     #[inline]
-    fn in_mesh(&self, rays: &[Ray], met: u32, trace: impl FnOnce(&[Ray])) {
-        if self.transform == Transform::IDENTITY {
-            return trace(rays);
+    fn local_rays(&self, rows: &RayRows, met: u32) -> [Ray; PACKET] {
+        let is_there = self.transform == Transform::IDENTITY;
+        let local = |lane: usize| {
+            let ray = rows.ray(lane % PACKET);
+            if is_there { ray } else { self.moved(&ray) }
+        };
+        let mut rays = [local(met.trailing_zeros() as usize); PACKET];
+        for lane in lanes(met & met.wrapping_sub(1)) {
+            rays[lane] = local(lane);
         }
-        let mut local = [rays[0]; PACKET];
-        for lane in lanes(met) {
-            local[lane] = self.local_ray(&rays[lane]);
-        }
-        trace(&local[..rays.len()]);
+        rays
     }
 }

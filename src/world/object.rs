@@ -3,7 +3,7 @@
 use super::mesh_instance::MeshInstance;
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows};
-use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Asked, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
 
 /// A thing that rays can hit.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ impl Object {
     pub fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         match self {
             Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found),
-            Self::Mesh(mesh) => mesh.closest_rows(rows.rays(), met, ends, found),
+            Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
         }
     }
 
@@ -52,15 +52,11 @@ impl Object {
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) => return mesh.any_rows(rows.rays(), met, ends, except),
+            Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
         let mut found = HitRows::none();
         shape.intersect_rows(rows, met, ends, &mut found);
-        let mut hit = 0;
-        for lane in 0..PACKET {
-            let bit = 1 << lane;
-            hit |= if found.t[lane].is_nan() { 0 } else { bit };
-        }
+        let mut hit = found.any();
         if let Some((own, parts)) = except {
             for (lane, &part) in parts.iter().enumerate() {
                 let bit = own & 1 << lane;
@@ -70,12 +66,12 @@ impl Object {
         hit
     }
 
-    /// The surface at a hit.
-    pub fn surface(&self, ray: &Ray, hit: &ShapeHit) -> SurfacePoint {
+    /// The surface at a hit, as far as it is asked for.
+    pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
-            Self::Shape(shape) => shape.surface(&ray, hit),
-            Self::Mesh(mesh) => mesh.surface(&ray, hit),
+            Self::Shape(shape) => shape.asked_surface(&ray, hit, asked),
+            Self::Mesh(mesh) => mesh.surface(&ray, hit, asked),
         }
     }
 

@@ -5,6 +5,7 @@ use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::lights::SourceRow;
+use crate::math::lanes::{TRUE, bits};
 
 impl Geometry {
     /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
@@ -108,23 +109,21 @@ impl AnyTest for Blockers<'_> {
 /// A bit for each ray whose light is a part of an object.
 #[inline(always)]
 fn in_part(sources: &SourceRow) -> u32 {
-    let mut bits = 0;
+    let mut in_part = [0; PACKET];
     for lane in 0..PACKET {
-        let bit = 1 << lane;
-        bits |= if sources.part[lane] == SourceRow::NONE { 0 } else { bit };
+        in_part[lane] = if sources.part[lane] == SourceRow::NONE { 0 } else { TRUE };
     }
-    bits
+    bits(in_part)
 }
 
 /// A bit for each ray whose light is an object or a part of it.
 #[inline(always)]
 fn own_bits(sources: &SourceRow, id: u32) -> u32 {
-    let mut bits = 0;
+    let mut own = [0; PACKET];
     for lane in 0..PACKET {
-        let bit = 1 << lane;
-        bits |= if sources.object[lane] == id { bit } else { 0 };
+        own[lane] = if sources.object[lane] == id { TRUE } else { 0 };
     }
-    bits
+    bits(own)
 }
 
 /// The ends of the rays of `met`; the others end below 0.

@@ -146,6 +146,20 @@ const BROKEN: &[(&str, &[Said])] = &[
         ],
     ),
     (
+        "lights",
+        &[
+            (8, 11, "the spotlight has no direction; `position` and `look_at` are the same point"),
+            (12, 9, "`angle` must be greater than 0 and less than 360; found 360"),
+            (13, 9, "`blend` must be between 0 and 1; found 1.5"),
+            (16, 8, r#"`type` cannot be "spott"; did you mean "spot"?"#),
+            (20, 13, "the light has no direction; `direction` is of length 0"),
+            (24, 9, "`angle` must be 0, or at least 1e-3"),
+            (25, 1, "unknown key `intensity` in [[light]]"),
+            (29, 9, "`angle` must be between 0 and 180; found 181"),
+            (32, 1, "unknown key `angle` in [[light]]"),
+        ],
+    ),
+    (
         "materials",
         &[
             (8, 10, r#"`filter` cannot be "linear"; did you mean "bilinear"?"#),
@@ -297,9 +311,7 @@ const BROKEN: &[(&str, &[Said])] = &[
         &[
             (5, 9, "`error` > 0 is not available in this version"),
             (13, 10, r#"filter "mipmap" is not available in this version; use one of "nearest", "bilinear""#),
-            (24, 8, r#"type "spot" is not available in this version; use "point""#),
-            (29, 8, r#"type "directional" is not available in this version; use "point""#),
-            (32, 2, "[environment] is not available in this version"),
+            (23, 2, "[environment] is not available in this version"),
         ],
     ),
     (

@@ -196,6 +196,27 @@ const TABLES: &[(&str, &[Key])] = &[
             ("falloff", "\"square\"", Default),
         ],
     ),
+    (
+        "[[light]]",
+        &[
+            ("type", "\"spot\"", Other),
+            ("position", "[0, 3, 0]", Default),
+            ("look_at", "[0, 0, 0]", Default),
+            ("intensity", "[10, 10, 10]", Default),
+            ("angle", "45", Default),
+            ("blend", "0.2", Default),
+            ("falloff", "\"square\"", Default),
+        ],
+    ),
+    (
+        "[[light]]",
+        &[
+            ("type", "\"directional\"", Other),
+            ("direction", "[0, -1, 0]", Default),
+            ("irradiance", "[1, 1, 1]", Default),
+            ("angle", "0", Default),
+        ],
+    ),
     ("[environment]", &[("color", "[0, 0, 0]", Default)]),
 ];
 
@@ -217,12 +238,12 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (folder, scene)
 }
 
-/// The whole example, with some keys left out.
-fn example(is_out: impl Fn(&str, &str) -> bool) -> String {
+/// The whole example, with some keys left out of the tables by their numbers.
+fn example(is_out: impl Fn(usize, &str) -> bool) -> String {
     let mut text = String::from(BUMPS);
-    for (header, keys) in TABLES {
+    for (table, (header, keys)) in TABLES.iter().enumerate() {
         text.push_str(&format!("{header}\n"));
-        for (key, value, _) in keys.iter().filter(|(key, ..)| !is_out(header, key)) {
+        for (key, value, _) in keys.iter().filter(|(key, ..)| !is_out(table, key)) {
             text.push_str(&format!("{key} = {value}\n"));
         }
     }
@@ -249,13 +270,13 @@ fn every_key_may_be_left_out_but_those_marked() {
     let whole = outcome(example(|_, _| false));
     assert_eq!(errors(&whole.diagnostics), [""; 0]);
     let whole = placeless(whole.scene.expect("a scene"));
-    for (header, keys) in TABLES {
+    for (table, (header, keys)) in TABLES.iter().enumerate() {
         for &(key, _, promise) in *keys {
             // A phong material has no `reflectance`; what is not the default is tried by itself below.
             if key == "type" && promise == Other {
                 continue;
             }
-            let without = outcome(example(|of, name| (of, name) == (*header, key)));
+            let without = outcome(example(|of, name| (of, name) == (table, key)));
             let said = errors(&without.diagnostics);
             match promise {
                 Required => assert_eq!(said, [format!("{header} needs `{key}`")], "{header} {key}"),
@@ -272,14 +293,14 @@ fn every_key_may_be_left_out_but_those_marked() {
 #[test]
 fn a_table_of_required_keys_alone_is_enough() {
     let (_folder, path) = folder();
-    let is_kept = |header: &str, key: &str| {
-        let (_, keys) = TABLES.iter().find(|(name, _)| *name == header).expect("a table");
+    let is_kept = |table: usize, key: &str| {
+        let (_, keys) = TABLES[table];
         keys.iter().any(|(name, _, promise)| *name == key && *promise == Required) || key == "type"
     };
-    let outcome = parse(example(|header, key| !is_kept(header, key)).into(), &path);
+    let outcome = parse(example(|table, key| !is_kept(table, key)).into(), &path);
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
     let scene = outcome.scene.expect("a scene");
-    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 1, 3));
+    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 3, 3));
     assert_eq!(scene.output, None);
 }
 

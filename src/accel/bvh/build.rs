@@ -1,6 +1,7 @@
 //! Building by binned surface area (Wald, *On fast Construction of SAH-based Bounding Volume Hierarchies*, 2007), the
 //! halves of large nodes in parallel. The tree is a function of the boxes alone, not of the threads.
 
+use super::crown::Crown;
 use super::{Bvh, Child, LEAF_SIZE, Node, SURFACE_AREA_LEVELS};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
@@ -16,8 +17,8 @@ const TRAVERSAL_COST: f32 = 1.0;
 
 /// A box with its id while the tree is built.
 #[derive(Clone, Copy)]
-struct Reference {
-    bounds: Aabb,
+pub(super) struct Reference {
+    pub(super) bounds: Aabb,
     id: u32,
 }
 
@@ -49,7 +50,8 @@ impl Bvh {
             .map(|(id, &bounds)| Reference { bounds, id: id as u32 })
             .collect();
         if references.is_empty() {
-            return Ok(Self { nodes: Vec::new(), order: Vec::new(), bounds: Aabb::EMPTY, depth: 0 });
+            let (nodes, order) = (Vec::new(), Vec::new());
+            return Ok(Self { nodes, order, bounds: Aabb::EMPTY, depth: 0, crown: Crown::EMPTY });
         }
         // A tree over n boxes has fewer than n nodes; every subtree writes into a stretch of its own.
         let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
@@ -59,7 +61,8 @@ impl Bvh {
             nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
-        Ok(Self { nodes, order, bounds: tree.bounds, depth: tree.depth.max(1) })
+        let crown = Crown::new((tree.bounds, tree.root), &nodes, &references);
+        Ok(Self { nodes, order, bounds: tree.bounds, depth: tree.depth.max(1), crown })
     }
 }
 

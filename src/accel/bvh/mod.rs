@@ -1,11 +1,13 @@
 //! A binary bounding volume hierarchy, built by binned surface area.
 
 mod build;
+mod crown;
 mod packet;
 mod traverse;
 
 use crate::geometry::Aabb;
 
+use crown::Crown;
 pub use packet::{AnyTest, ClosestTest};
 
 /// Most primitives in a leaf that the surface area heuristic may make.
@@ -30,6 +32,8 @@ pub struct Bvh {
     bounds: Aabb,
     /// Levels of nodes.
     depth: usize,
+    /// Where packets start.
+    crown: Crown,
 }
 
 /// Two children with their boxes, one cache line.

@@ -3,11 +3,15 @@
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
+use arrayvec::ArrayVec;
+
+use super::crown::Beam;
 use super::{Bvh, Child, DEEP_STACK};
 use crate::accel::{Ends, PACKET};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
-use crate::geometry::rows::{RayRows, Row};
+use crate::geometry::rows::{RayRows, Row, lanes};
+use crate::math::lanes::{TRUE, bits};
 
 /// Looks for the nearest hits of the rays of a packet.
 pub trait ClosestTest {
@@ -81,28 +85,24 @@ impl Stretches {
     }
 }
 
-/// A bit for each ray that meets the first box before its end, and for each that meets the second.
+/// A bit for each ray that meets a box before its end.
 #[inline(always)]
-fn met(left: &Stretches, right: &Stretches) -> [u32; 2] {
-    let mut met = 0_u32;
+fn met(stretches: &Stretches) -> u32 {
+    let mut met = [0; PACKET];
     for lane in 0..PACKET {
-        let (left_bit, right_bit) = (1 << lane, 1 << (lane + 16));
-        let in_left = if left.near[lane] <= left.far[lane] { left_bit } else { 0 };
-        let in_right = if right.near[lane] <= right.far[lane] { right_bit } else { 0 };
-        met |= in_left | in_right;
+        met[lane] = if stretches.near[lane] <= stretches.far[lane] { TRUE } else { 0 };
     }
-    [met & 0xffff, met >> 16]
+    bits(met)
 }
 
 /// A bit for each ray that is traced.
 #[inline(always)]
 fn traced(ends: &Ends) -> u32 {
-    let mut bits = 0;
-    for (lane, &end) in ends.iter().enumerate() {
-        let bit = 1 << lane;
-        bits |= if end >= 0.0 { bit } else { 0 };
+    let mut traced = [0; PACKET];
+    for lane in 0..PACKET {
+        traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };
     }
-    bits
+    bits(traced)
 }
 
 /// The end of the ray that goes on longest; below 0 where no ray is traced. Bits are ordered as in [`Stretches::first`].
@@ -116,7 +116,51 @@ fn greatest(ends: &Ends) -> f32 {
     f32::from_bits(greatest as u32)
 }
 
+/// What waits to be visited by a packet: where it is entered at the earliest, the rays that may meet it, and itself.
+type Waiting = ArrayVec<(f32, u32, Child), DEEP_STACK>;
+
+/// Subtrees of the crown that wait, the nearest last.
+struct Near {
+    entry: Row,
+    order: [u8; PACKET],
+    count: usize,
+}
+
+impl Near {
+    #[inline(always)]
+    fn sorted((met, entry): (u32, Row)) -> Self {
+        let mut near = Self { entry, order: [0; PACKET], count: 0 };
+        for i in lanes(met) {
+            let mut place = near.count;
+            while place > 0 && entry[usize::from(near.order[place - 1])] < entry[i] {
+                near.order[place] = near.order[place - 1];
+                place -= 1;
+            }
+            near.order[place] = i as u8;
+            near.count += 1;
+        }
+        near
+    }
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(f32, usize)> {
+        self.count = self.count.checked_sub(1)?;
+        let i = usize::from(self.order[self.count]);
+        Some((self.entry[i], i))
+    }
+}
+
 impl Bvh {
+    /// The subtrees of the crown that the rays of a packet may meet, and where they are entered at the earliest.
+    #[inline(always)]
+    fn crown_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32) -> (u32, Row) {
+        if traced == 0 {
+            return (0, [0.0; PACKET]);
+        }
+        let one = traced.trailing_zeros() as usize;
+        self.crown.met(&Beam::around(slabs.origin, &slabs.inverse, ends, one))
+    }
+
     /// Visit the leaves that any of at most [`PACKET`] rays may meet, near ones first; before them primitives that are not in
     /// the tree.
     #[inline(always)]
@@ -128,25 +172,28 @@ impl Bvh {
         closest: &mut impl ClosestTest,
     ) {
         let slabs = SlabPacket::new(rays);
-        let mut stack = [(0.0_f32, 0_u32, Child::NONE); DEEP_STACK];
-        let mut size = 0;
-        let (mut leaf, mut in_leaf) = (outside, traced(ends));
-        if !self.nodes.is_empty() {
-            stack[0] = (0.0, in_leaf, Child { first: 0, count: 0 });
-            size = 1;
-        }
+        let traced = traced(ends);
+        let (mut leaf, mut in_leaf) = (outside, traced);
+        let mut near = Near::sorted(self.crown_met(&slabs, ends, traced));
+        let mut stack = Waiting::new();
         loop {
             for &id in leaf {
                 closest.test(id, in_leaf, ends);
             }
             let end = greatest(ends) * SLAB_PAD;
             loop {
-                if size == 0 {
-                    return;
-                }
-                size -= 1;
-                let (entry, in_it, child) = stack[size];
-                if entry > end {
+                let (entry, in_it, child) = match stack.pop() {
+                    Some(waiting) => waiting,
+                    None => {
+                        let Some((entry, i)) = near.next() else { return };
+                        if entry > end {
+                            return;
+                        }
+                        let (bounds, child) = self.crown.subtree(i);
+                        (entry, met(&slabs.enter(&bounds, ends)), child)
+                    }
+                };
+                if entry > end || in_it == 0 {
                     continue;
                 }
                 if child.count > 0 {
@@ -156,20 +203,18 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
-                let [left_met, right_met] = met(&left, &right);
+                let (left_met, right_met) = (met(&left), met(&right));
                 if left_met == 0 || right_met == 0 {
                     let side = usize::from(left_met == 0);
-                    stack[size] = (0.0, left_met | right_met, node.child[side]);
-                    size += usize::from(left_met | right_met != 0);
+                    stack.push((0.0, left_met | right_met, node.child[side]));
                     continue;
                 }
                 let (left_first, right_first) = (left.first(), right.first());
                 let near = usize::from(right_first < left_first);
                 let children =
                     [(left_first, left_met, node.child[0]), (right_first, right_met, node.child[1])];
-                stack[size] = children[1 - near];
-                stack[size + 1] = children[near];
-                size += 2;
+                stack.push(children[1 - near]);
+                stack.push(children[near]);
             }
         }
     }
@@ -178,15 +223,11 @@ impl Bvh {
     #[inline(always)]
     pub fn any_packet(&self, rays: &RayRows, ends: &Ends, outside: &[u32], any: &mut impl AnyTest) -> u32 {
         let slabs = SlabPacket::new(rays);
-        let mut stack = [(0_u32, Child::NONE); DEEP_STACK];
-        let mut size = 0;
         let traced = traced(ends);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
-        if !self.nodes.is_empty() {
-            stack[0] = (traced, Child { first: 0, count: 0 });
-            size = 1;
-        }
+        let (mut subtrees, _) = self.crown_met(&slabs, ends, traced);
+        let mut stack = Waiting::new();
         loop {
             for &id in leaf {
                 let met = in_leaf & free;
@@ -195,24 +236,32 @@ impl Bvh {
                 }
             }
             loop {
-                if size == 0 || free == 0 {
-                    return traced & !free;
+                if free == 0 {
+                    return traced;
                 }
-                size -= 1;
-                let (in_it, child) = stack[size];
+                let (in_it, child) = match stack.pop() {
+                    Some((_, in_it, child)) => (in_it, child),
+                    None if subtrees == 0 => return traced & !free,
+                    None => {
+                        let (bounds, child) = self.crown.subtree(subtrees.trailing_zeros() as usize % PACKET);
+                        subtrees &= subtrees - 1;
+                        (met(&slabs.enter(&bounds, ends)), child)
+                    }
+                };
+                if in_it & free == 0 {
+                    continue;
+                }
                 if child.count > 0 {
                     leaf = &self.order[child.first as usize..(child.first + child.count) as usize];
                     in_leaf = in_it;
                     break;
                 }
-                if in_it & free == 0 {
-                    continue;
-                }
                 let node = &self.nodes[child.first as usize];
-                let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
-                for (met, child) in met(&left, &right).into_iter().zip(node.child) {
-                    stack[size] = (met & free, child);
-                    size += usize::from(met & free != 0);
+                for (bounds, child) in node.bounds.iter().zip(node.child) {
+                    let met = met(&slabs.enter(bounds, ends));
+                    if met & free != 0 {
+                        stack.push((0.0, met, child));
+                    }
                 }
             }
         }

@@ -1,7 +1,10 @@
 //! Ordered traversal for the closest hit, and for any.
 
+use arrayvec::ArrayVec;
+
 use super::{Bvh, Child, DEEP_STACK, SHALLOW_STACK};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
+use crate::geometry::rows::lanes;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
@@ -87,22 +90,18 @@ impl Bvh {
 
     /// Visit every box that has a point in common with another one.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
-        let mut stack = [Child::NONE; DEEP_STACK];
-        let mut size = usize::from(!self.nodes.is_empty());
-        while size > 0 {
-            size -= 1;
-            let current = stack[size];
-            if current.count > 0 {
-                let places = current.first as usize..(current.first + current.count) as usize;
-                self.order[places].iter().for_each(|&id| visit(id));
-                continue;
-            }
-            let node = &self.nodes[current.first as usize];
-            for side in 0..2 {
-                if node.bounds[side].meets(other) {
-                    stack[size] = node.child[side];
-                    size += 1;
+        let mut stack = ArrayVec::<Child, DEEP_STACK>::new();
+        for subtree in lanes(self.crown.meeting(other)) {
+            stack.push(self.crown.subtree(subtree).1);
+            while let Some(current) = stack.pop() {
+                if current.count > 0 {
+                    let places = current.first as usize..(current.first + current.count) as usize;
+                    self.order[places].iter().for_each(|&id| visit(id));
+                    continue;
                 }
+                let node = &self.nodes[current.first as usize];
+                let both = node.bounds.iter().zip(node.child);
+                stack.extend(both.filter(|(bounds, _)| bounds.meets(other)).map(|(_, child)| child));
             }
         }
     }

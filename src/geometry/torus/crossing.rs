@@ -79,6 +79,22 @@ impl UnitLine {
         None
     }
 
+    /// The places from `from`, which is outside, to `to` at which the line goes in: two at most, since it leaves as often.
+    pub(super) fn entries(&self, from: f64, to: f64) -> [Option<f64>; 2] {
+        /// From a crossing to where rounding does not doubt the side, but where the line grazes.
+        const BEYOND: f64 = 1e-10;
+        let mut found = [None; 2];
+        let mut start = from;
+        for crossing in 0..4 {
+            let Some(s) = self.first_crossing(start, to) else { break };
+            if crossing % 2 == 0 {
+                found[crossing / 2] = Some(s);
+            }
+            start = s + BEYOND;
+        }
+        found
+    }
+
     fn at(&self, s: f64) -> Sample {
         let p = self.foot + self.direction * s;
         let ring = p.truncate().length();

@@ -4,10 +4,10 @@ mod crossing;
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{self, AxialFrame, at_turn, exact_t, radial, turn};
-use super::surface::{self, SurfacePoint};
+use super::axial::{self, AxialFrame, Line, at_turn, exact_t, radial, turn};
+use super::surface::SurfacePoint;
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
-use crate::math::{DVec2, DVec3, Vec2, Vec3};
+use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
 
 /// Room around a torus in units of its tube, so that a line comes to it from outside for certain.
@@ -36,15 +36,7 @@ impl Torus {
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
-        let line = self.frame.line(ray);
-        let length = line.direction.length();
-        // Distances from here on are in units of the radius.
-        let unit = self.radius / length;
-        let unit_line = UnitLine {
-            foot: line.foot / self.radius,
-            direction: line.direction / length,
-            tube: self.tube / self.radius,
-        };
+        let (line, unit_line, unit) = self.unit_line(ray);
         let (enter, leave) = unit_line.surroundings(ROOM)?;
         let from = enter.max(-line.start / unit);
         if !(line.start + from * unit <= ray.t_max) {
@@ -52,6 +44,26 @@ impl Torus {
         }
         let t = line.start + unit_line.first_crossing(from, leave)? * unit;
         ray.accept(t).map(|_| (t, 0))
+    }
+
+    /// A ray's line, the same in units of the circle's radius, and that unit in the ray's.
+    fn unit_line(&self, ray: &RayF64) -> (Line, UnitLine, f64) {
+        let line = self.frame.line(ray);
+        let length = line.direction.length();
+        let unit_line = UnitLine {
+            foot: line.foot / self.radius,
+            direction: line.direction / length,
+            tube: self.tube / self.radius,
+        };
+        (line, unit_line, self.radius / length)
+    }
+
+    /// The t at which a ray from outside goes in: twice at most.
+    pub fn entries(&self, ray: &RayF64) -> [Option<f64>; 2] {
+        let (line, unit_line, unit) = self.unit_line(ray);
+        let Some((enter, leave)) = unit_line.surroundings(ROOM) else { return [None; 2] };
+        let from = enter.max(-line.start / unit);
+        unit_line.entries(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }
 
     /// The surface at a hit.
@@ -82,11 +94,6 @@ impl Torus {
         (self.frame.point((out * self.radius).extend(0.0) + normal * self.tube), self.frame.vector(normal))
     }
 
-    /// Bound on the error of a point of the surface.
-    pub fn error(&self, point: Vec3) -> Vec3 {
-        surface::error(point, self.reach())
-    }
-
     fn reach(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.radius + self.tube
     }
@@ -106,6 +113,16 @@ impl Torus {
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         let p = self.frame.local(point);
         DVec2::new(p.truncate().length() - self.radius, p.z).length() - self.tube
+    }
+
+    /// Unit vector along the axis.
+    pub fn axis(&self) -> DVec3 {
+        self.frame.axis()
+    }
+
+    /// Radius of the circle, and of the tube.
+    pub fn radii(&self) -> (f64, f64) {
+        (self.radius, self.tube)
     }
 
     /// Centre of area.
@@ -139,6 +156,7 @@ impl Torus {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
+    use crate::math::Vec3;
 
     /// About y, from 1.5 to 2.5.
     fn ring() -> Torus {
@@ -162,6 +180,23 @@ mod tests {
         ] {
             assert_eq!(met([x, 0.0, 0.0], Vec3::X), expected, "from {x}");
         }
+    }
+
+    #[test]
+    fn a_line_goes_in_once_for_each_time_that_it_leaves() {
+        let entries = |origin: Vec3, direction: Vec3| {
+            ring().entries(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
+        };
+        let x = |x: f32| Vec3::new(x, 0.0, 0.0);
+        assert_eq!(entries(x(-9.0), Vec3::X), [Some(6.5), Some(10.5)]);
+        assert_eq!(entries(x(0.0), Vec3::X), [Some(1.5), None]);
+        assert_eq!(entries(x(-9.0), Vec3::NEG_X), [None; 2]);
+        assert_eq!(entries(Vec3::new(2.0, 9.0, 0.0), Vec3::NEG_Y), [Some(8.5), None]);
+        // Beside the axis, through the tube on both sides of the hole, and through its outer part alone.
+        let [first, second] = entries(Vec3::new(-9.0, 0.0, 1.0), Vec3::X);
+        assert!((first.expect("in") - (9.0 - 5.25_f32.sqrt())).abs() < 1e-5);
+        assert!((second.expect("in again") - (9.0 + 1.25_f32.sqrt())).abs() < 1e-5);
+        assert_eq!(entries(Vec3::new(-9.0, 0.0, 1.8), Vec3::X)[1], None);
     }
 
     #[test]

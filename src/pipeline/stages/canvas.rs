@@ -1,5 +1,7 @@
 //! A film with what it is of, and how far it is.
 
+use std::sync::Arc;
+
 use super::super::plan::Plan;
 use super::super::trace::Job;
 use crate::film::{Film, FilmError, Previewer, RadianceImage};
@@ -9,7 +11,7 @@ use crate::scene::fingerprint::Key;
 #[derive(Debug)]
 pub(in crate::pipeline) struct Canvas {
     pub(in crate::pipeline) key: Key,
-    pub(in crate::pipeline) film: Film,
+    pub(in crate::pipeline) film: Arc<Film>,
     /// Samples that each tile has.
     pub(super) done: Vec<u32>,
     /// A first picture at the size of the preview, shown where there are no samples yet.
@@ -29,7 +31,7 @@ impl Canvas {
         let film =
             Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?;
         let done = vec![0; film.tile_count()];
-        Ok(Self { key, film, done, base: None, previewer: None, ended_by: None })
+        Ok(Self { key, film: Arc::new(film), done, base: None, previewer: None, ended_by: None })
     }
 
     /// Whether every pixel has this many samples.

@@ -4,6 +4,7 @@
 //! and both give the bits of an uninterrupted one, because every sample is a function of its pixel and number and
 //! every pixel's sum has the order of its samples.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::super::pace::{Clock, Pace};
@@ -15,7 +16,7 @@ use super::canvas::Canvas;
 use super::films::Films;
 use super::preview::Screen;
 use super::{Staged, Stop};
-use crate::film::{RadianceImage, Rect};
+use crate::film::{RadianceImage, Rect, TileSamples};
 use crate::integrators::{RayCounters, RenderSettings};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
@@ -145,9 +146,10 @@ impl<'a> Painter<'a> {
     fn pass(&mut self, target: u32) -> Result<(), Stop> {
         let jobs = self.canvas.jobs(target);
         let tracer = self.rendering.tracer;
-        tracer.run(&jobs, |result| {
-            if let Some((job, samples, rays)) = result {
-                self.canvas.film.add(job.tile, &samples);
+        let film = Arc::clone(&self.canvas.film);
+        let keep = |job: &Job, samples: TileSamples| film.add(job.tile, &samples);
+        tracer.run(&jobs, keep, |result| {
+            if let Some((job, (), rays)) = result {
                 self.canvas.done[job.tile] = job.samples.end;
                 self.units += job.rect.area() as u64 * job.samples.len() as u64;
                 self.rays += rays;
@@ -243,12 +245,16 @@ impl<'a> Painter<'a> {
         let rect = plan.crop.map_or(whole, |rect| scale(rect, (full_width, full_height), (width, height)));
         let tracer = Tracer { settings: &settings, ..self.rendering.tracer };
         let mut base = RadianceImage::black(width, height);
-        tracer.run(&coarse_jobs(rect), |result| {
-            if let Some((job, samples, _)) = result {
-                base.put(job.rect, &samples.radiance);
-            }
-            true
-        })?;
+        tracer.run(
+            &coarse_jobs(rect),
+            |_, samples| samples,
+            |result| {
+                if let Some((job, samples, _)) = result {
+                    base.put(job.rect, &samples.radiance);
+                }
+                true
+            },
+        )?;
         self.canvas.base = Some(base.resized(shown.0, shown.1));
         self.show();
         Ok(())

@@ -4,6 +4,17 @@ use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 pub use crate::lights::point::Falloff;
 use crate::math::{DVec3, Vec3};
 
+/// A light that is no shape.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Light {
+    /// Without extent.
+    Point(PointLight),
+    /// Without extent, into a cone.
+    Spot(SpotLight),
+    /// From beyond the scene.
+    Directional(DirectionalLight),
+}
+
 /// A light without extent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointLight {
@@ -13,6 +24,45 @@ pub struct PointLight {
     pub intensity: Vec3,
     /// How it weakens with distance.
     pub falloff: Falloff,
+}
+
+/// A light without extent that shines into a cone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpotLight {
+    /// The light on its axis.
+    pub point: PointLight,
+    /// A point on its axis, not the light's own.
+    pub look_at: DVec3,
+    /// The whole cone, in degrees, in (0, 360).
+    pub angle: f64,
+    /// The outer part of the half angle over which it fades, in [0, 1].
+    pub blend: f32,
+}
+
+/// Light from far away.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DirectionalLight {
+    /// The way that it travels, of any length but 0.
+    pub direction: DVec3,
+    /// On a surface that faces it.
+    pub irradiance: Vec3,
+    /// Apparent diameter in degrees, up to 180; 0: no extent.
+    pub angle: f64,
+}
+
+impl Fingerprinted for Light {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        match self {
+            Self::Point(light) => light.add_to(key.text("point"), of),
+            Self::Spot(SpotLight { point, look_at, angle, blend }) => {
+                point.add_to(key.text("spot"), of);
+                key.dvec3(*look_at).f64(*angle).f32(*blend);
+            }
+            Self::Directional(DirectionalLight { direction, irradiance, angle }) => {
+                key.text("directional").dvec3(*direction).vec3(*irradiance).f64(*angle);
+            }
+        }
+    }
 }
 
 impl Fingerprinted for PointLight {

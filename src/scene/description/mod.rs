@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 pub use camera::Camera;
-pub use light::{Falloff, PointLight};
+pub use light::{DirectionalLight, Falloff, Light, PointLight, SpotLight};
 pub use material::{
     ColorSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter, TextureUse, Wrap,
 };
@@ -40,7 +40,7 @@ pub struct Scene {
     /// Every shape, in the order of the file within its kind.
     pub objects: Vec<Object>,
     /// `[[light]]`, in the order of the file.
-    pub lights: Vec<PointLight>,
+    pub lights: Vec<Light>,
 }
 
 /// A value with its place in the scene file.

@@ -4,6 +4,7 @@ use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{ColorSource, Falloff, Integrator, MaterialKind, Shape};
 
+use super::distant::sun;
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{lambert, mean_and_error, v};
 
@@ -209,6 +210,13 @@ fn lamps_over_a_floor(diffuse: f32, specular: f32, shininess: f32) -> Vec<(&'sta
             "beside a point",
             floor().sphere(at, 0.4, emitter(2.0)).point_light(v(0.1, 0.6, 0.0), 0.3, Falloff::Square),
         ),
+        ("sun", sun(floor(), -at, 2.0, 40.0)),
+        ("narrow sun", sun(floor(), v(-1.0, -1.05, 0.0), 2.0, 3.0)),
+        (
+            "sharp sun beside a sphere",
+            sun(floor().sphere(at, 0.4, emitter(2.0)), v(1.0, -2.0, 0.0), 0.5, 0.0),
+        ),
+        ("half a sun", sun(floor().sphere(at * 3.0, 1.0, matte(0.0)), -at, 2.0, 60.0)),
     ]
 }
 
@@ -242,6 +250,18 @@ fn a_sharp_highlight_of_a_lamp_has_little_noise() {
         let lit = floor.quad(corners[0], u, w, emitter(3.0)).seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
         let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &corners);
         let exact = 3.0 * (diffuse + 0.5 * 0.5_f64.sqrt());
+        // A disc in the sky of the same radiance, whose irradiance at normal incidence is π·sin² of half its angle.
+        let disc = std::f64::consts::PI * 20_f64.to_radians().sin().powi(2);
+        let floor =
+            scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.2, 0.5, shininess, 0.0));
+        let sunny = sun(floor, v(-1.0, -1.0, 0.0), (3.0 * disc) as f32, 40.0);
+        let sunny = sunny.seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
+        let exact_sunny = 3.0 * (0.2 / std::f64::consts::PI * disc + 0.5) * 0.5_f64.sqrt();
+        for (what, build) in [("whitted", sunny.clone()), ("path", by_paths(sunny, 1))] {
+            let values = build.values(256, 16);
+            let worst = values.iter().map(|value| (value / exact_sunny - 1.0).abs()).fold(0.0, f64::max);
+            assert!(worst < 0.02, "sun, {what}, α {shininess}: {worst}");
+        }
         for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit.clone(), 1))] {
             for value in build.values(256, 16) {
                 assert!((value / exact - 1.0).abs() < 0.02, "{what}, α {shininess}: {value} is not {exact}");

@@ -1,5 +1,6 @@
 //! Hard shadows: one ray to the middle decides; what arrives is what arrives without shadows and with soft ones.
 
+use glimt::integrators::render_tile;
 use glimt::math::DVec3;
 use glimt::scene::description::{Falloff, Shadows, Shape};
 
@@ -78,4 +79,46 @@ fn the_ray_to_the_middle_decides() {
     assert_eq!(blocked(-0.2), 0.0);
     assert_eq!(blocked(0.05), free);
     assert_eq!(scene().value(), 0.0);
+}
+
+/// Shadow rays of one sample.
+fn rays(build: &Build) -> u64 {
+    let whole = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
+    let token = glimt::control::CancelToken::new();
+    render_tile(&build.world(), &build.settings(1), whole, 0..1, &token)
+        .expect("nobody cancels")
+        .1
+        .shadow_rays
+}
+
+#[test]
+fn one_ray_to_the_middle_decides_for_a_box_and_for_a_mesh() {
+    // Three faces of the cube are seen from the receiver beside it.
+    let center = v(0.5, 1.5, 0.4);
+    let cube = |build: Build| {
+        build.shape(Shape::Box { center, size: v(0.8, 0.8, 0.8), rotate: DVec3::ZERO }, emitter(1.0))
+    };
+    let mesh = |build: Build| build.mesh(boxes(&[(center, 0.8, 0)]), AS_IT_IS, emitter(1.0));
+    let screen = |at: DVec3| {
+        let half = v(0.05, 0.0, 0.05);
+        let sides = [v(0.1, 0.0, 0.0), v(0.0, 0.0, 0.1)];
+        receiver(DVec3::ZERO, 0.8).quad(at - half, sides[0], sides[1], matte(0.0))
+    };
+    for (name, lamp) in [("box", &cube as &dyn Fn(Build) -> Build), ("mesh", &mesh)] {
+        let hard = |build: Build| lamp(build).shadows(Shadows::Hard, 16);
+        let free = hard(receiver(DVec3::ZERO, 0.8));
+        assert_eq!(rays(&free), 1, "{name}");
+        let value = |build: Build| {
+            let (mean, _) = mean_and_error(&build.values(64, 16));
+            mean
+        };
+        let all = value(free);
+        assert!(all > 0.0, "{name}");
+        // On the way to the middle, and on that to the middle of the lower face.
+        assert_eq!(value(hard(screen(center * 0.5))), 0.0, "{name}");
+        let beside = value(hard(screen((center - v(0.0, 0.4, 0.0)) * 0.5)));
+        assert_eq!(beside, all, "{name}");
+        let soft = value(lamp(receiver(DVec3::ZERO, 0.8)).shadows(Shadows::Soft, 16));
+        assert!((soft / all - 1.0).abs() < 0.02, "{name}: {soft}, hard {all}");
+    }
 }

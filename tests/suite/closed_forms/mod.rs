@@ -2,6 +2,7 @@
 
 mod camera;
 mod direct;
+mod distant;
 mod facets;
 mod far;
 mod film;

@@ -11,8 +11,9 @@ use glimt::integrators::{RenderSettings, View, render_tile};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Located, Material, MaterialKind, Mesh, Object,
-    Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
+    Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Light, Located, Material, MaterialKind, Mesh,
+    Object, Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap,
+    Wrap,
 };
 use glimt::world::{Geometry, MeshTree, Parts, World, lights, origin, textures_needed};
 
@@ -109,7 +110,7 @@ impl Build {
 
     pub fn point_light(self, position: DVec3, intensity: f32, falloff: Falloff) -> Self {
         let light = PointLight { position, intensity: Vec3::splat(intensity), falloff };
-        self.with(|scene| scene.lights.push(light))
+        self.with(|scene| scene.lights.push(Light::Point(light)))
     }
 
     pub fn shape(mut self, shape: Shape, material: Material) -> Self {

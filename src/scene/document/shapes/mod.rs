@@ -25,7 +25,7 @@ use mesh::MeshFiles;
 /// What reads the table of a shape; only meshes touch the list of files.
 type Reader = fn(&Table<'_>, &mut MeshFiles) -> Option<Shape>;
 
-/// The kinds in the order in which the description lists them.
+/// The kinds; the description has the shapes in the order of the file.
 const KINDS: [(&str, Reader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
@@ -57,6 +57,7 @@ pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Objec
             }
         }
     }
+    objects.sort_by_key(|object| object.span.start);
     (is_right.then_some(objects), files.into_list())
 }
 
@@ -117,10 +118,10 @@ fn warn_about_no_inside(table: &Table<'_>, shape: &Shape, span: Option<Range<usi
     });
 }
 
-/// A direction of any length but 0, upwards by default; `what` is wrong without it.
-fn direction(table: &Table<'_>, name: &'static str, what: &str) -> Option<DVec3> {
+/// A direction of any length but 0; `what` is wrong without it.
+pub(super) fn direction(table: &Table<'_>, name: &'static str, what: &str, default: DVec3) -> Option<DVec3> {
     let key = table.optional(name);
-    let direction = key.vector_or(Limits::Any, DVec3::Y)?;
+    let direction = key.vector_or(Limits::Any, default)?;
     if !key.is_long(direction) {
         return None;
     }

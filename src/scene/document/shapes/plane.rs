@@ -8,5 +8,5 @@ use crate::math::DVec3;
 
 pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
     let point = table.optional("point").vector(Limits::Any).unwrap_or(DVec3::ZERO);
-    Some(Shape::Plane { point, normal: direction(table, "normal", "plane")? })
+    Some(Shape::Plane { point, normal: direction(table, "normal", "plane", DVec3::Y)? })
 }

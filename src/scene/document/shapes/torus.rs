@@ -11,7 +11,7 @@ use crate::math::DVec3;
 /// that is the front of both.
 pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
     let center = table.optional("center").vector(Limits::Any).unwrap_or(DVec3::ZERO);
-    let axis = direction(table, "axis", "torus");
+    let axis = direction(table, "axis", "torus", DVec3::Y);
     let radius = length(table, "radius", 0.5);
     let tube = length(table, "tube", radius.unwrap_or(0.5) / 4.0);
     let (radius, tube) = (radius?, tube?);

@@ -1,4 +1,4 @@
-//! Emissive triangles: single ones and those of a mesh, by area.
+//! Emissive triangles of a mesh, by area.
 
 use super::{End, LightSample, Source};
 use crate::math::{DVec3, Vec2, Vec3};
@@ -7,7 +7,7 @@ use crate::sampling::warp;
 
 /// Triangles that shine along (b − a) × (c − a).
 #[derive(Clone, Debug, PartialEq)]
-pub struct TriangleEmitter {
+pub struct MeshEmitter {
     /// Corners in world coordinates, with the number each has in its object.
     triangles: Vec<([DVec3; 3], u32)>,
     by_area: Discrete,
@@ -17,7 +17,7 @@ pub struct TriangleEmitter {
     vector_area: DVec3,
 }
 
-impl TriangleEmitter {
+impl MeshEmitter {
     /// From corners with their primitive numbers; none where there is no area.
     pub fn new(triangles: Vec<([DVec3; 3], u32)>) -> Option<Self> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;

@@ -1,0 +1,280 @@
+//! The upper part of a tree as one row of boxes. What all rays of a packet miss is left out by one test of all boxes against the
+//! intervals that the rays' coordinates lie in: rounding is monotonic, so that what bounds the numbers of
+//! [`SlabRay::enter`] before it bounds them after it, and no box is missed that any ray meets alone.
+//!
+//! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
+
+use super::build::Reference;
+use super::{Bvh, Child, Node};
+use crate::accel::{Ends, PACKET};
+use crate::geometry::Aabb;
+use crate::geometry::aabb::SLAB_PAD;
+use crate::geometry::rows::Row;
+use crate::math::Vec3;
+use crate::math::lanes::{TRUE, bits};
+
+/// Up to [`PACKET`] subtrees that hold all primitives, in place of the upper levels; a scene of few objects is all in it.
+#[derive(Clone, Debug)]
+pub(super) struct Crown {
+    min: [Row; 3],
+    max: [Row; 3],
+    child: [Child; PACKET],
+    /// A bit for each subtree.
+    used: u32,
+}
+
+impl Crown {
+    /// Of no tree.
+    pub(super) const EMPTY: Self = Self {
+        min: [[f32::INFINITY; PACKET]; 3],
+        max: [[f32::NEG_INFINITY; PACKET]; 3],
+        child: [Child::NONE; PACKET],
+        used: 0,
+    };
+
+    /// Open the largest nodes, then the largest leaves, as long as there is room.
+    pub(super) fn new(root: (Aabb, Child), nodes: &[Node], references: &[Reference]) -> Self {
+        let mut open = vec![root];
+        while let Some(place) = largest(&open, |child, room| child.count == 0 && room > 0) {
+            let node = &nodes[open.swap_remove(place).1.first as usize];
+            let both = node.bounds.into_iter().zip(node.child);
+            open.extend(both.filter(|(bounds, _)| !bounds.is_empty()));
+        }
+        while let Some(place) =
+            largest(&open, |child, room| child.count > 1 && room + 1 >= child.count as usize)
+        {
+            let Child { first, count } = open.swap_remove(place).1;
+            let each = |first: u32| (references[first as usize].bounds, Child { first, count: 1 });
+            open.extend((first..first + count).map(each));
+        }
+        let mut crown = Self::EMPTY;
+        for (i, (bounds, child)) in open.into_iter().enumerate() {
+            for axis in 0..3 {
+                (crown.min[axis][i], crown.max[axis][i]) = (bounds.min[axis], bounds.max[axis]);
+            }
+            crown.child[i] = child;
+            crown.used |= 1 << i;
+        }
+        crown
+    }
+
+    /// One of the subtrees and its box.
+    #[inline(always)]
+    pub(super) fn subtree(&self, i: usize) -> (Aabb, Child) {
+        let corner = |rows: &[Row; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
+        (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
+    }
+
+    /// A bit for each subtree whose box has a point in common with another one.
+    pub(super) fn meeting(&self, other: &Aabb) -> u32 {
+        let mut met = [TRUE; PACKET];
+        for axis in 0..3 {
+            let (least, greatest) = (other.min[axis], other.max[axis]);
+            for i in 0..PACKET {
+                let meets = (self.min[axis][i] <= greatest) & (least <= self.max[axis][i]);
+                met[i] = if meets { met[i] } else { 0 };
+            }
+        }
+        bits(met) & self.used
+    }
+
+    /// A bit for each subtree that the rays of a beam may meet, and where they enter it at the earliest.
+    #[inline(always)]
+    pub(super) fn met(&self, beam: &Beam) -> (u32, Row) {
+        let (mut near, mut far) = ([0.0_f32; PACKET], [beam.end * SLAB_PAD; PACKET]);
+        for axis in 0..3 {
+            let [low, high] = beam.inverse[axis];
+            let is_up = (low > 0.0) & (high < f32::INFINITY);
+            let is_down = (high < 0.0) & (low > f32::NEG_INFINITY);
+            if !(is_up | is_down) {
+                continue;
+            }
+            let (first, last) =
+                if is_up { (&self.min[axis], &self.max[axis]) } else { (&self.max[axis], &self.min[axis]) };
+            let [start, end] = beam.origin[axis];
+            let (start, end) = if is_up { (start, end) } else { (end, start) };
+            for i in 0..PACKET {
+                let (to_first, to_last) = (first[i] - end, last[i] - start);
+                let (a, b) = (to_first * low, to_first * high);
+                let entry = if a < b { a } else { b };
+                let (a, b) = (to_last * low, to_last * high);
+                let exit = (if a > b { a } else { b }) * SLAB_PAD;
+                near[i] = if entry > near[i] { entry } else { near[i] };
+                far[i] = if exit < far[i] { exit } else { far[i] };
+            }
+        }
+        let mut met = [0; PACKET];
+        for i in 0..PACKET {
+            met[i] = if near[i] <= far[i] { TRUE } else { 0 };
+        }
+        (bits(met) & self.used, near)
+    }
+}
+
+/// The largest box whose subtree may be opened, told also how many places more there are.
+fn largest(open: &[(Aabb, Child)], may_open: impl Fn(Child, usize) -> bool) -> Option<usize> {
+    let room = PACKET - open.len();
+    let each = open.iter().enumerate().filter(|(_, (_, child))| may_open(*child, room));
+    each.max_by(|(_, (a, _)), (_, (b, _))| a.half_area().total_cmp(&b.half_area())).map(|(place, _)| place)
+}
+
+/// The intervals that rays lie in.
+pub(super) struct Beam {
+    /// Least and greatest coordinates of where they start.
+    origin: [[f32; 2]; 3],
+    /// Of the inverses of where they go.
+    inverse: [[f32; 2]; 3],
+    /// The end of the ray that goes on longest.
+    end: f32,
+}
+
+impl Beam {
+    /// Around the rays of a packet that have an end, one of which is this.
+    #[inline(always)]
+    pub(super) fn around(origin: &[Row; 3], inverse: &[Row; 3], ends: &Ends, one: usize) -> Self {
+        let [x, y, z] = origin;
+        let origin = [around(x, ends, one), around(y, ends, one), around(z, ends, one)];
+        let [x, y, z] = inverse;
+        let inverse = [around(x, ends, one), around(y, ends, one), around(z, ends, one)];
+        Self { origin, inverse, end: greatest(ends) }
+    }
+}
+
+/// The least and the greatest number of rays that have an end.
+#[inline(always)]
+fn around(row: &Row, ends: &Ends, one: usize) -> [f32; 2] {
+    let (mut traced, other) = (*row, row[one % PACKET]);
+    for i in 0..PACKET {
+        traced[i] = if ends[i] >= 0.0 { traced[i] } else { other };
+    }
+    [least(&traced), greatest(&traced)]
+}
+
+/// By halves, which become vector instructions.
+macro_rules! folded {
+    ($row:expr, $better:tt) => {{
+        let mut row = *$row;
+        for i in 0..8 {
+            row[i] = if row[i + 8] $better row[i] { row[i + 8] } else { row[i] };
+        }
+        for i in 0..4 {
+            row[i] = if row[i + 4] $better row[i] { row[i + 4] } else { row[i] };
+        }
+        for i in 0..2 {
+            row[i] = if row[i + 2] $better row[i] { row[i + 2] } else { row[i] };
+        }
+        if row[1] $better row[0] { row[1] } else { row[0] }
+    }};
+}
+
+#[inline(always)]
+fn least(row: &Row) -> f32 {
+    folded!(row, <)
+}
+
+#[inline(always)]
+fn greatest(row: &Row) -> f32 {
+    folded!(row, >)
+}
+
+impl Bvh {
+    /// Whether the crown holds all primitives one by one.
+    #[cfg(test)]
+    pub(super) fn is_flat(&self) -> bool {
+        self.crown
+            .child
+            .iter()
+            .enumerate()
+            .all(|(i, child)| self.crown.used >> i & 1 == 0 || child.count == 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::{AnyTest, ClosestTest};
+    use crate::control::CancelToken;
+    use crate::geometry::Ray;
+    use crate::geometry::aabb::SlabRay;
+    use crate::geometry::rows::{RayRows, lanes};
+
+    /// Random numbers in [−1, 1).
+    fn random(seed: u64) -> impl FnMut() -> f32 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
+        }
+    }
+
+    /// Notes which primitives are tested, and for which rays.
+    struct Seen(Vec<u32>);
+
+    impl ClosestTest for Seen {
+        fn test(&mut self, id: u32, met: u32, _: &mut Ends) {
+            self.0[id as usize] |= met;
+        }
+    }
+
+    impl AnyTest for Seen {
+        fn test(&mut self, id: u32, met: u32, _: &Ends) -> u32 {
+            self.0[id as usize] |= met;
+            0
+        }
+    }
+
+    #[test]
+    fn packets_test_every_box_that_a_ray_meets_alone() {
+        let mut next = random(11);
+        for count in [0, 1, 2, 5, 15, 16, 17, 40, 300] {
+            let cell = |next: &mut dyn FnMut() -> f32| {
+                let middle = Vec3::new(next(), next(), next()) * 4.0;
+                let half = Vec3::new(next(), next(), next()).abs() * 0.8;
+                // Some are flat, as quads are.
+                let half = if next() > 0.5 { half * Vec3::new(1.0, 0.0, 1.0) } else { half };
+                Aabb { min: middle - half, max: middle + half }
+            };
+            let boxes: Vec<Aabb> = (0..count).map(|_| cell(&mut next)).collect();
+            let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+            assert_eq!(tree.is_flat(), count <= PACKET, "{count}");
+            let (mut tested, mut met) = (0, 0);
+            for round in 0..600 {
+                let (from, to) = (Vec3::new(next(), next(), next()) * 6.0, Vec3::new(next(), next(), next()));
+                let spread = [0.001, 0.1, 4.0][round % 3];
+                let mut ray = || {
+                    let jitter = Vec3::new(next(), next(), next()) * spread;
+                    // Along an axis, from one point, from many.
+                    match round % 7 {
+                        0 => Ray::new(from + jitter, Vec3::NEG_Y),
+                        1 | 2 => Ray::new(from + jitter, to - from),
+                        _ => Ray::segment(from, to * 3.0 + jitter),
+                    }
+                };
+                let rays: Vec<Ray> = (0..=round % PACKET).map(|_| ray()).collect();
+                let (rows, mut ends) = RayRows::new(&rays);
+                // Some are not traced.
+                for lane in (0..rays.len()).filter(|lane| round % 5 == 0 && lane % 3 == 1) {
+                    ends[lane] = -1.0;
+                }
+                let (mut closest, mut any) = (Seen(vec![0; count]), Seen(vec![0; count]));
+                tree.closest_packet(&rows, &mut ends, &[], &mut closest);
+                tree.any_packet(&rows, &ends, &[], &mut any);
+                for (id, bounds) in boxes.iter().enumerate() {
+                    for lane in lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
+                        let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);
+                        let is_met = slabs.enter(bounds.min, bounds.max, ends[lane]).is_some();
+                        let seen = [closest.0[id], any.0[id]].map(|seen| seen & 1 << lane != 0);
+                        assert!(!is_met || seen == [true; 2], "{lane} of {rays:?}: {bounds:?} {seen:?}");
+                        met += u32::from(is_met);
+                    }
+                    tested += closest.0[id].count_ones();
+                }
+            }
+            assert!(met > 0 || count == 0, "{count}: the rays meet something");
+            assert!(
+                count > PACKET || tested == met,
+                "{count}: {tested} tests for {met}: alone in its leaf, no box is too much"
+            );
+        }
+    }
+}

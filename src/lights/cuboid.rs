@@ -1,0 +1,133 @@
+//! Box lights: the faces that a point sees, by their solid angles.
+
+use super::Met;
+use super::emitter::Arrival;
+use super::rectangle::SphericalRectangle;
+use crate::geometry::cuboid::Cuboid;
+use crate::math::{DVec3, Vec3};
+
+/// A box that shines outwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoxEmitter {
+    center: DVec3,
+    /// Half the lengths along the axes.
+    half: [f32; 3],
+    /// Unit vectors.
+    axes: [Vec3; 3],
+}
+
+/// A box as it is seen from a point, mirrored so that the point is on the positive side of each axis.
+struct View {
+    /// Sign of the point's coordinates.
+    signs: [f32; 3],
+    /// The positive faces. Of each the first coordinate is along the next axis and the second along the one after that.
+    faces: [Face; 3],
+}
+
+/// A face as it is seen from a point.
+#[derive(Clone, Copy)]
+struct Face {
+    rectangle: SphericalRectangle,
+    /// In sr, nearly that if the face is small; 0 from behind.
+    solid_angle: f32,
+}
+
+impl BoxEmitter {
+    /// All of a box.
+    pub fn new(cuboid: &Cuboid) -> Self {
+        let axes = cuboid.axes();
+        Self {
+            center: cuboid.middle(),
+            half: cuboid.half().as_vec3().to_array(),
+            axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::as_vec3),
+        }
+    }
+
+    #[inline(always)]
+    fn seen_from(&self, point: Vec3) -> View {
+        let from_center = (point.as_dvec3() - self.center).as_vec3();
+        let local = self.axes.map(|axis| from_center.dot(axis));
+        let face = |k: usize| {
+            let side = |i: usize| [-self.half[i] - local[i].abs(), self.half[i] - local[i].abs()];
+            Face::new(side((k + 1) % 3), side((k + 2) % 3), self.half[k] - local[k].abs())
+        };
+        View { signs: local.map(|x| 1.0_f32.copysign(x)), faces: [face(0), face(1), face(2)] }
+    }
+
+    /// A face by its solid angle, and a point of that by solid angle.
+    #[inline(always)]
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let View { signs, faces } = self.seen_from(point);
+        let [a, b, c] = faces.map(|face| face.solid_angle);
+        let total = a + b + c;
+        let target = u[0] * total;
+        let is_first = (target < a) | ((b == 0.0) & (c == 0.0));
+        let is_second = !is_first & ((target < a + b) | (c == 0.0));
+        let of = |values: [f32; 3]| {
+            let rest = if is_second { values[1] } else { values[2] };
+            if is_first { values[0] } else { rest }
+        };
+        let face = Face {
+            rectangle: SphericalRectangle::each(faces.map(|face| face.rectangle), of),
+            solid_angle: of([a, b, c]),
+        };
+        let rest = (target - of([0.0, a, a + b])) / face.solid_angle;
+        let rest = rest.max(0.0).min(1.0_f32.next_down());
+        let (x, y, own) = face.sample([rest, u[1]]);
+        let z = face.rectangle.z();
+        let local = [of([z, y, x]) * signs[0], of([x, z, y]) * signs[1], of([y, x, z]) * signs[2]];
+        let offset = self.axes[0] * local[0] + self.axes[1] * local[1] + self.axes[2] * local[2];
+        let factor = own * (total / face.solid_angle);
+        Arrival {
+            direction: offset * (1.0 / offset.length_squared().sqrt()),
+            target: point + offset,
+            factor: if total > 0.0 { factor } else { 0.0 },
+        }
+    }
+
+    /// [`Light::pdf`](super::Light::pdf).
+    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        let View { faces, .. } = self.seen_from(from);
+        let total: f32 = faces.iter().map(|face| face.solid_angle).sum();
+        let own = faces.iter().zip(self.axes).enumerate();
+        let own = own.into_iter().find(|(_, (_, axis))| axis.dot(met.normal).abs() > 0.9);
+        match own {
+            Some((_, (face, _))) if !(face.solid_angle > 0.0) => 0.0,
+            Some((_, (face, _))) if face.rectangle.is_told() => 1.0 / total,
+            Some((k, (face, _))) => {
+                let area = 4.0 * self.half[(k + 1) % 3] * self.half[(k + 2) % 3];
+                met.pdf_by_area(f64::from(area)) * (face.solid_angle / total)
+            }
+            None => 0.0,
+        }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.center
+    }
+}
+
+impl Face {
+    /// Between coordinates as seen from the point, in a plane at z, which is negative before the face.
+    #[inline(always)]
+    fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
+        let rectangle = SphericalRectangle::new(x, y, z);
+        let (_, _, by_area) = rectangle.by_area([0.5; 2]);
+        let solid_angle = if rectangle.is_told() { rectangle.solid_angle() } else { by_area };
+        Self { rectangle, solid_angle: if z < 0.0 { solid_angle } else { 0.0 } }
+    }
+
+    /// A point of the face, and one over the density of its direction.
+    #[inline(always)]
+    fn sample(&self, u: [f32; 2]) -> (f32, f32, f32) {
+        let rectangle = &self.rectangle;
+        let (by_area, [x, y]) = (rectangle.by_area(u), rectangle.sample(u));
+        let is_told = rectangle.is_told();
+        (
+            if is_told { x } else { by_area.0 },
+            if is_told { y } else { by_area.1 },
+            if is_told { rectangle.solid_angle() } else { by_area.2 },
+        )
+    }
+}

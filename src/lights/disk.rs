@@ -1,0 +1,178 @@
+//! Disk lights, sampled over the solid angle within 20 %.
+
+use std::f64::consts::TAU;
+
+use super::emitter::Arrival;
+use crate::geometry::disk::Disk;
+use crate::math::elementary::sin_cos;
+use crate::math::{DVec3, Vec3};
+
+/// A disk that shines from its front.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DiskEmitter {
+    center: DVec3,
+    normal: DVec3,
+    radius: f64,
+}
+
+/// A disk as it is seen from a point: directions in an elliptical cone.
+#[derive(Clone, Copy, Debug)]
+pub struct DiskView {
+    /// Axis of the cone, and the directions of the ellipse's axes.
+    axes: [DVec3; 3],
+    /// Tangents of the half angles along them.
+    a: f64,
+    b: f64,
+    /// The density of an angle around the axis is one over p·cos² + q·sin².
+    p: f64,
+    q: f64,
+    /// Height of the point above the front, > 0.
+    height: f64,
+    /// Distance to the farthest point.
+    farthest: f64,
+}
+
+impl DiskEmitter {
+    /// All of a disk.
+    pub fn new(disk: &Disk) -> Self {
+        Self { center: disk.middle(), normal: disk.normal(), radius: disk.radius() }
+    }
+
+    /// As seen from a point before it; else its height is not positive, and nothing else counts.
+    ///
+    /// In the plane of the disk's normal and its middle the cone has the half angle α between the rays to the nearest and the
+    /// farthest point; across, at the bisector, β (Guillén et al., *Area-Preserving Parameterizations for Spherical Ellipses*,
+    /// 2017).
+    #[inline(always)]
+    pub fn seen_from(&self, point: Vec3) -> DiskView {
+        let to_center = self.center - point.as_dvec3();
+        let height = -to_center.dot(self.normal);
+        let flat = to_center + self.normal * height;
+        let beside = flat.length();
+        let is_beside = beside > 0.0;
+        let across = perpendicular(self.normal);
+        let out = DVec3::new(
+            if is_beside { flat.x / beside } else { across.x },
+            if is_beside { flat.y / beside } else { across.y },
+            if is_beside { flat.z / beside } else { across.z },
+        );
+        let (near, far) = (beside - self.radius, beside + self.radius);
+        let h2 = height * height;
+        let (l0, l1) = ((near * near + h2).sqrt(), (far * far + h2).sqrt());
+        let both = l0 + l1;
+        // Where the bisector meets the plane, and how far that is.
+        let middle = (near * l1 + far * l0) / both;
+        let l = (middle * middle + h2).sqrt();
+        // tan α by sine and cosine of 2α times l0·l1, without differences of near numbers.
+        let (sin, cos) = (2.0 * self.radius * height, near * far + h2);
+        let a = if cos > 0.0 { sin / (l0 * l1 + cos) } else { (l0 * l1 - cos) / sin };
+        let b = 2.0 * self.radius * (l0 * l1).sqrt() / (both * l);
+        let down = -self.normal;
+        let (a2, b2) = (1.0 + a * a, 1.0 + b * b);
+        DiskView {
+            axes: [
+                (out * middle + down * height) / l,
+                (out * height - down * middle) / l,
+                self.normal.cross(out),
+            ],
+            a,
+            b,
+            p: a2 + a2.sqrt(),
+            q: b2 + b2.sqrt(),
+            height,
+            farthest: l1,
+        }
+    }
+
+    /// Uniform within 20 % over the solid angle.
+    #[inline(always)]
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let view = self.seen_from(point);
+        let (direction, distance, factor) = view.sample(self.normal, u);
+        let direction = direction.as_vec3();
+        Arrival {
+            direction,
+            target: point + direction * distance as f32,
+            factor: if view.height > 0.0 { factor as f32 } else { 0.0 },
+        }
+    }
+
+    /// Density in sr⁻¹ of a direction that meets the front.
+    pub fn pdf(&self, from: Vec3, direction: Vec3) -> f64 {
+        let view = self.seen_from(from);
+        if view.is_front() { view.pdf(direction) } else { 0.0 }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Unit normal of the front.
+    #[inline(always)]
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+}
+
+impl DiskView {
+    /// Whether the front is seen.
+    #[inline(always)]
+    pub fn is_front(&self) -> bool {
+        self.height > 0.0
+    }
+
+    /// A bound on the solid angle, at most 20 % above it.
+    #[inline(always)]
+    pub fn solid_angle(&self) -> f64 {
+        TAU * self.a * self.b / (self.p * self.q).sqrt()
+    }
+
+    /// Direction, distance to the plane, and one over the density.
+    ///
+    /// In the plane before the eye that the axis is perpendicular to, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills
+    /// a·b/(Q + √Q) dφ, Q = 1 + a²cos²φ + b²sin²φ, and in it cosines to the axis are uniform. φ gets the density
+    /// ∝ 1/(p·cos²φ + q·sin²φ), whose denominator is Q + √Q at both axes and at least 1/1.2 of it between.
+    #[inline(always)]
+    pub fn sample(&self, normal: DVec3, u: [f32; 2]) -> (DVec3, f64, f64) {
+        let (sin, cos) = sin_cos(std::f32::consts::TAU * u[1]);
+        let (x, y) = (f64::from(cos) * self.q.sqrt(), f64::from(sin) * self.p.sqrt());
+        let scale = 1.0 / (x * x + y * y).sqrt();
+        let (cos, sin) = (x * scale, y * scale);
+        let (x, y) = (self.a * cos, self.b * sin);
+        let slope2 = x * x + y * y;
+        let (q, root) = (1.0 + slope2, (1.0 + slope2).sqrt());
+        let versine = f64::from(u[0]) * slope2 / (q + root);
+        let across = (versine * (2.0 - versine)).sqrt() / slope2.sqrt();
+        let [axis, along, beside] = self.axes;
+        let direction = axis * (1.0 - versine) + (along * x + beside * y) * across;
+        let distance = self.height / -direction.dot(normal);
+        let distance = if (distance > 0.0) & (distance < self.farthest) { distance } else { self.farthest };
+        (direction, distance, self.factor(cos * cos, q + root))
+    }
+
+    /// One over the density, at cos²φ and Q + √Q.
+    #[inline(always)]
+    fn factor(&self, cos2: f64, slice: f64) -> f64 {
+        self.solid_angle() * (self.p * cos2 + self.q * (1.0 - cos2)) / slice
+    }
+
+    /// Density in sr⁻¹ of a direction inside.
+    pub fn pdf(&self, direction: Vec3) -> f64 {
+        let direction = direction.as_dvec3();
+        let [_, along, beside] = self.axes;
+        let (x, y) = (direction.dot(along) / self.a, direction.dot(beside) / self.b);
+        let cos2 = if x == 0.0 && y == 0.0 { 1.0 } else { x * x / (x * x + y * y) };
+        let q = 1.0 + self.a * self.a * cos2 + self.b * self.b * (1.0 - cos2);
+        1.0 / self.factor(cos2, q + q.sqrt())
+    }
+}
+
+/// A unit vector perpendicular to one.
+#[inline(always)]
+pub fn perpendicular(n: DVec3) -> DVec3 {
+    let is_x = n.x.abs() < 0.6;
+    let other = if is_x { DVec3::X } else { DVec3::Y };
+    let across = n.cross(other);
+    across / across.length()
+}

@@ -1,0 +1,313 @@
+//! Lights with a round side, and caps: cylinders and cones.
+
+use super::Met;
+use super::disk::{DiskEmitter, perpendicular};
+use super::emitter::Arrival;
+use super::meridians::{Meridians, Pole, Turn};
+use crate::geometry::cone::Cone;
+use crate::geometry::cylinder::Cylinder;
+use crate::math::{DVec3, Vec3};
+
+/// A side and its caps, of which a point sees one at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoundEmitter<S> {
+    side: S,
+    caps: [Option<DiskEmitter>; 2],
+    middle: DVec3,
+}
+
+/// The side of a light: half planes around a pole each show one stretch of it.
+pub trait Side {
+    /// As seen from a point.
+    type View: SideView;
+
+    /// As seen from a point; none where it shows its back.
+    fn seen_from(&self, point: Vec3) -> Option<Self::View>;
+}
+
+/// A side as it is seen from a point.
+pub trait SideView {
+    /// The pole.
+    fn pole(&self) -> &Pole;
+
+    /// The greatest angle around the pole at which the side is seen.
+    fn reach(&self) -> Turn;
+
+    /// Difference of the cosines at the ends of the stretch which is seen at an angle around the pole.
+    fn stretch(&self, around: Turn) -> f64;
+
+    /// The point of the stretch that divides the cosines by a share in [0, 1): its angle from the pole, and its distance.
+    fn place(&self, around: Turn, share: f64) -> (Turn, f64);
+}
+
+/// What is seen of a light, with its angles.
+struct View<V> {
+    side: Option<(V, Meridians)>,
+    cap: Option<(super::disk::DiskView, DVec3)>,
+    /// The side's part of all.
+    share: f64,
+}
+
+impl<S: Side> RoundEmitter<S> {
+    fn view(&self, point: Vec3) -> View<S::View> {
+        let side = self.side.seen_from(point).map(|view| {
+            let meridians = Meridians::new(view.reach(), |turn| view.stretch(turn));
+            (view, meridians)
+        });
+        let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
+        let caps = self.caps.iter().flatten().map(|cap| (cap.seen_from(point), cap.normal()));
+        let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
+        let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
+        let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle());
+        let share = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };
+        View { side, cap, share }
+    }
+
+    /// Uniform over the solid angle, but for how fast that changes from one meridian to the next, and for a cap's 20 %.
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let view = self.view(point);
+        let share = view.share as f32;
+        let (direction, distance, factor) = match (view.side, view.cap) {
+            (Some((side, meridians)), _) if u[0] < share => {
+                let (angle, density) = meridians.sample(u[1]);
+                let around = Turn::of(angle);
+                let (from_pole, distance) = side.place(around, f64::from(u[0] / share));
+                let factor = side.stretch(around) / (density * f64::from(share));
+                (side.pole().direction(from_pole, around), distance, factor)
+            }
+            (_, Some((cap, normal))) => {
+                let rest = (u[0] - share) / (1.0 - share);
+                let (direction, distance, factor) = cap.sample(normal, [rest.min(1.0_f32.next_down()), u[1]]);
+                (direction, distance, factor / f64::from(1.0 - share))
+            }
+            (_, None) => return Arrival::NOTHING,
+        };
+        let direction = direction.as_vec3();
+        Arrival { direction, target: point + direction * distance as f32, factor: factor as f32 }
+    }
+
+    /// [`Light::pdf`](super::Light::pdf).
+    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        let view = self.view(from);
+        let share = f64::from(view.share as f32);
+        let is_cap = |normal: DVec3| met.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
+        let density = match (view.side, view.cap) {
+            (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
+            (Some((side, meridians)), _) => {
+                let angle = side.pole().around(met.direction);
+                share * meridians.pdf(angle) / side.stretch(Turn::of(angle.abs()))
+            }
+            (None, _) => 0.0,
+        };
+        density as f32
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        self.middle
+    }
+}
+
+/// The side of a cylinder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CylinderSide {
+    middle: DVec3,
+    /// Unit vector along it.
+    axis: DVec3,
+    half_length: f64,
+    radius: f64,
+}
+
+/// The pole is along the axis, and the half planes are those of the angles at which the circle is seen in a plane across.
+pub struct CylinderView {
+    pole: Pole,
+    reach: Turn,
+    radius: f64,
+    /// From the axis.
+    distance: f64,
+    /// Its square less that of the radius.
+    power: f64,
+    /// Heights of the ends above the point.
+    ends: [f64; 2],
+}
+
+impl RoundEmitter<CylinderSide> {
+    /// All of a cylinder.
+    pub fn of_cylinder(cylinder: &Cylinder) -> Self {
+        let caps = [1, 2].map(|number| cylinder.cap(number));
+        let across = caps[1].middle() - caps[0].middle();
+        let side = CylinderSide {
+            middle: cylinder.middle(),
+            axis: caps[1].normal(),
+            half_length: across.length() * 0.5,
+            radius: caps[0].radius(),
+        };
+        let caps = caps.map(|cap| cylinder.is_capped().then(|| DiskEmitter::new(&cap)));
+        Self { side, caps, middle: cylinder.middle() }
+    }
+}
+
+impl Side for CylinderSide {
+    type View = CylinderView;
+
+    fn seen_from(&self, point: Vec3) -> Option<CylinderView> {
+        let to_middle = self.middle - point.as_dvec3();
+        let height = to_middle.dot(self.axis);
+        let across = to_middle - self.axis * height;
+        let distance = across.length();
+        let power = (distance - self.radius) * (distance + self.radius);
+        (power > 0.0).then(|| CylinderView {
+            pole: Pole::new(self.axis, across / distance),
+            reach: Turn { sin: self.radius / distance, cos: power.sqrt() / distance },
+            radius: self.radius,
+            distance,
+            power,
+            ends: [height - self.half_length, height + self.half_length],
+        })
+    }
+}
+
+impl CylinderView {
+    /// Distance to the circle in the plane across, without a difference of near numbers.
+    fn to_circle(&self, around: Turn) -> f64 {
+        let off = self.distance * around.sin;
+        let half_chord = ((self.radius - off) * (self.radius + off)).max(0.0).sqrt();
+        self.power / (self.distance * around.cos + half_chord)
+    }
+
+    fn cosines(&self, to_circle: f64) -> [f64; 2] {
+        self.ends.map(|end| end / (to_circle * to_circle + end * end).sqrt())
+    }
+}
+
+impl SideView for CylinderView {
+    fn pole(&self) -> &Pole {
+        &self.pole
+    }
+
+    fn reach(&self) -> Turn {
+        self.reach
+    }
+
+    fn stretch(&self, around: Turn) -> f64 {
+        let [low, high] = self.cosines(self.to_circle(Turn { sin: around.sin.abs(), ..around }));
+        high - low
+    }
+
+    fn place(&self, around: Turn, share: f64) -> (Turn, f64) {
+        let to_circle = self.to_circle(Turn { sin: around.sin.abs(), ..around });
+        let [low, high] = self.cosines(to_circle);
+        let cos = low + (high - low) * share;
+        let height = to_circle * cos / ((1.0 - cos) * (1.0 + cos)).max(f64::MIN_POSITIVE).sqrt();
+        let height = height.clamp(self.ends[0], self.ends[1]);
+        let distance = (to_circle * to_circle + height * height).sqrt();
+        (Turn { sin: to_circle / distance, cos: height / distance }, distance)
+    }
+}
+
+/// The side of a cone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConeSide {
+    tip: DVec3,
+    /// Unit vector from the tip to the base.
+    axis: DVec3,
+    /// Of the half angle at the tip.
+    opening: (f64, f64),
+    /// From the tip to the border of the base.
+    slant: f64,
+}
+
+/// The pole is in the direction of the tip, and each half plane shows one straight line of the side from there to the base.
+pub struct ConeView {
+    pole: Pole,
+    reach: Turn,
+    /// To the tip.
+    distance: f64,
+    /// Cosine, seen from the tip, between the point and the axis, and the sine.
+    off_axis: (f64, f64),
+    /// Cosine of the half angle at the tip.
+    cos_opening: f64,
+    slant: f64,
+}
+
+impl RoundEmitter<ConeSide> {
+    /// All of a cone.
+    pub fn of_cone(cone: &Cone) -> Self {
+        let (base, tip) = (cone.base(), cone.tip());
+        let (height, radius) = ((base.middle() - tip).length(), base.radius());
+        let slant = (height * height + radius * radius).sqrt();
+        let side = ConeSide { tip, axis: base.normal(), opening: (radius / slant, height / slant), slant };
+        let cap = cone.is_capped().then(|| DiskEmitter::new(&base));
+        Self { side, caps: [cap, None], middle: cone.middle() }
+    }
+}
+
+impl Side for ConeSide {
+    type View = ConeView;
+
+    fn seen_from(&self, point: Vec3) -> Option<ConeView> {
+        let to_tip = self.tip - point.as_dvec3();
+        let distance = to_tip.length();
+        let pole = to_tip / distance;
+        let cos = -pole.dot(self.axis);
+        let across = self.axis + pole * cos;
+        let sin = across.length();
+        let (sin_opening, cos_opening) = self.opening;
+        let is_around = cos <= -cos_opening;
+        let reach = if is_around {
+            Turn { sin: 0.0, cos: -1.0 }
+        } else {
+            let cos_reach = ((cos_opening - cos) * (cos_opening + cos)).max(0.0).sqrt() / sin;
+            Turn { sin: (sin_opening / sin).min(1.0), cos: cos_reach }
+        };
+        let front = if sin > 0.0 { across / sin } else { perpendicular(pole) };
+        (distance > 0.0 && cos < cos_opening).then(|| ConeView {
+            pole: Pole::new(pole, front),
+            reach,
+            distance,
+            off_axis: (cos, sin),
+            cos_opening,
+            slant: self.slant,
+        })
+    }
+}
+
+impl ConeView {
+    /// Of the line of the side that a half plane shows: the angle at the tip between it and the point.
+    fn at_tip(&self, around: Turn) -> Turn {
+        let ((m, sin), c) = (self.off_axis, self.cos_opening);
+        let q = sin * around.cos;
+        let square = m * m + q * q;
+        let w = (square - c * c).max(0.0).sqrt();
+        // The nearer of both lines whose angle with the axis is that of the side.
+        let sin = if m > 0.0 { (c - m) * (c + m) / (q * c + m * w) } else { (q * c - m * w) / square };
+        Turn { sin, cos: (m * c + q * w) / square }
+    }
+}
+
+impl SideView for ConeView {
+    fn pole(&self) -> &Pole {
+        &self.pole
+    }
+
+    fn reach(&self) -> Turn {
+        self.reach
+    }
+
+    fn stretch(&self, around: Turn) -> f64 {
+        let at_tip = self.at_tip(around);
+        let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
+        let length = (along * along + across * across).sqrt();
+        if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
+    }
+
+    fn place(&self, around: Turn, share: f64) -> (Turn, f64) {
+        let at_tip = self.at_tip(around);
+        let versine = share * self.stretch(around);
+        let from_pole = Turn { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
+        let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
+        let farthest = self.distance + self.slant;
+        let distance = self.distance * at_tip.sin / sin;
+        (from_pole, if (distance > 0.0) & (distance < farthest) { distance } else { farthest })
+    }
+}

@@ -1,0 +1,142 @@
+//! Single triangles that emit: by solid angle, distant ones by area.
+
+use std::f64::consts::TAU;
+
+use super::Met;
+use super::emitter::Arrival;
+use crate::geometry::triangle::Triangle;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::sampling::warp;
+
+/// Below this solid angle in sr uniform over the area is as good.
+const LEAST_SOLID_ANGLE: f64 = 1e-3;
+
+/// Within this of a half sphere, in sr, the corners are on one great circle but for rounding.
+const ALMOST_HALF: f64 = 1e-4;
+
+/// A triangle that shines along (b − a) × (c − a).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangleEmitter {
+    corners: [DVec3; 3],
+    /// Unit normal of the front.
+    normal: DVec3,
+    area: f64,
+}
+
+/// A triangle on the sphere of directions.
+struct Spherical {
+    /// Unit vectors to the corners.
+    corners: [DVec3; 3],
+    solid_angle: f64,
+}
+
+impl TriangleEmitter {
+    /// All of a triangle; none without an area.
+    pub fn new(triangle: &Triangle) -> Option<Self> {
+        let Triangle { a, b, c } = *triangle;
+        let normal = (b - a).cross(c - a);
+        let length = normal.length();
+        (length > 0.0 && length.is_finite()).then(|| Self {
+            corners: [a, b, c],
+            normal: normal / length,
+            area: 0.5 * length,
+        })
+    }
+
+    /// None from behind.
+    fn seen_from(&self, point: DVec3) -> Option<([DVec3; 3], Spherical)> {
+        let offsets = self.corners.map(|corner| corner - point);
+        let corners = offsets.map(DVec3::normalize);
+        let [a, b, c] = corners;
+        let is_front = offsets[0].dot(self.normal) < 0.0;
+        // tan(Ω/2) (Van Oosterom and Strackee, *The Solid Angle of a Plane Triangle*, 1983).
+        let volume = a.dot(b.cross(c)).abs();
+        let solid_angle = 2.0 * libm::atan2(volume, 1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+        is_front.then_some((offsets, Spherical { corners, solid_angle }))
+    }
+
+    /// Uniform over the solid angle, or over the area.
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else { return Arrival::NOTHING };
+        let (direction, distance, factor) = if spherical.is_told() {
+            let direction = spherical.sample(u.map(f64::from));
+            let distance = offsets[0].dot(self.normal) / direction.dot(self.normal);
+            let farthest = offsets.iter().map(|offset| offset.length()).fold(0.0, f64::max);
+            let is_near = distance > 0.0 && distance < farthest;
+            (direction, if is_near { distance } else { farthest }, spherical.solid_angle)
+        } else {
+            let weights = warp::triangle(Vec2::from_array(u)).as_dvec3();
+            let offset = offsets[0] * weights.x + offsets[1] * weights.y + offsets[2] * weights.z;
+            let distance = offset.length();
+            let direction = offset / distance;
+            (direction, distance, -direction.dot(self.normal) * self.area / (distance * distance))
+        };
+        let direction = direction.as_vec3();
+        Arrival { direction, target: point + direction * distance as f32, factor: factor as f32 }
+    }
+
+    /// [`Light::pdf`](super::Light::pdf).
+    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        match self.seen_from(from.as_dvec3()) {
+            Some((_, spherical)) if spherical.is_told() => (1.0 / spherical.solid_angle) as f32,
+            Some(_) => met.pdf_by_area(self.area),
+            None => 0.0,
+        }
+    }
+
+    /// Centre of area.
+    pub fn middle(&self) -> DVec3 {
+        let [a, b, c] = self.corners;
+        (a + b + c) / 3.0
+    }
+}
+
+impl Spherical {
+    fn is_told(&self) -> bool {
+        (LEAST_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
+    }
+
+    /// Uniform over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995): a corner on the side a–c, so that
+    /// the triangle with a and b has its share of the solid angle, and on the side from b to there by its height.
+    fn sample(&self, u: [f64; 2]) -> DVec3 {
+        let [a, b, c] = self.corners;
+        // The angle at a, between the planes through b and through c.
+        let (to_b, to_c) = (b - a * a.dot(b), c - a * a.dot(c));
+        let alpha = libm::atan2(a.dot(to_b.cross(to_c)).abs(), to_b.dot(to_c));
+        let (sin_alpha, cos_alpha) = libm::sincos(alpha);
+        // With the angles β at b and γ at the new corner, α + β + γ = π + share: of ψ = share − α, and with the cosine of the
+        // side a–b, the spherical law of cosines gives that of the side from a to the new corner.
+        let (sin, cos) = libm::sincos(u[0] * self.solid_angle - alpha);
+        let (p, q) = (cos - cos_alpha, sin + sin_alpha * a.dot(b));
+        let cos_side = ((q * cos - p * sin) * cos_alpha - q) / ((q * sin + p * cos) * sin_alpha);
+        let cos_side = cos_side.clamp(a.dot(c).min(1.0), 1.0);
+        let corner = a * cos_side + to_c.normalize() * ((1.0 - cos_side) * (1.0 + cos_side)).sqrt();
+        // Cosines from b to the corner are uniform.
+        let from_b = corner - b * b.dot(corner);
+        let versine = u[1] * (1.0 - corner.dot(b)).max(0.0);
+        let across = (versine * (2.0 - versine)).max(0.0).sqrt();
+        from_b.try_normalize().map_or(b, |along| b * (1.0 - versine) + along * across)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    #[test]
+    fn an_octant_has_an_eighth_of_the_sphere_and_its_middle() {
+        let octant = Spherical { corners: [DVec3::X, DVec3::Y, DVec3::Z], solid_angle: PI / 2.0 };
+        let n = 400;
+        let mut sum = DVec3::ZERO;
+        for i in 0..n * n {
+            let direction = octant
+                .sample([(f64::from(i % n) + 0.5) / f64::from(n), (f64::from(i / n) + 0.5) / f64::from(n)]);
+            assert!((direction.length() - 1.0).abs() < 1e-12 && direction.min_element() > -1e-12);
+            sum += direction / f64::from(n * n);
+        }
+        // ∫x over the octant is π/4.
+        assert!((sum - DVec3::splat(0.5)).abs().max_element() < 1e-5, "{sum}");
+    }
+}
