@@ -1,6 +1,6 @@
 //! Direct light at vertices, in rows of sixteen: every light with its own shadow rays.
 
-use super::medium::Medium;
+use super::medium::{Medium, absorption};
 use super::onward::{Onward, Scattering};
 use super::queues::PathRay;
 use super::shot::Shot;
@@ -253,6 +253,11 @@ impl LitRow {
         Response { f, cosines, glosses }
     }
 
+    /// Whether any vertex is in glass.
+    fn is_inside(&self) -> bool {
+        lanes(self.used).any(|i| self.medium[i] != 0)
+    }
+
     /// A bit for each vertex that certainly sees nothing in a direction.
     #[inline(always)]
     pub fn hidden(&self, directions: &Lanes3) -> u32 {
@@ -398,7 +403,8 @@ impl LitQueue {
             let row = &*row;
             let others =
                 if onward.is_some() { Others::Paths } else { Others::Lobes(row.sharp(shot, measure)) };
-            let work = Lighting { shot, row, used: row.used, measure, others };
+            let media = row.is_inside().then_some(&*self.media);
+            let work = Lighting { shot, row, used: row.used, measure, others, media };
             let arrived = shot.world.geometry.instructions().run(work);
             rays.shadow += arrived.rays.shadow;
             rays.scattered += arrived.rays.scattered;
@@ -456,6 +462,8 @@ struct Lighting<'a> {
     used: u32,
     measure: Measure,
     others: Others,
+    /// Those that the vertices are in; none where all are in air.
+    media: Option<&'a [Medium]>,
 }
 
 /// What finds light beside samples of the lamps.
@@ -511,7 +519,8 @@ impl Loops for Lighting<'_> {
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, self.used, &nowhere);
-                let (values, active) = self.values(&samples, 1.0);
+                let (mut values, active) = self.values(&samples, 1.0);
+                self.absorb(&samples, &mut values);
                 self.add(&samples, &values, active, &mut sums, &mut waiting);
             } else {
                 let count = render.shadow_samples;
@@ -523,6 +532,7 @@ impl Loops for Lighting<'_> {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32);
+                    self.absorb(&samples, &mut values);
                     match self.others {
                         Others::Paths => self.weigh(light, &samples, 1.0 / count as f32, &mut values),
                         Others::Lobes(0) => {}
@@ -557,6 +567,27 @@ impl Lighting<'_> {
     #[inline(always)]
     fn sampler(&self) -> SamplerRow<LANES> {
         self.row.sampler(self.shot)
+    }
+
+    /// Leave of samples what glass around the vertices lets through on the way.
+    #[inline(always)]
+    fn absorb(&self, samples: &LightRow, values: &mut Lanes3) {
+        if self.media.is_none() || self.measure == Measure::ArrivingShare {
+            return;
+        }
+        for i in lanes(self.used) {
+            let way = lane(&samples.targets, i) - lane(&self.row.from, i);
+            let is_beyond = samples.beyond & 1 << i != 0;
+            let distance = if is_beyond { f32::MAX } else { way.length() };
+            set_lane(values, i, lane(values, i) * self.transmittance(i, distance));
+        }
+    }
+
+    /// What glass around a vertex lets through over a distance.
+    fn transmittance(&self, i: usize, distance: f32) -> Vec3 {
+        self.media.map_or(Vec3::ONE, |media| {
+            absorption(self.shot.world, media[self.row.medium[i] as usize], distance)
+        })
     }
 
     /// Leave of samples of one light what rays in the lobes do not bring, of which there are so many for each sample.
@@ -624,9 +655,13 @@ impl Lighting<'_> {
                 let radiance = match hits.get(i) {
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };
-                        self.shot.lamp_radiance(&rays.ray(i), &hit, density)
+                        let radiance = self.shot.lamp_radiance(&rays.ray(i), &hit, density);
+                        radiance * self.transmittance(i, hit.shape.t)
                     }
-                    None => self.shot.radiance_beyond(lane(&directions, i), density),
+                    None => {
+                        let radiance = self.shot.radiance_beyond(lane(&directions, i), density);
+                        radiance * self.transmittance(i, f32::MAX)
+                    }
                 };
                 let value = lane(&f, i) * radiance * (cosines[i] / (density * count as f32));
                 let sum = lane(&sums.light, i) + value;

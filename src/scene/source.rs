@@ -90,7 +90,9 @@ impl Source {
 
 /// The text as TOML: with its value as it stands, or as a text in quotes. None: it has no key in a table, or no `=`.
 fn key_value(set: &str) -> Option<String> {
-    set.match_indices('=').find_map(|(at, _)| {
+    // Keys in quotes may have some.
+    const MOST_EQUALS_SIGNS: usize = 8;
+    set.match_indices('=').take(MOST_EQUALS_SIGNS).find_map(|(at, _)| {
         let (key, value) = (set[..at].trim(), set[at + 1..].trim());
         let with = |value: &str| Some(format!("{key} = {value}")).filter(|text| is_key_value(text));
         with("0")?;

@@ -1,12 +1,14 @@
 //! Light that bounces, by paths, against closed forms.
 
+use std::f64::consts::PI;
+
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{ColorSource, Falloff, Integrator, MaterialKind, Shape};
+use glimt::scene::description::{ColorSource, Falloff, Integrator, MaterialKind, Shadows, Shape};
 
 use super::distant::sun;
-use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
-use super::{lambert, mean_and_error, v};
+use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, plain, scene};
+use super::{assert_close, assert_mean, lambert, mean_and_error, v};
 
 /// A scene that is rendered by paths.
 pub fn by_paths(build: Build, max_depth: u32) -> Build {
@@ -390,5 +392,58 @@ fn coloured_walls_multiply_their_colours() {
     for axis in 0..3 {
         let values: Vec<f64> = pixels.iter().map(|pixel| pixel[axis]).collect();
         assert_near("a colour", &values, 1.0 / (1.0 - f64::from(colors[axis])), 4e-3);
+    }
+}
+
+#[test]
+fn light_inside_glass_is_tinted_on_its_way_from_the_lamp_as_well() {
+    // Floor, lamp and eye are in one glass: tint^(lamp to floor) · tint^(floor to eye).
+    let tint = 0.5_f64;
+    let inside = || {
+        let glass = MaterialKind::Glass { ior: 1.5, tint: Vec3::splat(tint as f32) };
+        let floor = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
+        let room =
+            scene().shape(floor, matte(0.6)).cuboid(DVec3::Y, v(8.0, 6.0, 8.0), DVec3::ZERO, plain(glass));
+        room.seen(v(0.0, 1.5, 0.0), DVec3::ZERO)
+    };
+    let to_eye = tint.powf(1.5);
+    let lit = inside().point_light(v(0.5, 1.0, 0.0), 1.0, Falloff::Square);
+    let distance = 1.25_f64.sqrt();
+    let exact = 0.6 / PI * (1.0 / distance) / 1.25 * tint.powf(distance) * to_eye;
+    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+        for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
+            assert_close(what, build.clone().shadows(shadows, 1).value(), exact);
+        }
+    }
+    // A lamp of 6 × 6 at a height of 1.6, by a sum over its midpoints.
+    let (side, height, steps) = (6.0, 1.6, 600);
+    let mut sum = 0.0;
+    for i in 0..steps {
+        for j in 0..steps {
+            let at = |k: i32| ((f64::from(k) + 0.5) / f64::from(steps) - 0.5) * side;
+            let d2 = at(i) * at(i) + at(j) * at(j) + height * height;
+            sum += height * height / (d2 * d2) * tint.powf(d2.sqrt()) * (side / f64::from(steps)).powi(2);
+        }
+    }
+    let exact = 0.6 / PI * sum * to_eye;
+    let lit = inside().quad(v(-3.0, height, -3.0), v(side, 0.0, 0.0), v(0.0, 0.0, side), emitter(1.0));
+    let lit = lit.seen(v(0.0, 1.5, 0.0), DVec3::ZERO);
+    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+        assert_mean(what, &build.values(256, 64), exact);
+    }
+    // The same by the lobe of a sharp highlight.
+    let glossy = |build: Build| build.with(|scene| scene.materials[0] = phong(0.1, 0.8, 1e4, 0.0));
+    let lit = inside().quad(v(-3.0, height, -3.0), v(side, 0.0, 0.0), v(0.0, 0.0, side), emitter(1.0));
+    let lit = glossy(lit.seen(v(0.5, 0.5, 0.0), DVec3::ZERO));
+    let reach = height * 2.0_f64.sqrt() + 0.5_f64.sqrt();
+    let (diffuse, gloss) =
+        (0.1 / PI * sum * tint.powf(0.5_f64.sqrt()), 0.8 * 0.5_f64.sqrt() * tint.powf(reach));
+    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+        let (mean, error) = mean_and_error(&build.values(256, 64));
+        assert!(
+            (mean - diffuse - gloss).abs() < 3.0 * error + 2e-3 * gloss,
+            "{what}: {mean}, {}",
+            diffuse + gloss
+        );
     }
 }
