@@ -7,7 +7,7 @@ use super::view::{Measure, Parts};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{Light, LightRow, Middle, Source, SourceRow};
+use crate::lights::{LightRow, Middle, Source, SourceRow};
 use crate::materials::phong::{PhongBsdf, lobe};
 use crate::math::Vec3;
 use crate::math::color::luminance;
@@ -347,10 +347,16 @@ impl Loops for Lighting<'_> {
         for (number, light) in self.shot.world.lights.iter() {
             // Where one ray decides for all of a light, what it could send waits for that.
             let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
+            let middle = light.middle();
+            let is_soft = match render.shadows {
+                Shadows::Soft => true,
+                Shadows::Hard => middle.is_none(),
+                Shadows::Off => false,
+            };
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
-                let samples = light.sample_row(&self.row.from, self.used, &nowhere);
-                self.add(&samples, 1.0, &mut sums, &mut waiting);
+                let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
+                self.add(&samples, 1.0, is_soft, &mut sums, &mut waiting);
             } else {
                 let count = render.shadow_samples;
                 if sampler.is_none() {
@@ -359,12 +365,12 @@ impl Loops for Lighting<'_> {
                 let Some(sampler) = &sampler else { continue };
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
-                    let samples = light.sample_row(&self.row.from, self.used, &u);
-                    self.add(&samples, 1.0 / count as f32, &mut sums, &mut waiting);
+                    let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
+                    self.add(&samples, 1.0 / count as f32, is_soft, &mut sums, &mut waiting);
                 }
             }
             if waiting.active != 0 {
-                self.add_waiting(light, &waiting, &mut sums);
+                self.add_waiting(middle, &waiting, &mut sums);
             }
         }
         if self.measure == Measure::ArrivingShare {
@@ -402,9 +408,10 @@ impl Lighting<'_> {
         SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples)
     }
 
-    /// Add samples of one light, each of which counts as this share of it; what waits for one ray is put beside.
+    /// Add samples of one light, each of which counts as this share of it; what waits for one ray, where shadows are not soft, is
+    /// put beside.
     #[inline(always)]
-    fn add(&self, samples: &LightRow, share: f32, sums: &mut Sums, waiting: &mut Waiting) {
+    fn add(&self, samples: &LightRow, share: f32, is_soft: bool, sums: &mut Sums, waiting: &mut Waiting) {
         let (values, active) = self.values(samples, share);
         if active == 0 {
             return;
@@ -413,7 +420,7 @@ impl Lighting<'_> {
             let is_active = active & 1 << i != 0;
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
-        if self.shot.settings.render.shadows == Shadows::Soft {
+        if is_soft {
             let (rays, ends) = self.shadow_rays(samples, active & !self.hidden(&samples.directions));
             self.add_seen(&rays, &ends, &samples.sources, &values, sums);
         } else {
@@ -437,11 +444,11 @@ impl Lighting<'_> {
 
     /// What waits for one ray to the middle of its light.
     #[inline(always)]
-    fn add_waiting(&self, light: &Light, waiting: &Waiting, sums: &mut Sums) {
-        if self.shot.settings.render.shadows == Shadows::Off {
+    fn add_waiting(&self, middle: Option<(Middle, Source)>, waiting: &Waiting, sums: &mut Sums) {
+        let Some((middle, source)) = middle.filter(|_| self.shot.settings.render.shadows != Shadows::Off)
+        else {
             return add_where(waiting.active, &waiting.light, &mut sums.light);
-        }
-        let (middle, source) = light.middle();
+        };
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
         for i in 0..LANES {
             let from = lane(&self.row.from, i);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::emitter::{Emitter, Part};
-use super::{AreaLight, DirectionalLight, Light};
+use super::{AreaLight, DirectionalLight, Environment, Light};
 use crate::math::Vec3;
 
 /// The lights of a scene, known by their index.
@@ -13,6 +13,8 @@ pub struct Lights {
     by_object: HashMap<u32, OfObject>,
     /// Those that rays see which leave the scene.
     suns: Vec<DirectionalLight>,
+    /// The same of light from all around.
+    environment: Option<Environment>,
 }
 
 /// The lights that an object is.
@@ -33,6 +35,7 @@ impl Lights {
                 Light::Point(_) | Light::Spot(_) => {}
                 Light::Directional(sun) if sun.is_sharp() => {}
                 Light::Directional(sun) => lights.suns.push(*sun),
+                Light::Environment(light) => lights.environment = Some(light.clone()),
                 Light::Area(light) => lights.note(number, light),
             }
         }
@@ -86,12 +89,18 @@ impl Lights {
 
     /// Whether a ray that leaves the scene may see light.
     pub fn are_beyond(&self) -> bool {
-        !self.suns.is_empty()
+        !self.suns.is_empty() || self.environment.is_some()
     }
 
     /// Radiance that comes from beyond the scene, from a unit direction.
     pub fn beyond(&self, direction: Vec3) -> Vec3 {
-        self.suns.iter().map(|sun| sun.radiance(direction)).sum()
+        self.each_beyond(direction).map(|(radiance, _)| radiance).sum()
+    }
+
+    /// The same from each light, with the density in sr⁻¹ of samples of that light: for the way that a surface chose by itself.
+    pub fn each_beyond(&self, direction: Vec3) -> impl Iterator<Item = (Vec3, f32)> {
+        let suns = self.suns.iter().map(move |sun| (sun.radiance(direction), sun.pdf(direction)));
+        suns.chain(self.environment.iter().map(move |light| light.arriving(direction)))
     }
 
     /// The light that a primitive of an object is, with its number.
