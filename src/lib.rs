@@ -14,13 +14,13 @@
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
 //! | [`accel`] | trees over boxes and ids, a closure tests the shape; over triangles, of boxes by vector instructions and of planes |
 //! | [`sampling`] | sample streams, warps, distributions |
-//! | [`materials`] | phong, mirror, glass; texture lookup, normal maps, Fresnel |
+//! | [`materials`] | phong and its lobes, mirror, glass; texture lookup, normal maps, Fresnel |
 //! | [`lights`] | point and area lights, light from beyond the scene |
 //! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |
 //! | [`world`] | everything ready to trace, immutable |
 //! | [`film`] | sums of samples, tone mapping, pictures |
-//! | [`integrators`] | whitted, views |
+//! | [`integrators`] | whitted, path, views |
 //! | [`compare`] | the error of a picture against a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
 //! | [`pipeline`] | stages, caches, the worker, watching files |

@@ -168,6 +168,9 @@ pub struct RenderArgs {
     /// Shadows; hard: one ray to the middle of an area light
     #[arg(long, value_parser = one_of::<Shadows>(), value_name = "HOW", help_heading = "Method")]
     pub shadows: Option<Shadows>,
+    /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection: less noise, but too dark; 0: none
+    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = clamp, help_heading = "Method")]
+    pub clamp: Option<f32>,
     /// Photon maps; accepted, but not rendered by this version
     #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "Method")]
     pub photons: Option<Switch>,
@@ -209,6 +212,7 @@ impl RenderArgs {
             max_depth: self.max_depth,
             integrator: self.integrator,
             shadows: self.shadows,
+            clamp: self.clamp,
             photons: self.photons.map(bool::from),
             dof: self.dof.map(bool::from),
             accel: self.accel,
@@ -296,6 +300,13 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds above 0".to_owned()),
+    }
+}
+
+fn clamp(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(most) if (0.0..=1e18).contains(&most) => Ok(most),
+        _ => Err("expected a radiance from 0 to 1e18; 0 for none".to_owned()),
     }
 }
 

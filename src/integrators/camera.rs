@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::medium::{Inside, Medium};
-use super::queues::PathRay;
+use super::queues::{History, PathRay};
 use super::shot::Shot;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, Row};
@@ -57,7 +57,8 @@ impl Shot<'_> {
         let around =
             self.world.glass_around(ray.origin).map(|(object, material)| Inside { object, material });
         let medium = around.fold(Medium::default(), Medium::entered);
-        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium }
+        let history = History::CAMERA;
+        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, history }
     }
 
     /// The rays of the slots from `first` on, also beyond the last. To be called inside of loops for each instruction set.

@@ -11,6 +11,8 @@ pub struct RayCounters {
     pub reflected_rays: u64,
     /// Refracted rays.
     pub refracted_rays: u64,
+    /// Rays that go on from diffuse and glossy surfaces.
+    pub scattered_rays: u64,
     /// Texture look-ups.
     pub texture_lookups: u64,
 }
@@ -21,6 +23,7 @@ impl std::ops::AddAssign for RayCounters {
         self.shadow_rays += other.shadow_rays;
         self.reflected_rays += other.reflected_rays;
         self.refracted_rays += other.refracted_rays;
+        self.scattered_rays += other.scattered_rays;
         self.texture_lookups += other.texture_lookups;
     }
 }

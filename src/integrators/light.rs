@@ -1,5 +1,8 @@
 //! Direct light at vertices, in rows of sixteen: every light with its own shadow rays.
 
+use super::medium::Medium;
+use super::onward::{Onward, Scattering};
+use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
 use super::vertices::{Lift, LitVertex};
@@ -7,14 +10,16 @@ use super::view::{Measure, Parts};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{LightRow, Middle, Source, SourceRow};
-use crate::materials::phong::{PhongBsdf, lobe};
+use crate::lights::{Light, LightRow, Middle, Source, SourceRow};
+use crate::materials::Lobes;
+use crate::materials::lobes::gloss;
+use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
-use crate::world::{Geometry, Loops};
+use crate::world::{Geometry, Hit, Loops};
 
 /// Vertices that wait to be lit, side by side; each is lit alone, whatever it shares its row with.
 #[derive(Default)]
@@ -26,6 +31,8 @@ pub struct LitQueue {
     open: usize,
     /// What lamps send by the vertex of each path of the round.
     arrived: Vec<Vec3>,
+    /// The glass around vertices; the first is none.
+    media: Vec<Medium>,
 }
 
 /// Vertices to be lit.
@@ -56,6 +63,8 @@ pub struct LitRow {
     pub specular: Lanes3,
     /// Of the glossy lobe.
     pub shininess: Lanes,
+    /// The largest parts of kd and ks, whatever is shown of them.
+    pub albedos: [Lanes; 2],
     /// Of the paths.
     pub throughput: Lanes3,
     /// Of the paths.
@@ -64,6 +73,10 @@ pub struct LitRow {
     pub path: [u32; LANES],
     /// Places of the paths in the round's queue.
     pub place: [u32; LANES],
+    /// [`History::carried`](super::queues::History::carried) of the paths.
+    pub carried: Lanes,
+    /// Places of the glass that they are in.
+    pub medium: [u32; LANES],
     /// Whether any vertex has a glossy lobe.
     pub is_glossy: bool,
     /// Whether any vertex has a bent normal.
@@ -74,6 +87,43 @@ pub struct LitRow {
 const UNBENT: f32 = -2.0;
 
 impl LitRow {
+    /// The least α of lobes that are worth rays of their own.
+    const SHARP: f32 = 100.0;
+
+    /// A bit for each vertex whose highlights of lamps samples of the lamps alone would find too seldom.
+    fn sharp(&self, shot: &Shot<'_>, measure: Measure) -> u32 {
+        let shows = match measure {
+            Measure::Radiance(Parts { specular, .. }) => specular,
+            Measure::ArrivingShare => false,
+        };
+        let is_soft = shot.settings.render.shadows == Shadows::Soft;
+        if !(self.is_glossy && shows && is_soft && shot.world.lights.can_be_found()) {
+            return 0;
+        }
+        let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= Self::SHARP;
+        lanes(self.used).filter(is_sharp).fold(0, |sharp, i| sharp | 1 << i)
+    }
+
+    /// The random numbers of the vertices.
+    #[inline(always)]
+    pub fn sampler(&self, shot: &Shot<'_>) -> SamplerRow<LANES> {
+        let (block, slots) = (shot.block, &self.slot);
+        let mut is_run = true;
+        for i in 0..LANES {
+            is_run &= slots[i] == slots[0] + i as u32;
+        }
+        let (xs, ys, samples) = if is_run {
+            block.places(slots[0])
+        } else {
+            let [mut xs, mut ys, mut samples] = [[0; LANES]; 3];
+            for i in (0..LANES).filter(|i| self.used & 1 << i != 0) {
+                (xs[i], ys[i], samples[i]) = block.place(slots[i]);
+            }
+            (xs, ys, samples)
+        };
+        SamplerRow::new(shot.settings.render.seed, &xs, &ys, &samples)
+    }
+
     /// No vertex.
     pub const EMPTY: Self = Self {
         used: 0,
@@ -90,10 +140,13 @@ impl LitRow {
         diffuse: [[0.0; LANES]; 3],
         specular: [[0.0; LANES]; 3],
         shininess: [0.0; LANES],
+        albedos: [[0.0; LANES]; 2],
         throughput: [[0.0; LANES]; 3],
         slot: [0; LANES],
         path: [0; LANES],
         place: [0; LANES],
+        carried: [0.0; LANES],
+        medium: [0; LANES],
         is_glossy: false,
         is_bent: false,
     };
@@ -122,6 +175,10 @@ impl LitRow {
             set_lane(own, i, lane(other, from));
         }
         (self.bend[i], self.shininess[i]) = (other.bend[from], other.shininess[from]);
+        for (own, other) in self.albedos.iter_mut().zip(&other.albedos) {
+            own[i] = other[from];
+        }
+        (self.carried[i], self.medium[i]) = (other.carried[from], other.medium[from]);
         (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
         self.is_glossy |= other.is_glossy;
         self.is_bent |= other.is_bent;
@@ -131,7 +188,7 @@ impl LitRow {
         self.used |= 1 << i;
     }
 
-    fn put(&mut self, i: usize, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+    fn put(&mut self, i: usize, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure, medium: u32) {
         let LitVertex { path, place, vertex, shading, bsdf } = lit;
         let outlook = vertex.outlook(shot);
         set_lane(&mut self.from, i, outlook.point);
@@ -150,12 +207,74 @@ impl LitRow {
         set_lane(&mut self.diffuse, i, diffuse);
         set_lane(&mut self.specular, i, specular);
         self.shininess[i] = bsdf.shininess;
+        self.albedos[0][i] = bsdf.diffuse.max_element();
+        self.albedos[1][i] = bsdf.specular.max_element();
+        (self.carried[i], self.medium[i]) = (path.history.carried, medium);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
-        self.is_glossy |= specular != Vec3::ZERO;
+        self.is_glossy |= bsdf.specular != Vec3::ZERO;
         self.is_bent |= shading.bend.is_some();
         self.used |= 1 << i;
     }
+
+    /// The lobes of a vertex.
+    #[inline(always)]
+    pub fn lobes(&self, i: usize) -> Lobes {
+        Lobes {
+            normal: lane(&self.normal, i),
+            mirrored_eye: lane(&self.mirrored_eye, i),
+            diffuse: self.albedos[0][i],
+            specular: self.albedos[1][i],
+            shininess: self.shininess[i],
+        }
+    }
+
+    /// What the vertices make of light from some directions.
+    #[inline(always)]
+    pub fn response(&self, directions: &Lanes3) -> Response {
+        let mut cosines = [0.0; LANES];
+        for i in 0..LANES {
+            cosines[i] = lane(&self.normal, i).dot(lane(directions, i));
+        }
+        if self.is_bent {
+            for i in 0..LANES {
+                let smooth = lane(&self.smooth_normal, i).dot(lane(directions, i));
+                cosines[i] *= terminator(cosines[i], smooth, self.bend[i]);
+            }
+        }
+        let (mut f, mut glosses) = (self.diffuse, [0.0; LANES]);
+        if self.is_glossy {
+            for i in 0..LANES {
+                let left = gloss(lane(&self.mirrored_eye, i), lane(directions, i), self.shininess[i]);
+                set_lane(&mut f, i, lane(&self.diffuse, i) + lane(&self.specular, i) * left);
+                glosses[i] = left;
+            }
+        }
+        Response { f, cosines, glosses }
+    }
+
+    /// A bit for each vertex that certainly sees nothing in a direction.
+    #[inline(always)]
+    pub fn hidden(&self, directions: &Lanes3) -> u32 {
+        let mut hidden = [0; LANES];
+        if self.is_bounded != 0 {
+            for i in 0..LANES {
+                let cosine = lane(&self.horizon, i).dot(lane(directions, i));
+                hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
+            }
+        }
+        bits(hidden) & self.is_bounded
+    }
+}
+
+/// What vertices make of light from directions.
+pub struct Response {
+    /// The BSDF in sr⁻¹, as far as it is shown.
+    pub f: Lanes3,
+    /// Cosines, times what is left of them at the terminator; not above 0 where nothing arrives.
+    pub cosines: Lanes,
+    /// [`gloss`].
+    pub glosses: Lanes,
 }
 
 /// A bit for each lane.
@@ -190,12 +309,16 @@ impl LitQueue {
         self.clear();
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
+        self.media.clear();
+        self.media.push(Medium::default());
     }
 
-    /// The round is over: the sink gets what lamps send, in the order of the paths, whose slots are told by their places.
-    pub fn settle(&mut self, slot: impl Fn(usize) -> u32, sink: &mut Sink<'_>) {
+    /// The round is over: the sink gets what lamps send, in the order of the paths; their slots, and whether the eye sees their
+    /// vertices, are told by their places.
+    pub fn settle(&mut self, path: impl Fn(usize) -> (u32, bool), sink: &mut Sink<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
-            sink.add_arrived(slot(place), *light);
+            let (slot, is_seen) = path(place);
+            sink.add_arrived(slot, *light, is_seen);
         }
     }
 
@@ -231,8 +354,13 @@ impl LitQueue {
 
     /// One more vertex.
     pub fn push(&mut self, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+        let mut medium = 0;
+        if !lit.path.medium.is_air() {
+            medium = self.media.len() as u32;
+            self.media.push(lit.path.medium);
+        }
         let (row, lane) = self.open_row();
-        row.put(lane, shot, lit, measure);
+        row.put(lane, shot, lit, measure, medium);
     }
 
     /// A row with a free lane.
@@ -252,19 +380,33 @@ impl LitQueue {
         (self.count, self.open) = (0, 0);
     }
 
-    /// Light all vertices and forget them; how many shadow rays that took.
-    pub fn light(&mut self, shot: &Shot<'_>, measure: Measure) -> Result<u64, Cancelled> {
-        let mut rays = 0;
+    /// Light all vertices and forget them; what rays that took. Where paths go on from them, the rays of the next round
+    /// are added to `next`.
+    pub fn light(
+        &mut self,
+        shot: &Shot<'_>,
+        measure: Measure,
+        onward: Option<Onward>,
+        next: &mut Vec<PathRay>,
+    ) -> Result<LightRays, Cancelled> {
+        let mut rays = LightRays::default();
         for row in &mut self.rows[..self.count] {
             shot.token.check()?;
             if row.may_lift != 0 {
                 shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
             }
-            let work = Lighting { shot, row, used: row.used, measure };
+            let row = &*row;
+            let others =
+                if onward.is_some() { Others::Paths } else { Others::Lobes(row.sharp(shot, measure)) };
+            let work = Lighting { shot, row, used: row.used, measure, others };
             let arrived = shot.world.geometry.instructions().run(work);
-            rays += arrived.rays;
+            rays.shadow += arrived.rays.shadow;
+            rays.scattered += arrived.rays.scattered;
             for i in lanes(row.used) {
                 self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
+            }
+            if let Some(onward) = onward.filter(|onward| onward.leads_on) {
+                Scattering { shot, row, onward }.scatter(&self.media, next);
             }
         }
         self.clear();
@@ -313,12 +455,31 @@ struct Lighting<'a> {
     row: &'a LitRow,
     used: u32,
     measure: Measure,
+    others: Others,
+}
+
+/// What finds light beside samples of the lamps.
+#[derive(Clone, Copy)]
+enum Others {
+    /// The rays of paths that go on from the vertices.
+    Paths,
+    /// Rays in the glossy lobes of the vertices whose bits are set.
+    Lobes(u32),
+}
+
+/// Rays that the light of vertices took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LightRays {
+    /// Towards lamps.
+    pub shadow: u64,
+    /// In lobes.
+    pub scattered: u64,
 }
 
 /// What of the light that arrives at the vertices of a row gets to the eye.
 struct Arrived {
     light: Lanes3,
-    rays: u64,
+    rays: LightRays,
 }
 
 /// Sums over the lights.
@@ -327,7 +488,7 @@ struct Sums {
     light: Lanes3,
     /// Of what could.
     total: Lanes,
-    rays: u64,
+    rays: LightRays,
 }
 
 /// What a light could send, before one ray tells whether it does.
@@ -343,20 +504,21 @@ impl Loops for Lighting<'_> {
     fn run(self) -> Arrived {
         let render = &self.shot.settings.render;
         let mut sampler = None;
-        let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: 0 };
+        let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: LightRays::default() };
         for (number, light) in self.shot.world.lights.iter() {
             // Where one ray decides for all of a light, what it could send waits for that.
             let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
             let middle = light.middle();
-            let is_soft = match render.shadows {
-                Shadows::Soft => true,
-                Shadows::Hard => middle.is_none(),
-                Shadows::Off => false,
+            let waits = match render.shadows {
+                Shadows::Soft => false,
+                Shadows::Hard => middle.is_some(),
+                Shadows::Off => true,
             };
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
-                self.add(&samples, 1.0, is_soft, &mut sums, &mut waiting);
+                let (values, active) = self.values(&samples, 1.0);
+                self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting));
             } else {
                 let count = render.shadow_samples;
                 if sampler.is_none() {
@@ -366,12 +528,21 @@ impl Loops for Lighting<'_> {
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
-                    self.add(&samples, 1.0 / count as f32, is_soft, &mut sums, &mut waiting);
+                    let (mut values, active) = self.values(&samples, 1.0 / count as f32);
+                    match self.others {
+                        Others::Paths => self.weigh(light, &samples, 1.0 / count as f32, &mut values),
+                        Others::Lobes(0) => {}
+                        Others::Lobes(_) => self.weigh(light, &samples, 1.0, &mut values),
+                    }
+                    self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting));
                 }
             }
             if waiting.active != 0 {
                 self.add_waiting(middle, &waiting, &mut sums);
             }
+        }
+        if let Others::Lobes(sharp @ 1..) = self.others {
+            self.add_lobes(sharp, &sampler.unwrap_or_else(|| self.sampler()), &mut sums);
         }
         if self.measure == Measure::ArrivingShare {
             for i in 0..LANES {
@@ -391,28 +562,95 @@ impl Loops for Lighting<'_> {
 impl Lighting<'_> {
     #[inline(always)]
     fn sampler(&self) -> SamplerRow<LANES> {
-        let (block, slots) = (self.shot.block, &self.row.slot);
-        let mut is_run = true;
-        for i in 0..LANES {
-            is_run &= slots[i] == slots[0] + i as u32;
-        }
-        let (xs, ys, samples) = if is_run {
-            block.places(slots[0])
-        } else {
-            let [mut xs, mut ys, mut samples] = [[0; LANES]; 3];
-            for i in (0..LANES).filter(|i| self.used & 1 << i != 0) {
-                (xs[i], ys[i], samples[i]) = block.place(slots[i]);
-            }
-            (xs, ys, samples)
-        };
-        SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples)
+        self.row.sampler(self.shot)
     }
 
-    /// Add samples of one light, each of which counts as this share of it; what waits for one ray, where shadows are not soft, is
-    /// put beside.
+    /// Leave of samples of one light what rays in the lobes do not bring, of which there are so many for each sample.
     #[inline(always)]
-    fn add(&self, samples: &LightRow, share: f32, is_soft: bool, sums: &mut Sums, waiting: &mut Waiting) {
-        let (values, active) = self.values(samples, share);
+    fn weigh(&self, light: &Light, samples: &LightRow, others: f32, values: &mut Lanes3) {
+        let of_light = light.inverse_densities(samples);
+        let mut glosses = [0.0; LANES];
+        if self.row.is_glossy {
+            for i in 0..LANES {
+                let mirrored = lane(&self.row.mirrored_eye, i);
+                glosses[i] = gloss(mirrored, lane(&samples.directions, i), self.row.shininess[i]);
+            }
+        }
+        for i in 0..LANES {
+            let density = self.lobes(i).density(lane(&samples.directions, i), glosses[i]);
+            let weight = weight(density * of_light[i] * others);
+            let weight = if self.shares(i) { weight } else { 1.0 };
+            set_lane(values, i, lane(values, i) * weight);
+        }
+    }
+
+    /// The lobes in which rays are sent out from a vertex.
+    #[inline(always)]
+    fn lobes(&self, i: usize) -> Lobes {
+        let lobes = self.row.lobes(i);
+        match self.others {
+            Others::Paths => lobes,
+            Others::Lobes(_) => Lobes { diffuse: 0.0, specular: 1.0, ..lobes },
+        }
+    }
+
+    /// Whether rays are sent out from a vertex.
+    #[inline(always)]
+    fn shares(&self, i: usize) -> bool {
+        match self.others {
+            Others::Paths => true,
+            Others::Lobes(sharp) => sharp & 1 << i != 0,
+        }
+    }
+
+    /// Add what rays bring that are sent out in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp:
+    /// a narrow lobe finds in a wide lamp what samples of the lamp hardly ever meet.
+    #[inline(always)]
+    fn add_lobes(&self, sharp: u32, sampler: &SamplerRow<LANES>, sums: &mut Sums) {
+        let (row, count) = (self.row, self.shot.settings.render.shadow_samples);
+        for repetition in 0..count {
+            let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
+            let mut directions = [[0.0; LANES]; 3];
+            for i in 0..LANES {
+                set_lane(&mut directions, i, self.lobes(i).sample(1.0, [u[0][i], u[1][i]]));
+            }
+            let Response { f, cosines, glosses } = row.response(&directions);
+            let mut sent = sharp & !row.hidden(&directions);
+            let mut ends = [-1.0; LANES];
+            for i in 0..LANES {
+                let bit = 1 << i;
+                sent &= if cosines[i] > 0.0 { !0 } else { !bit };
+                ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
+            }
+            let rays = RayRows::of(row.from, directions);
+            let (hits, objects) = self.shot.world.geometry.closest_rows(&rays, &mut ends);
+            sums.rays.scattered += u64::from(sent.count_ones());
+            for i in lanes(sent) {
+                let density = self.lobes(i).density(lane(&directions, i), glosses[i]);
+                let radiance = match hits.get(i) {
+                    Some(shape) => {
+                        let hit = Hit { shape, object: objects[i] };
+                        self.shot.lamp_radiance(&rays.ray(i), &hit, density)
+                    }
+                    None => self.shot.radiance_beyond(lane(&directions, i), density),
+                };
+                let value = lane(&f, i) * radiance * (cosines[i] / (density * count as f32));
+                let sum = lane(&sums.light, i) + value;
+                set_lane(&mut sums.light, i, sum);
+            }
+        }
+    }
+
+    /// Add what samples of one light bring, if they bring anything; where it waits for one ray, it is put beside.
+    #[inline(always)]
+    fn add(
+        &self,
+        samples: &LightRow,
+        values: &Lanes3,
+        active: u32,
+        sums: &mut Sums,
+        waiting: Option<&mut Waiting>,
+    ) {
         if active == 0 {
             return;
         }
@@ -420,26 +658,13 @@ impl Lighting<'_> {
             let is_active = active & 1 << i != 0;
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
-        if is_soft {
-            let (rays, ends) = self.shadow_rays(samples, active & !self.hidden(&samples.directions));
-            self.add_seen(&rays, &ends, &samples.sources, &values, sums);
-        } else {
+        if let Some(waiting) = waiting {
             waiting.active |= active;
-            add_where(active, &values, &mut waiting.light);
+            add_where(active, values, &mut waiting.light);
+        } else {
+            let (rays, ends) = self.shadow_rays(samples, active & !self.row.hidden(&samples.directions));
+            self.add_seen(&rays, &ends, &samples.sources, values, sums);
         }
-    }
-
-    /// A bit for each vertex that certainly sees nothing in a direction.
-    #[inline(always)]
-    fn hidden(&self, directions: &Lanes3) -> u32 {
-        let mut hidden = [0; LANES];
-        if self.row.is_bounded != 0 {
-            for i in 0..LANES {
-                let cosine = lane(&self.row.horizon, i).dot(lane(directions, i));
-                hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
-            }
-        }
-        bits(hidden) & self.row.is_bounded
     }
 
     /// What waits for one ray to the middle of its light.
@@ -459,7 +684,7 @@ impl Lighting<'_> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
-        let traced = waiting.active & !self.hidden(&direction);
+        let traced = waiting.active & !self.row.hidden(&direction);
         for i in 0..LANES {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
@@ -476,32 +701,14 @@ impl Lighting<'_> {
         }
         let traced = bits(traced);
         let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
-        sums.rays += u64::from(traced.count_ones());
+        sums.rays.shadow += u64::from(traced.count_ones());
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
     /// What each sample brings if nothing is in its way, and a bit for each that brings anything.
     #[inline(always)]
     fn values(&self, samples: &LightRow, share: f32) -> (Lanes3, u32) {
-        let row = self.row;
-        let mut cosines = [0.0; LANES];
-        for i in 0..LANES {
-            cosines[i] = lane(&row.normal, i).dot(lane(&samples.directions, i));
-        }
-        if row.is_bent {
-            for i in 0..LANES {
-                let smooth = lane(&row.smooth_normal, i).dot(lane(&samples.directions, i));
-                cosines[i] *= terminator(cosines[i], smooth, row.bend[i]);
-            }
-        }
-        let mut f = row.diffuse;
-        if row.is_glossy {
-            for i in 0..LANES {
-                let mirrored = lane(&row.mirrored_eye, i).dot(lane(&samples.directions, i));
-                let value = lane(&row.diffuse, i) + lane(&row.specular, i) * lobe(mirrored, row.shininess[i]);
-                set_lane(&mut f, i, value);
-            }
-        }
+        let Response { f, cosines, .. } = self.row.response(&samples.directions);
         let mut arriving = samples.weights;
         if self.measure == Measure::ArrivingShare {
             for i in 0..LANES {
@@ -534,6 +741,13 @@ impl Lighting<'_> {
         }
         (RayRows::of(self.row.from, direction), ends)
     }
+}
+
+/// What a sample counts where another way to find the same light has a density so many times as high (the power heuristic:
+/// Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
+#[inline(always)]
+pub fn weight(ratio: f32) -> f32 {
+    1.0 / (1.0 + ratio * ratio)
 }
 
 /// Add the values of the lanes whose bits are set.

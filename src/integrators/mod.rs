@@ -3,13 +3,15 @@
 //!
 //! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues`, their way to hits
 //! (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what touches it (`crossing`), the ways on at mirrors
-//! and glass (`specular`), `light` at a vertex, and the `sink` that takes what the view shows. Above them `whitted` and `views`.
+//! and glass (`specular`), `light` at a vertex, and the `sink` that takes what the view shows. `wave` follows the rays round by round, for both
+//! methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are of first hits.
 
 mod camera;
 mod counters;
 mod crossing;
 mod light;
 mod medium;
+mod onward;
 mod packet;
 mod queues;
 mod settings;
@@ -20,14 +22,13 @@ mod trace;
 mod vertices;
 mod view;
 mod views;
-mod whitted;
+mod wave;
 
 use std::ops::Range;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{NegativeLobes, Rect, TileSamples};
 use crate::math::Vec3;
-use crate::scene::description::Integrator;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
 use queues::Queues;
@@ -56,6 +57,7 @@ pub fn render_tile(
     let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
+    let settings = &RenderSettings { render: settings.render.heeded(), ..*settings };
     let shot = Shot { world, settings, block: &block, token };
     let mut queues = Queues::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
@@ -68,12 +70,8 @@ pub fn render_tile(
                 views::shade(&shot, number, &mut queues, &mut radiance, &mut counters)?;
             }
             Shown::Light(measure) => {
-                let sink = Sink { measure, radiance: &mut radiance };
-                match settings.render.integrator {
-                    Integrator::Whitted => {
-                        whitted::trace(&shot, slots, &mut queues, sink, &mut counters, negative)?;
-                    }
-                }
+                let sink = Sink { measure, radiance: &mut radiance, clamp: settings.render.clamp };
+                wave::trace(&shot, slots, &mut queues, sink, &mut counters, negative)?;
             }
         }
     }

@@ -108,11 +108,13 @@ impl Loops for Meeting<'_> {
         let mut surface = SurfaceRow::EMPTY;
         let any = hits.any();
         let (mut left, mut plain, mut shining) = (any, 0, 0);
+        let mut seen = !0;
         match rays {
             Rays::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
             Rays::Paths(paths) => {
                 for (lane, path) in paths.iter().enumerate() {
                     left &= if path.medium.is_air() { !0 } else { !(1 << lane) };
+                    seen &= if path.history.is_seen { !0 } else { !(1 << lane) };
                 }
             }
         }
@@ -130,7 +132,11 @@ impl Loops for Meeting<'_> {
                 plain |= of;
                 shining |= if material.emission.max_element() > 0.0 { of } else { 0 };
                 row.used |= if bsdf.is_black() { 0 } else { of };
+                let seen = seen & of;
                 row.set_bsdf(of, &bsdf, measure);
+                if seen != of && measure != Measure::ALL {
+                    row.set_bsdf(of & !seen, &bsdf, Measure::ALL);
+                }
             }
         }
         let front = if plain == 0 { 0 } else { row.place(&rays, first, rows, &surface) };
@@ -152,14 +158,17 @@ impl LitRow {
                 *own = if is_of { new } else { *own };
             }
             self.shininess[lane] = if is_of { bsdf.shininess } else { self.shininess[lane] };
+            self.albedos[0][lane] = if is_of { bsdf.diffuse.max_element() } else { self.albedos[0][lane] };
+            self.albedos[1][lane] = if is_of { bsdf.specular.max_element() } else { self.albedos[1][lane] };
         }
-        self.is_glossy |= specular != Vec3::ZERO;
+        self.is_glossy |= bsdf.specular != Vec3::ZERO;
     }
 
     /// Where paths meet plain surfaces; a bit for each that comes to the front.
     #[inline(always)]
     fn place(&mut self, paths: &Rays<'_>, first: u32, rays: &RayRows, surface: &SurfaceRow) -> u32 {
         let mut front = [0; PACKET];
+        self.medium = [0; PACKET];
         for i in 0..PACKET {
             let (normal, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
             let cosine = normal.dot(direction);
@@ -175,6 +184,7 @@ impl LitRow {
             Rays::Camera(_, slot, _) => {
                 self.throughput = [[1.0; PACKET]; 3];
                 self.path = [CAMERA_PATH + 1; PACKET];
+                self.carried = [1.0; PACKET];
                 for i in 0..PACKET {
                     (self.slot[i], self.place[i]) = (slot + i as u32, first + i as u32);
                 }
@@ -182,6 +192,7 @@ impl LitRow {
             Rays::Paths(paths) => {
                 for (i, path) in paths.iter().enumerate().take(PACKET) {
                     set_lane(&mut self.throughput, i, path.throughput);
+                    self.carried[i] = path.history.carried;
                     (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, first + i as u32);
                 }
             }

@@ -23,6 +23,35 @@ pub struct PathRay {
     pub path: u32,
     /// The glass that it is in.
     pub medium: Medium,
+    /// How it came to its direction.
+    pub history: History,
+}
+
+/// What the light that a path meets depends on beside its ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct History {
+    /// Density in sr⁻¹ with which the direction was drawn from the lobes of the last vertex; 0 where that is the camera, a mirror
+    /// or glass, or where the path passed through glass since: no light sample finds what it meets then.
+    pub density: f32,
+    /// The path's throughput as roulette sees it: its largest part, of all lobes, whatever the view shows.
+    pub carried: f32,
+    /// Whether there are but the camera, mirrors and glass before.
+    pub is_seen: bool,
+}
+
+impl History {
+    /// Of rays of the camera.
+    pub const CAMERA: Self = Self { density: 0.0, carried: 1.0, is_seen: true };
+
+    /// After a δ lobe with this part of the radiance.
+    pub fn mirrored(self, part: f32) -> Self {
+        Self { density: 0.0, carried: self.carried * part, ..self }
+    }
+
+    /// After passing surfaces that change nothing but hide what is behind from light samples.
+    pub fn hidden(self) -> Self {
+        self.mirrored(1.0)
+    }
 }
 
 impl PathRay {
@@ -75,7 +104,14 @@ mod tests {
 
     fn numbered(path: u32) -> PathRay {
         let ray = Ray::new(Vec3::ZERO, Vec3::Z);
-        PathRay { ray, throughput: Vec3::ONE, slot: 0, path, medium: Medium::default() }
+        PathRay {
+            ray,
+            throughput: Vec3::ONE,
+            slot: 0,
+            path,
+            medium: Medium::default(),
+            history: History::CAMERA,
+        }
     }
 
     #[test]

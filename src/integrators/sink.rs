@@ -19,6 +19,8 @@ pub struct Sink<'a> {
     pub measure: Measure,
     /// Sums, by slot.
     pub radiance: &'a mut [Vec3],
+    /// Most that a vertex which the eye does not see may bring; 0: no such limit.
+    pub clamp: f32,
 }
 
 impl Sink<'_> {
@@ -50,15 +52,18 @@ impl Sink<'_> {
         }
     }
 
-    /// What lamps send to the eye by the vertices of the slots from one on.
+    /// What lamps send to the eye by the vertices of the slots from one on, which the eye sees itself.
     pub fn add_arrived_run(&mut self, first: u32, contributions: &[Vec3]) {
         for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
             *sum += *contribution;
         }
     }
 
-    /// What lamps send to the eye by a vertex.
-    pub fn add_arrived(&mut self, slot: u32, contribution: Vec3) {
-        self.radiance[slot as usize] += contribution;
+    /// What lamps send to the eye by a vertex, which the eye sees itself or not.
+    pub fn add_arrived(&mut self, slot: u32, contribution: Vec3, is_seen: bool) {
+        let largest = contribution.max_element();
+        let is_clamped = !is_seen && self.clamp > 0.0 && largest > self.clamp;
+        let kept = if is_clamped { self.clamp / largest } else { 1.0 };
+        self.radiance[slot as usize] += contribution * kept;
     }
 }

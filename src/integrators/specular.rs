@@ -11,6 +11,8 @@ use crate::world::World;
 /// Which way a path goes on: tells the paths of one sample apart.
 const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
+/// [`REFLECTED`], by a lobe that is no δ.
+pub const SCATTERED: u32 = 3;
 
 /// The mirrored ray; a shading normal that sends it below the surface gives way to the geometric one.
 pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
@@ -24,6 +26,7 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
         ray: vertex.leaving(direction.normalize()),
         throughput: path.throughput * reflectance,
         path: path.next_path(REFLECTED),
+        history: path.history.mirrored(reflectance.max_element()),
         ..*path
     }
 }
@@ -51,6 +54,7 @@ pub fn interface(
         ray: vertex.leaving(direction),
         path: path.next_path(REFRACTED),
         medium: far,
+        history: path.history.mirrored(1.0),
         ..*path
     });
     Interface { reflectance, refracted }

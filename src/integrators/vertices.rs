@@ -71,6 +71,11 @@ impl<'a> Vertex<'a> {
         }
     }
 
+    /// Whether it sends out light towards the path.
+    pub fn emits(&self) -> bool {
+        self.is_front && self.material.emission != Vec3::ZERO
+    }
+
     /// The same, with rays that leave from these.
     pub fn between(self, sides: Sides) -> Self {
         Self { sides: Some(sides), ..self }

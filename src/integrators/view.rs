@@ -68,6 +68,11 @@ pub enum Measure {
     ArrivingShare,
 }
 
+impl Measure {
+    /// All radiance.
+    pub const ALL: Self = Self::Radiance(Parts::ALL);
+}
+
 /// Parts of the light that a sample sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parts {

@@ -55,7 +55,7 @@ impl DirectionalLight {
             return (self.to_light, self.irradiance);
         }
         let direction = Frame::from_normal(self.to_light).to_world(warp::cone(u, self.one_minus_cos));
-        (direction, self.radiance * (2.0 * PI * self.one_minus_cos))
+        (direction, self.radiance * self.inverse_density())
     }
 
     /// Radiance from a direction; none from a light without extent.
@@ -65,7 +65,13 @@ impl DirectionalLight {
 
     /// Density in sr⁻¹ of [`DirectionalLight::sample`]; 0 without extent.
     pub fn pdf(&self, direction: Vec3) -> f32 {
-        if self.holds(direction) { 1.0 / (2.0 * PI * self.one_minus_cos) } else { 0.0 }
+        if self.holds(direction) { 1.0 / self.inverse_density() } else { 0.0 }
+    }
+
+    /// One over that density; 0 without extent.
+    #[inline(always)]
+    pub fn inverse_density(&self) -> f32 {
+        2.0 * PI * self.one_minus_cos
     }
 
     /// Whether a unit direction is one of the disc. By the chord between them, which is exact for small discs too.

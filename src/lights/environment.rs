@@ -47,6 +47,13 @@ impl Environment {
         }
     }
 
+    /// One over the density of a sample; 0 where there are none.
+    #[inline(always)]
+    pub fn inverse_density(&self, direction: Vec3) -> f32 {
+        let (_, density) = self.arriving(direction);
+        if density > 0.0 { 1.0 / density } else { 0.0 }
+    }
+
     /// A way for its light to arrive at a surface of this normal.
     pub fn sample(&self, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let (direction, weight) = self.arriving_at(normal, u);

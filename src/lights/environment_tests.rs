@@ -141,15 +141,14 @@ fn samples_come_as_often_as_their_densities_say() {
             let steps = 24;
             let mut sum = 0.0;
             for (i, j) in (0..steps).flat_map(|j| (0..steps).map(move |i| (i, j))) {
-                let at =
-                    |k: usize, of: usize| (k as f64 + (f64::from(of as u32) + 0.5) / f64::from(steps as u32));
+                let at = |k: usize, of: usize| k as f64 + (of as f64 + 0.5) / steps as f64;
                 let phi = (at(cell % columns, i) / columns as f64 - 0.5) * TAU;
                 let y = 1.0 - 2.0 * at(cell / columns, j) / rows as f64;
                 let sin = (1.0 - y * y).sqrt();
                 let direction = DVec3::new(sin * phi.sin(), y, -sin * phi.cos()).as_vec3();
                 sum += f64::from(environment.arriving(direction).1);
             }
-            sum / f64::from((steps * steps) as u32) * 2.0 * TAU / (columns * rows) as f64 * f64::from(count)
+            sum / (steps * steps) as f64 * 2.0 * TAU / (columns * rows) as f64 * f64::from(count)
         };
         let (mut statistic, mut freedom, mut pooled) = (0.0, 0.0, (0.0, 0.0));
         for (cell, count) in counts.iter().enumerate() {

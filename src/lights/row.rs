@@ -182,3 +182,28 @@ impl Light {
         row
     }
 }
+
+impl Light {
+    /// One over the densities in sr⁻¹ of samples of this light; 0 of a light without extent, which has no other way to be found,
+    /// and where nothing arrives.
+    #[inline(always)]
+    pub fn inverse_densities(&self, samples: &LightRow) -> Lanes {
+        let mut inverse = [0.0; LANES];
+        match self {
+            Self::Point(_) | Self::Spot(_) => {}
+            Self::Directional(light) => inverse = [light.inverse_density(); LANES],
+            Self::Environment(light) => {
+                for i in 0..LANES {
+                    inverse[i] = light.inverse_density(lane(&samples.directions, i));
+                }
+            }
+            Self::Area(light) => {
+                let of_radiance = 1.0 / light.radiance.max_element();
+                for i in 0..LANES {
+                    inverse[i] = lane(&samples.weights, i).max_element() * of_radiance;
+                }
+            }
+        }
+        inverse
+    }
+}

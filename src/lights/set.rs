@@ -82,6 +82,11 @@ impl Lights {
         self.all.is_empty()
     }
 
+    /// Whether a ray can find any.
+    pub fn can_be_found(&self) -> bool {
+        !self.by_object.is_empty() || self.are_beyond()
+    }
+
     /// All with their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {
         (0..).zip(&self.all)
@@ -92,15 +97,13 @@ impl Lights {
         !self.suns.is_empty() || self.environment.is_some()
     }
 
-    /// Radiance that comes from beyond the scene, from a unit direction.
-    pub fn beyond(&self, direction: Vec3) -> Vec3 {
-        self.each_beyond(direction).map(|(radiance, _)| radiance).sum()
-    }
-
-    /// The same from each light, with the density in sr⁻¹ of samples of that light: for the way that a surface chose by itself.
-    pub fn each_beyond(&self, direction: Vec3) -> impl Iterator<Item = (Vec3, f32)> {
-        let suns = self.suns.iter().map(move |sun| (sun.radiance(direction), sun.pdf(direction)));
-        suns.chain(self.environment.iter().map(move |light| light.arriving(direction)))
+    /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by the density in
+    /// sr⁻¹ of its samples from there.
+    pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
+        let suns = self.suns.iter().map(|sun| (sun.radiance(direction), sun.pdf(direction)));
+        let environment = self.environment.iter().map(|environment| environment.arriving(direction));
+        let seen = suns.chain(environment).filter(|(radiance, _)| *radiance != Vec3::ZERO);
+        seen.map(|(radiance, density)| radiance * share(density)).sum()
     }
 
     /// The light that a primitive of an object is, with its number.

@@ -2,6 +2,7 @@
 
 pub mod fresnel;
 pub mod glass;
+pub mod lobes;
 pub mod mirror;
 pub mod normal_map;
 pub mod phong;
@@ -9,6 +10,7 @@ pub mod texels;
 pub mod texture;
 
 pub use glass::Glass;
+pub use lobes::Lobes;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use phong::Phong;

@@ -3,8 +3,8 @@
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
+use super::lobes::{Lobes, gloss};
 use super::texture::Color;
-use crate::math::elementary::pow;
 use crate::math::{DVec2, Vec3};
 
 /// Diffuse and glossy reflection on both sides.
@@ -65,13 +65,22 @@ impl PhongBsdf {
         self.diffuse * FRAC_1_PI
     }
 
-    /// The glossy part of f in sr⁻¹, for unit vectors that point away from the surface.
-    pub fn specular_value(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> Vec3 {
-        if self.specular == Vec3::ZERO {
-            return Vec3::ZERO;
+    /// f in sr⁻¹ for light from a direction.
+    pub fn value(&self, lobes: &Lobes, to_light: Vec3) -> Vec3 {
+        let gloss = gloss(lobes.mirrored_eye, to_light, self.shininess);
+        self.diffuse_value() + self.specular_peak() * gloss
+    }
+
+    /// Its lobes for a direction to the eye, by the unit normal on that side.
+    pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> Lobes {
+        Lobes {
+            normal,
+            // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
+            mirrored_eye: normal * (2.0 * normal.dot(to_eye)) - to_eye,
+            diffuse: self.diffuse.max_element(),
+            specular: self.specular.max_element(),
+            shininess: self.shininess,
         }
-        let mirrored = normal * (2.0 * normal.dot(to_light)) - to_light;
-        self.specular_peak() * lobe(mirrored.dot(to_eye), self.shininess)
     }
 
     /// The glossy part of f in sr⁻¹ where the mirrored direction is the eye's.
@@ -85,19 +94,17 @@ impl PhongBsdf {
     }
 }
 
-/// What part of the glossy lobe's peak is left, by the cosine between the mirrored direction and the eye's.
-#[inline(always)]
-pub fn lobe(cosine: f32, shininess: f32) -> f32 {
-    let size = if cosine > 0.0 { cosine } else { 0.0 };
-    pow(if size < 1.0 { size } else { 1.0 }, shininess)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn glossy(shininess: f32) -> PhongBsdf {
         PhongBsdf { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess, ambient: Vec3::ZERO }
+    }
+
+    fn reflected(shininess: f32, to_eye: Vec3, to_light: Vec3) -> f32 {
+        let bsdf = glossy(shininess);
+        bsdf.value(&bsdf.lobes(Vec3::Z, to_eye), to_light).x
     }
 
     fn at_angle(degrees: f32) -> Vec3 {
@@ -108,7 +115,7 @@ mod tests {
     #[test]
     fn the_lobe_of_known_value() {
         // (n + 2)/2π·cosⁿ 10° at n = 50, looking 10° beside the mirrored direction.
-        let value = glossy(50.0).specular_value(Vec3::Z, at_angle(-30.0), at_angle(20.0)).x;
+        let value = reflected(50.0, at_angle(-30.0), at_angle(20.0));
         let expected = 52.0 / (2.0 * std::f64::consts::PI) * 10.0_f64.to_radians().cos().powi(50);
         assert!((f64::from(value) - expected).abs() < 1e-4 * expected, "{value} {expected}");
     }
@@ -123,7 +130,7 @@ mod tests {
             for step in 0..steps {
                 let (s, c) = (step as f32 / steps as f32 * 2.0 * PI).sin_cos();
                 let light = Vec3::new(sin * c, sin * s, cos);
-                sum += f64::from(glossy(shininess).specular_value(Vec3::Z, at_angle(degrees), light).x);
+                sum += f64::from(reflected(shininess, at_angle(degrees), light));
             }
         }
         // Equal steps of cos² weigh by the cosine: ∫f cos dω = π·mean(f).

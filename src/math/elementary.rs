@@ -13,6 +13,12 @@ pub fn pow(x: f32, y: f32) -> f32 {
     if (y == 0.0) | (x == 1.0) { 1.0 } else { power }
 }
 
+/// xʸ for normal x > 0, within 1e-11 times y of itself; 0 or ∞ where `f32` is.
+#[inline(always)]
+pub fn power_f64(x: f64, y: f64) -> f64 {
+    exp2_f64(y * log2_f64(x))
+}
+
 /// 2ˣ within one ulp.
 #[inline(always)]
 pub fn exp2(x: f32) -> f32 {

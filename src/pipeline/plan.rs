@@ -10,7 +10,7 @@ use crate::film::tone::{Distances, ToneMapping};
 use crate::integrators::{FirstHit, Measure, RenderSettings, Shown};
 use crate::math::Vec3;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Scene, Tonemap};
+use crate::scene::description::{Accel, Integrator, MaterialKind, Render, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -67,6 +67,34 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         report: overrides.report.clone(),
         scene: with_accel(scene, render.accel),
     })
+}
+
+/// What a person should know of the integrator that was asked for.
+pub(super) fn warnings(scene: &Scene, render: &Render) -> Vec<String> {
+    let is_path = match render.integrator {
+        Integrator::Path => true,
+        Integrator::Whitted => false,
+    };
+    let is_specular = |index: usize| match scene.materials[index].kind {
+        MaterialKind::Mirror { .. } | MaterialKind::Glass { .. } => true,
+        MaterialKind::Phong { .. } => false,
+    };
+    let specular = || scene.objects.iter().filter_map(|object| object.material).any(is_specular);
+    let mut warnings = Vec::new();
+    if is_path && !scene.lights.is_empty() && specular() {
+        warnings.push(
+            "path finds no light of a [[light]] without size that passes mirror or glass before it meets a surface: \
+             what they would throw on it stays dark"
+                .to_owned(),
+        );
+    }
+    if render.heeded().clamp > 0.0 {
+        warnings.push(format!(
+            "`clamp` {} makes the picture less noisy, but too dark: it is biased",
+            render.clamp
+        ));
+    }
+    warnings
 }
 
 /// A scene may be large: it is copied only where it has to be another one.

@@ -359,6 +359,8 @@ pub struct Counters {
     pub reflected_rays: u64,
     /// Refracted rays.
     pub refracted_rays: u64,
+    /// Rays that go on from diffuse and glossy surfaces.
+    pub scattered_rays: u64,
     /// Photons sent out.
     pub photons_emitted: u64,
     /// Photons stored.

@@ -76,6 +76,7 @@ fn counters(finished: &Finished<'_>) -> Counters {
         shadow_rays: rays.shadow_rays,
         reflected_rays: rays.reflected_rays,
         refracted_rays: rays.refracted_rays,
+        scattered_rays: rays.scattered_rays,
         photons_emitted: 0,
         photons_stored: 0,
         texels_loaded: finished.texels_loaded,

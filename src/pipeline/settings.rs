@@ -31,6 +31,8 @@ pub struct Overrides {
     pub integrator: Option<Integrator>,
     /// Shadows.
     pub shadows: Option<Shadows>,
+    /// Most that a path brings by one vertex.
+    pub clamp: Option<f32>,
     /// Photon maps.
     pub photons: Option<bool>,
     /// Depth of field.
@@ -59,6 +61,7 @@ impl Overrides {
             max_depth: self.max_depth.unwrap_or(to.max_depth),
             integrator: self.integrator.unwrap_or(to.integrator),
             shadows: self.shadows.unwrap_or(to.shadows),
+            clamp: self.clamp.unwrap_or(to.clamp),
             accel: self.accel.unwrap_or(to.accel),
             seed: self.seed.unwrap_or(to.seed),
             ..*to
@@ -81,6 +84,8 @@ pub struct Effective {
     /// Shadows.
     #[serde(serialize_with = "choice::serialize")]
     pub shadows: Shadows,
+    /// Most radiance that a path brings by one vertex after its first reflection, which is a bias; 0: no such limit.
+    pub clamp: f32,
     /// Whether photons are on.
     pub photons: bool,
     /// Whether depth of field is on.
@@ -109,6 +114,7 @@ impl Effective {
             samples: render.samples,
             integrator: render.integrator,
             shadows: render.shadows,
+            clamp: render.heeded().clamp,
             // The integrators of this version gather no photons, whatever is asked for.
             photons: false,
             dof,

@@ -15,6 +15,12 @@ pub enum Decision {
     Light(u32),
     /// Which of two ways to go on.
     Choice,
+    /// Which lobe to go on in.
+    Lobe,
+    /// Where to in a lobe.
+    Direction,
+    /// Whether to go on at all.
+    Roulette,
 }
 
 impl Decision {
@@ -26,6 +32,9 @@ impl Decision {
             Self::Choice => u32::MAX,
             Self::Pixel => u32::MAX - 1,
             Self::Lens => u32::MAX - 2,
+            Self::Lobe => u32::MAX - 3,
+            Self::Direction => u32::MAX - 4,
+            Self::Roulette => u32::MAX - 5,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }

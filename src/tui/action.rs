@@ -6,6 +6,7 @@ pub(super) enum Action {
     CycleShadows,
     ToggleDepthOfField,
     TogglePhotons,
+    CycleIntegrator,
     NextView,
     PreviousView,
     TogglePause,

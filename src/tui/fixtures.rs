@@ -136,6 +136,7 @@ pub(super) fn settings() -> Effective {
         samples: 64,
         integrator: Integrator::Whitted,
         shadows: Shadows::Soft,
+        clamp: 0.0,
         photons: false,
         dof: true,
         accel: Accel::Bvh,

@@ -35,6 +35,7 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", "shadows"),
     binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", "dof"),
     binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons: not in this version", ""),
+    binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", "path"),
     binding(&[KeyPress::plain('v')], "v", Action::NextView, "next view: normals, depth, …", "view"),
     binding(&[KeyPress::plain('V')], "V", Action::PreviousView, "previous view", ""),
     binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn the_fixed_keys_are_there() {
-        for key in "?qsdpv rw0".chars() {
+        for key in "?qsdpiv rw0".chars() {
             assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
         }
     }

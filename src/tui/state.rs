@@ -9,7 +9,7 @@ use super::event::{Window, Written};
 use crate::film::Picture;
 use crate::pipeline::protocol::{AssetProgress, PreviewSize, RenderProgress, Report, Stage, StageReport};
 use crate::pipeline::settings::{Effective, Overrides, View};
-use crate::scene::description::Shadows;
+use crate::scene::description::{Integrator, Shadows};
 use crate::scene::diagnostic::Diagnostic;
 
 /// How pictures become cells.
@@ -24,6 +24,7 @@ pub(super) enum PreviewKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Toggles {
     pub shadows: Option<Shadows>,
+    pub integrator: Option<Integrator>,
     pub dof: Option<bool>,
     pub view: Option<View>,
 }
@@ -216,6 +217,7 @@ impl State {
     pub(super) fn overrides(&self) -> Overrides {
         let mut overrides = self.base.clone();
         overrides.shadows = self.toggles.shadows.or(overrides.shadows);
+        overrides.integrator = self.toggles.integrator.or(overrides.integrator);
         overrides.dof = self.toggles.dof.or(overrides.dof);
         overrides.view = self.toggles.view.or(overrides.view);
         overrides
@@ -234,6 +236,12 @@ impl State {
     pub(super) fn shadows(&self) -> Shadows {
         let of_scene = self.effective.as_ref().map_or(Shadows::Soft, |effective| effective.shadows);
         self.overrides().shadows.unwrap_or(of_scene)
+    }
+
+    /// The integrator that holds now.
+    pub(super) fn integrator(&self) -> Integrator {
+        let of_scene = self.effective.as_ref().map_or(Integrator::Whitted, |effective| effective.integrator);
+        self.overrides().integrator.unwrap_or(of_scene)
     }
 
     pub(super) fn is_running(&self) -> bool {

@@ -309,7 +309,6 @@ const BROKEN: &[(&str, &[Said])] = &[
     (
         "unavailable",
         &[
-            (3, 14, r#"integrator "path" is not available in this version; use "whitted""#),
             (5, 9, "`error` > 0 is not available in this version"),
             (13, 10, r#"filter "mipmap" is not available in this version; use one of "nearest", "bilinear""#),
             (23, 2, "[environment] is not available in this version"),

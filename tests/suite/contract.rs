@@ -34,6 +34,7 @@ const TABLES: &[(&str, &[Key])] = &[
             ("error", "0.0", Default),
             ("max_depth", "8", Default),
             ("integrator", "\"whitted\"", Default),
+            ("clamp", "0.0", Default),
             ("shadows", "\"soft\"", Default),
             ("ambient", "[0, 0, 0]", Default),
             ("background", "[0, 0, 0]", Default),

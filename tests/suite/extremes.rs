@@ -214,16 +214,21 @@ fn bundled_scenes_are_right_and_the_same_with_any_number_of_threads() {
     for scene in bundled().iter().filter(|scene| !is_made_on_demand(scene)) {
         let desk = Desk::new();
         let path = scene.display();
-        for threads in [1, 2, 7] {
-            let size = "--width 40 --height 30 --samples 3";
-            let outputs = format!("-o {threads}.png -o {threads}.exr");
-            let report = desk.report(&format!("{path} {size} {outputs} --threads {threads}"));
-            assert_eq!(report["counters"]["non_finite_samples"], 0, "{path}");
-            assert_eq!(report["settings"]["threads"], threads, "{path}");
-        }
-        for ending in ["png", "exr"] {
-            let picture = |threads: u32| desk.bytes(&format!("{threads}.{ending}"));
-            assert!(picture(1) == picture(2) && picture(1) == picture(7), "{path} .{ending}");
+        for integrator in ["whitted", "path"] {
+            for threads in [1, 2, 7] {
+                let size = format!("--width 40 --height 30 --samples 3 --integrator {integrator}");
+                let outputs = format!("-o {threads}.png -o {threads}.exr");
+                let report = desk.report(&format!("{path} {size} {outputs} --threads {threads}"));
+                assert_eq!(report["counters"]["non_finite_samples"], 0, "{path} by {integrator}");
+                assert_eq!(report["settings"]["threads"], threads, "{path}");
+            }
+            for ending in ["png", "exr"] {
+                let picture = |threads: u32| desk.bytes(&format!("{threads}.{ending}"));
+                assert!(
+                    picture(1) == picture(2) && picture(1) == picture(7),
+                    "{path} .{ending} by {integrator}"
+                );
+            }
         }
         let check = desk.run(&format!("check {path}"));
         let (answer, said) = (String::from_utf8_lossy(&check.stdout), String::from_utf8_lossy(&check.stderr));

@@ -228,7 +228,8 @@ fn a_wrong_call_is_2() {
     let desk = Desk::new();
     for (line, word) in [
         ("ball.toml --once --samples 0", "--samples"),
-        ("ball.toml --once --integrator path", "not available"),
+        ("ball.toml --once --integrator paths", "path"),
+        ("ball.toml --once --clamp x", "--clamp"),
         ("ball.toml --once --accel octree", "kdtree"),
         ("ball.toml --once -o a.xyz", "a.xyz"),
         ("ball.toml --once --crop 0,0,33,1", "32×24"),

@@ -275,6 +275,7 @@ fn help_fits_and_names_every_option() {
         "--integrator",
         "--max-depth",
         "--shadows",
+        "--clamp",
         "--photons",
         "--dof",
         "--accel",

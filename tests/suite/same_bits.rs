@@ -19,6 +19,7 @@ height = 30
 samples = 5
 shadow_samples = 2
 filter = "FILTER"
+integrator = "INTEGRATOR"
 ambient = [0.05, 0.06, 0.07]
 background = [0.2, 0.3, 0.5]
 [camera]
@@ -97,11 +98,12 @@ intensity = [9, 9, 9]
 #[test]
 fn known_pictures_have_their_bits_by_every_instruction_set() {
     let desk = Desk::new();
-    let known: [(&str, u64); 4] = [
-        ("box", 0x4257_756f_d8d8_6578),
-        ("tent", 0xbbf4_4ce3_c14e_85bc),
-        ("gaussian", 0xc175_b87c_997d_3a33),
-        ("mitchell", 0x8878_f865_d2bb_430d),
+    let known: [(&str, &str, u64); 5] = [
+        ("box", "whitted", 0x1112_d3d2_74ba_fa65),
+        ("tent", "whitted", 0x36f6_ddfa_d89e_7e0a),
+        ("gaussian", "whitted", 0x9b0c_3547_e87f_5b6d),
+        ("mitchell", "whitted", 0x9763_20df_c066_6b78),
+        ("box", "path", 0x69e9_85cd_9ebf_1c74),
     ];
     let mut tried = Vec::new();
     let mut wrong = Vec::new();
@@ -112,14 +114,14 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
             continue;
         }
         tried.push(instructions);
-        for (filter, expected) in known {
-            desk.write("all.toml", EVERYTHING.replace("FILTER", filter));
+        for (filter, integrator, expected) in known {
+            desk.write("all.toml", EVERYTHING.replace("FILTER", filter).replace("INTEGRATOR", integrator));
             let mut process = desk.glimt("all.toml --once -o all.exr");
             let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
             assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
             let found = hash(&desk, "all.exr");
             if found != expected {
-                wrong.push(format!("{filter} by {name}: {found:#018x}"));
+                wrong.push(format!("{integrator}, {filter} by {name}: {found:#018x}"));
             }
         }
     }

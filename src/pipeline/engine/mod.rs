@@ -14,7 +14,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::cache::{Memo, Pool};
 use super::inputs::Inputs;
-use super::plan::{Plan, cores, plan};
+use super::plan::{Plan, cores, plan, warnings};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
 use super::settings::Overrides;
@@ -220,6 +220,9 @@ impl Engine {
         })?;
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
+        for warning in warnings(&plan.scene, &plan.settings.render) {
+            findings.warn(&parsed.loaded, 0..0, warning);
+        }
         let settings = Box::new(plan.effective.clone());
         table.sink.send(Event::Settings { generation: request.generation, settings });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed.loaded));
@@ -373,6 +376,9 @@ impl Engine {
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             let plan = plan(&loaded.scene, path, &Overrides::default())
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
+            for warning in warnings(&plan.scene, &plan.settings.render) {
+                findings.warn(loaded, 0..0, warning);
+            }
             if plan.named_by == NamedBy::Scene {
                 let inputs = inputs(&parsed, &found, &findings);
                 findings.errors.extend(conflicts(&plan, &inputs));

@@ -193,6 +193,7 @@ mod tests {
             max_depth,
             integrator,
             shadows,
+            clamp,
             ambient,
             background,
             filter,
@@ -201,7 +202,8 @@ mod tests {
             accel,
             seed,
         } = render_settings;
-        assert_eq!((integrator, shadows), (Integrator::Whitted, Shadows::Soft));
+        assert_eq!((integrator, shadows, clamp), (Integrator::Whitted, Shadows::Soft, 0.0));
+        let path = Render { integrator: Integrator::Path, ..render_settings };
         assert_eq!(
             (filter, view, tonemap, accel),
             (PixelFilter::Box, View::Beauty, Tonemap::None, Accel::Bvh)
@@ -214,6 +216,8 @@ mod tests {
             with(Render { max_depth: max_depth + 1, ..render_settings }),
             with(Render { shadows: Shadows::Hard, ..render_settings }),
             with(Render { shadows: Shadows::Off, ..render_settings }),
+            with(path),
+            with(Render { clamp: 1.0, ..path }),
             with(Render { ambient: ambient + Vec3::ONE, ..render_settings }),
             with(Render { background: background + Vec3::ONE, ..render_settings }),
             with(Render { filter: PixelFilter::Tent, ..render_settings }),
@@ -230,6 +234,13 @@ mod tests {
         ] {
             assert_eq!(of(&with(same)), of(&settings), "{same:?}");
         }
+        // What path ignores, and whitted.
+        for same in
+            [Render { shadows: Shadows::Hard, ..path }, Render { ambient: ambient + Vec3::ONE, ..path }]
+        {
+            assert_eq!(of(&with(same)), of(&with(path)), "{same:?}");
+        }
+        assert_eq!(of(&with(Render { clamp: 1.0, ..render_settings })), of(&settings));
         let mut keys: Vec<Key> = others.iter().chain([&settings]).map(of).collect();
         let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
         keys.push(render(Fingerprint::new("w").finish(), &settings, Some(crop)));

@@ -26,6 +26,8 @@ pub struct Render {
     pub integrator: Integrator,
     /// Shadows.
     pub shadows: Shadows,
+    /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection; 0: no such limit.
+    pub clamp: f32,
     /// Ambient radiance of the Phong model.
     pub ambient: Vec3,
     /// Radiance seen by a ray that leaves the scene.
@@ -47,8 +49,9 @@ choice! {
     pub enum Integrator {
         /// Direct light by Phong, mirror, glass, ambient.
         Whitted = "whitted",
+        /// All light, by paths from the eye, without bias.
+        Path = "path",
     }
-    unavailable "path"
 }
 
 choice! {
@@ -76,6 +79,16 @@ choice! {
     }
 }
 
+impl Render {
+    /// With the defaults in place of what its integrator ignores.
+    pub fn heeded(self) -> Self {
+        match self.integrator {
+            Integrator::Whitted => Self { clamp: 0.0, ..self },
+            Integrator::Path => Self { shadows: Shadows::Soft, ambient: Vec3::ZERO, ..self },
+        }
+    }
+}
+
 /// What the samples of a picture depend on.
 impl Fingerprinted for Render {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
@@ -88,6 +101,7 @@ impl Fingerprinted for Render {
             max_depth,
             integrator,
             shadows,
+            clamp,
             ambient,
             background,
             filter,
@@ -97,8 +111,14 @@ impl Fingerprinted for Render {
             // All trees give the same hits.
             accel: _,
             seed,
-        } = *self;
+        } = self.heeded();
         key.u64(width.into()).u64(height.into()).u64(shadow_samples.into()).u64(max_depth.into());
-        key.choice(integrator).choice(shadows).vec3(ambient).vec3(background).choice(filter).u64(seed.into());
+        key.choice(integrator)
+            .choice(shadows)
+            .f32(clamp)
+            .vec3(ambient)
+            .vec3(background)
+            .choice(filter)
+            .u64(seed.into());
     }
 }

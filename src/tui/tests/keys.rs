@@ -4,7 +4,7 @@ use super::RED;
 use crate::choice::Choice;
 use crate::pipeline::protocol::{self, Command, Writing};
 use crate::pipeline::settings::{Effective, Overrides, View};
-use crate::scene::description::Shadows;
+use crate::scene::description::{Integrator, Shadows};
 use crate::scene::diagnostic::Severity;
 use crate::tui::action::Action;
 use crate::tui::color::ColorDepth;
@@ -44,6 +44,16 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
         Action::TogglePhotons => {
             assert!(desk.key(key).is_empty());
             assert!(desk.text().contains("photons come with a later version"));
+        }
+        Action::CycleIntegrator => {
+            for wanted in [Integrator::Path, Integrator::Whitted] {
+                let effects = desk.key(key);
+                assert_eq!(overrides(&effects).expect("a request").integrator, Some(wanted));
+            }
+            desk.key(key);
+            assert!(desk.text().contains("path"), "{}", desk.text());
+            assert!(desk.press('s').is_empty(), "path has no other shadows");
+            assert!(desk.text().contains("path ignores"), "{}", desk.text());
         }
         Action::NextView | Action::PreviousView => {
             let effects = desk.key(key);

@@ -4,7 +4,7 @@ use super::{render, say};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
-use crate::scene::description::Shadows;
+use crate::scene::description::{Integrator, Shadows};
 use crate::tui::ExitStatus;
 use crate::tui::action::Action;
 use crate::tui::event::{Effect, KeyPress};
@@ -23,6 +23,7 @@ fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::CycleShadows => cycle_shadows(state),
         Action::ToggleDepthOfField => toggle_depth_of_field(state),
         Action::TogglePhotons => told(state, "photons come with a later version: this one has none"),
+        Action::CycleIntegrator => cycle_integrator(state),
         Action::NextView => step_view(state, 1),
         Action::PreviousView => step_view(state, View::ALL.len() - 1),
         Action::TogglePause => toggle_pause(state),
@@ -54,7 +55,21 @@ fn told(state: &mut State, message: &str) -> Vec<Effect> {
     Vec::new()
 }
 
+fn cycle_integrator(state: &mut State) -> Vec<Effect> {
+    state.toggles.integrator = Some(match state.integrator() {
+        Integrator::Whitted => Integrator::Path,
+        Integrator::Path => Integrator::Whitted,
+    });
+    render(state, false)
+}
+
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
+    match state.integrator() {
+        Integrator::Path => {
+            return told(state, "path ignores `shadows`: its light is what it is; i is whitted");
+        }
+        Integrator::Whitted => {}
+    }
     let next = match state.shadows() {
         Shadows::Soft => Shadows::Hard,
         Shadows::Hard => Shadows::Off,

@@ -8,6 +8,7 @@ use ratatui::layout::Rect;
 use super::layout::Layout;
 use super::text::{Tone, columns, duration, gauge, percent, put, put_right, seconds};
 use crate::choice::Choice;
+use crate::scene::description::Integrator;
 use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP};
@@ -102,12 +103,15 @@ pub(super) fn status(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.status;
     let help = keymap::of(Action::ToggleHelp).map_or(String::new(), |it| format!("{} {}", it.label, it.hint));
     let mut words = vec![
-        format!("shadows {}", state.shadows().name()),
+        match state.integrator() {
+            Integrator::Whitted => format!("shadows {}", state.shadows().name()),
+            Integrator::Path => "shadows as they are".to_owned(),
+        },
         format!("photons {}", on_off(state.effective.as_ref().is_some_and(|it| it.photons))),
         format!("dof {}", on_off(depth_of_field(state))),
         format!("view {}", state.view().name()),
     ];
-    words.extend(state.effective.as_ref().map(|it| it.integrator.name().to_owned()));
+    words.push(state.integrator().name().to_owned());
     if !layout.hidden.is_empty() {
         words.insert(0, format!("{} (too small: {} hidden)", activity(state).0, layout.hidden.join(", ")));
     }

@@ -7,6 +7,7 @@ mod facets;
 mod far;
 mod film;
 mod glass;
+mod global;
 mod hard;
 mod mirror;
 mod robust;
@@ -16,6 +17,7 @@ mod round_properties;
 mod rows;
 mod scenes;
 mod shading;
+mod sky;
 mod speckle;
 mod touching;
 

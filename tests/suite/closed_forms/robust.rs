@@ -1,5 +1,6 @@
 //! Rays that leave surfaces, aim at edges, are huge, tiny or not a number.
 
+use glimt::choice::Choice;
 use glimt::control::CancelToken;
 use glimt::film::Rect;
 use glimt::geometry::ray::offset_origin;
@@ -8,7 +9,7 @@ use glimt::integrators::render_tile;
 use glimt::lights::Source;
 use glimt::materials::fresnel::dielectric;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Falloff, Shape};
+use glimt::scene::description::{Falloff, Integrator, Shape};
 use glimt::world::{Geometry, Hit};
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
@@ -265,7 +266,12 @@ fn a_scene_of_any_scale_gives_the_same_bits() {
 #[test]
 fn no_split_of_the_work_changes_a_bit() {
     // A sample is a function of the scene, its pixel, its number and the seed.
-    let build = of_everything(0);
+    for integrator in Integrator::ALL {
+        assert_no_split(&of_everything(0).with(|scene| scene.render.integrator = *integrator));
+    }
+}
+
+fn assert_no_split(build: &Build) {
     let (world, settings, token) = (build.world(), build.settings(4), CancelToken::new());
     let render = |x, y, width, height, samples| {
         let rect = Rect { x, y, width, height };

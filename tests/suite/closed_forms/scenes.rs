@@ -39,6 +39,7 @@ pub fn scene() -> Build {
         max_depth: 8,
         integrator: Integrator::Whitted,
         shadows: Shadows::Soft,
+        clamp: 0.0,
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
         filter: PixelFilter::Box,

@@ -1,5 +1,6 @@
-//! Direct light by Phong, mirror, glass and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*,
-//! 1980), over queues instead of recursion.
+//! Rays from the eye, round by round over queues instead of recursion. In whitted they are split at glass and end at Phong
+//! surfaces, which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). In path each
+//! stays one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986).
 
 use std::ops::Range;
 
@@ -8,18 +9,21 @@ use super::camera::CAMERA_ROWS;
 use super::crossing::{Crossing, CrossingMemory};
 use super::light::LitQueue;
 use super::medium::{Medium, absorption};
+use super::onward::Onward;
 use super::packet::Rays;
 use super::queues::{PathRay, Queues};
 use super::shot::Shot;
 use super::sink::{Part, Sink};
 use super::specular::{Interface, interface, reflected};
 use super::vertices::{LitVertex, Vertex};
+use super::view::Measure;
 use crate::control::Cancelled;
-use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
+use crate::geometry::{Ray, ShapeHit};
 use crate::materials::{Bsdf, Mirror, Phong};
 use crate::math::Vec3;
 use crate::sampling::Decision;
+use crate::scene::description::Integrator;
 use crate::world::{Hit, PACKET};
 
 /// A ray is split in two while the weaker part counts at least this much of its sample; below, chance takes one of them.
@@ -43,7 +47,14 @@ pub fn trace(
 ) -> Result<(), Cancelled> {
     let Queues { rays, next, lit, crossing, camera, .. } = queues;
     next.clear();
-    let mut wave = Wave { depth: 0, shot, lit, sink, next, crossing, place: 0, counters };
+    let is_path = match shot.settings.render.integrator {
+        Integrator::Whitted => false,
+        // What arrives of the lamps' light is asked at what the eye sees.
+        Integrator::Path => sink.measure != Measure::ArrivingShare,
+    };
+    let mut wave =
+        Wave { depth: 0, is_path, onward: None, shot, lit, sink, next, crossing, place: 0, counters };
+    wave.begin_round();
     wave.lit.expect(slots.len());
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
         shot.camera_rows(start..slots.end, camera);
@@ -63,7 +74,7 @@ pub fn trace(
         }
         let slots: &[PathRay] = rays;
         wave.light()?;
-        wave.lit.settle(|place| slots[place].slot, &mut wave.sink);
+        wave.lit.settle(|place| (slots[place].slot, slots[place].history.is_seen), &mut wave.sink);
         wave.next_round(rays);
     }
     Ok(())
@@ -73,6 +84,9 @@ pub fn trace(
 struct Wave<'a, 's> {
     /// Scatterings before the hits of this round.
     depth: u32,
+    is_path: bool,
+    /// How paths go on from Phong surfaces; none: they end there.
+    onward: Option<Onward>,
     shot: &'a Shot<'a>,
     /// Vertices of this round that are not lit yet.
     lit: &'a mut LitQueue,
@@ -87,8 +101,15 @@ struct Wave<'a, 's> {
 
 impl Wave<'_, '_> {
     fn light(&mut self) -> Result<(), Cancelled> {
-        self.counters.shadow_rays += self.lit.light(self.shot, self.sink.measure)?;
+        let before = self.next.len();
+        let rays = self.lit.light(self.shot, self.sink.measure, self.onward, self.next)?;
+        self.counters.shadow_rays += rays.shadow;
+        self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
         Ok(())
+    }
+
+    fn begin_round(&mut self) {
+        self.onward = self.is_path.then(|| Onward::new(self.shot, self.depth));
     }
 
     /// The rays of the next round are those that were found; what is in their place is memory.
@@ -96,6 +117,7 @@ impl Wave<'_, '_> {
         std::mem::swap(rays, self.next);
         self.next.clear();
         self.depth += 1;
+        self.begin_round();
     }
 
     /// What each ray of a packet meets; its places in the round's queue start at `first`.
@@ -136,7 +158,7 @@ impl Wave<'_, '_> {
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let Some((material, bsdf)) = self.shot.world.plain_phong(hit.object) else { return };
         if is_shining {
-            self.sink.add(path.slot, Part::Emitted, path.throughput * material.emission);
+            self.add_emitted(path, material.emission, self.shot.lamp_weight(path, hit));
         }
         let render = &self.shot.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
@@ -144,10 +166,24 @@ impl Wave<'_, '_> {
         }
     }
 
+    /// What a path meets of radiance that is sent out; light samples find the rest of it.
+    fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
+        if path.history.is_seen {
+            self.sink.add(path.slot, Part::Emitted, path.throughput * radiance);
+        } else {
+            self.sink.add_arrived(path.slot, path.throughput * radiance * weight, false);
+        }
+    }
+
+    /// The background lights nothing.
     fn leave(&mut self, path: &PathRay) {
-        let beyond = self.shot.world.lights.beyond(path.ray.direction);
-        let background = self.shot.settings.render.background + beyond;
-        self.sink.add(path.slot, Part::Emitted, path.throughput * background);
+        let beyond = self.shot.light_beyond(path);
+        if path.history.is_seen {
+            let background = self.shot.settings.render.background;
+            self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
+        } else if beyond != Vec3::ZERO {
+            self.sink.add_arrived(path.slot, path.throughput * beyond, false);
+        }
     }
 
     /// Shade the first thing that is no mere change between parts of one glass.
@@ -156,20 +192,24 @@ impl Wave<'_, '_> {
         for _ in 0..MOST_HIDDEN {
             let vertex = Vertex::to_shade(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
-                return self.shade_surface(path, &vertex, hit.shape.t);
+                let weight = if vertex.emits() { shot.lamp_weight(&path, &hit) } else { 1.0 };
+                return self.shade_surface(path, &vertex, hit.shape.t, weight);
             }
             let Crossing { sides, near, far, opaque } =
                 shot.crossing(&path, &vertex, hit.shape.t, self.crossing);
             path.medium = near;
             if let Some(touching) = opaque {
                 let vertex = Vertex::touching(shot, &path, sides, &touching);
-                return self.shade_surface(path, &vertex, hit.shape.t);
+                let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
+                let weight = if vertex.emits() { shot.touching_lamp_weight(&path, &touched) } else { 1.0 };
+                return self.shade_surface(path, &vertex, hit.shape.t, weight);
             }
             if near.glass() != far.glass() {
                 return self.shade_glass(path, &vertex.between(sides), far, hit.shape.t);
             }
             path.throughput *= absorption(shot.world, near, hit.shape.t);
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
+            path.history = path.history.hidden();
             match shot.world.geometry.closest(&path.ray) {
                 Some(next) => hit = next,
                 None => return self.leave(&path),
@@ -181,18 +221,17 @@ impl Wave<'_, '_> {
     }
 
     /// Take what a surface sends out on the way of a path; whether the path may be scattered there.
-    fn arrive(&mut self, path: &mut PathRay, vertex: &Vertex<'_>, distance: f32) -> bool {
+    fn arrive(&mut self, path: &mut PathRay, vertex: &Vertex<'_>, distance: f32, weight: f32) -> bool {
         let shot = self.shot;
         path.throughput *= absorption(shot.world, path.medium, distance);
-        let emission = vertex.material.emission;
-        if emission != Vec3::ZERO && vertex.is_front {
-            self.sink.add(path.slot, Part::Emitted, path.throughput * emission);
+        if vertex.emits() {
+            self.add_emitted(path, vertex.material.emission, weight);
         }
         self.depth < shot.settings.render.max_depth
     }
 
-    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, distance: f32) {
-        if !self.arrive(&mut path, vertex, distance) {
+    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, distance: f32, weight: f32) {
+        if !self.arrive(&mut path, vertex, distance, weight) {
             return;
         }
         match &vertex.material.bsdf {
@@ -212,21 +251,18 @@ impl Wave<'_, '_> {
             return;
         }
         let shading = vertex.shading(self.counters);
-        self.lit.push(
-            self.shot,
-            &LitVertex { path, place: self.place, vertex, shading, bsdf },
-            self.sink.measure,
-        );
+        let lit = LitVertex { path, place: self.place, vertex, shading, bsdf };
+        let measure = if path.history.is_seen { self.sink.measure } else { Measure::ALL };
+        self.lit.push(self.shot, &lit, measure);
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
         let shading = vertex.shading(self.counters);
-        self.counters.reflected_rays += 1;
-        self.next.push(reflected(path, vertex, &shading, mirror.reflectance));
+        self.push_reflected(reflected(path, vertex, &shading, mirror.reflectance));
     }
 
     fn shade_glass(&mut self, mut path: PathRay, vertex: &Vertex<'_>, far: Medium, distance: f32) {
-        if !self.arrive(&mut path, vertex, distance) {
+        if !self.arrive(&mut path, vertex, distance, 1.0) {
             return;
         }
         let shading = vertex.shading(self.counters);
@@ -234,7 +270,7 @@ impl Wave<'_, '_> {
         let mirrored = |weight: f32| reflected(&path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
-        if weaker >= LEAST_SPLIT {
+        if weaker >= LEAST_SPLIT && !self.is_path {
             self.push_reflected(mirrored(reflectance));
             self.push_refracted(refracted, 1.0 - reflectance);
         } else if self.shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
@@ -245,13 +281,22 @@ impl Wave<'_, '_> {
     }
 
     fn push_reflected(&mut self, ray: PathRay) {
+        let Some(ray) = self.spared(ray) else { return };
         self.counters.reflected_rays += 1;
         self.next.push(ray);
     }
 
     fn push_refracted(&mut self, mut ray: PathRay, weight: f32) {
-        self.counters.refracted_rays += 1;
         ray.throughput *= weight;
+        let Some(ray) = self.spared(ray) else { return };
+        self.counters.refracted_rays += 1;
         self.next.push(ray);
+    }
+
+    fn spared(&self, ray: PathRay) -> Option<PathRay> {
+        match self.onward {
+            Some(onward) => onward.spared(self.shot, ray),
+            None => Some(ray),
+        }
     }
 }

@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+"""Checks the checks: each fault of the table below, put into the program, must make its test fail.
+
+    python3 .ci/injected_errors.py [PROFILE]      (default: release)
+
+A copy of the sources under target/injected gets all faults at once, each behind its name; it is built once, and the test of
+each fault is run with that fault alone, after all of them without any. The sources themselves know nothing of it.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+COPY = ROOT / "target" / "injected"
+SWITCH = """
+/// Whether a fault is asked for.
+pub fn injected(fault: &str) -> bool {
+    static ASKED: std::sync::LazyLock<String> =
+        std::sync::LazyLock::new(|| std::env::var("GLIMT_FAULT").unwrap_or_default());
+    *ASKED == fault
+}
+"""
+GLOBAL = "closed_forms::global::"
+
+# Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
+FAULTS = [
+    ("1 % of energy won at each bounce", "integrators/onward.rs", "let share = ⟦cosines[i] / densities[i]⟧;",
+     "1.01 * cosines[i] / densities[i]", GLOBAL + "a_furnace_sums_its_bounces_to_the_depth_asked_for"),
+    ("the cosine dropped", "integrators/onward.rs", "let share = ⟦cosines[i] / densities[i]⟧;",
+     "1.0 / densities[i]", GLOBAL + "an_integrating_sphere_is_lit_everywhere_alike_by_what_bounces"),
+    ("roulette not divided by its chance", "integrators/onward.rs", "let factor = ⟦lane(&factors, i) / chance⟧;",
+     "lane(&factors, i)", GLOBAL + "a_furnace_sums_its_bounces_to_the_depth_asked_for"),
+    ("roulette by what is shown", "integrators/onward.rs", "let chance = ⟦onward.chance(carried[i])⟧;",
+     "onward.chance(factors[0][i])", GLOBAL + "the_parts_of_a_picture_by_paths_add_up_to_it"),
+    ("lamps that paths meet counted in full", "integrators/onward.rs", "if ⟦!(density > 0.0)⟧ {",
+     "true", GLOBAL + "direct_light_by_paths_is_that_of_whitted"),
+    ("light samples counted in full", "integrators/light.rs", "let weight = ⟦if self.shares(i) { weight } else { 1.0 }⟧;",
+     "1.0", GLOBAL + "direct_light_by_paths_is_that_of_whitted"),
+    ("rays of sharp lobes counted in full", "integrators/onward.rs",
+     "emission * ⟦weight(self.sample_density(ray, hit, normal) / density)⟧", "1.0",
+     GLOBAL + "a_sharp_highlight_of_a_lamp_has_little_noise"),
+    ("a lamp behind glass weighed as one in sight", "integrators/queues.rs", "Self { density: ⟦0.0⟧, carried: self.carried * part",
+     "self.density", GLOBAL + "light_behind_glass_is_found_by_paths_alone_and_counted_once"),
+    ("the background lights", "integrators/wave.rs", "if ⟦path.history.is_seen⟧ {\n            let background",
+     "true", GLOBAL + "the_background_lights_nothing_but_is_seen_by_mirrors"),
+    ("one bounce too few", "integrators/onward.rs", "let leads_on = ⟦depth + 1 < max_depth⟧",
+     "depth + 2 < max_depth", GLOBAL + "a_furnace_sums_its_bounces_to_the_depth_asked_for"),
+    ("glass reflects too much", "integrators/wave.rs", "Decision::Choice).x < ⟦reflectance⟧ {",
+     "reflectance + 0.05", GLOBAL + "mirrors_and_glass_are_followed_as_by_whitted"),
+    ("a glossy density off by a factor", "materials/lobes.rs", "let glossy = ⟦(self.shininess + 1.0) * (0.5 * FRAC_1_PI)⟧ * gloss;",
+     "(self.shininess + 2.0) * (0.5 * FRAC_1_PI)", "materials::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
+    ("1 % too much of a lobe", "materials/lobes.rs", "1.0 / (⟦f64::from(self.shininess) + 1.0⟧)",
+     "f64::from(self.shininess) * 0.99 + 1.0", "materials::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
+    ("the wrong side of a lobe", "materials/lobes.rs", "let local = ⟦Vec3::new(sine * cos_phi, sine * sin_phi, cosine)⟧;",
+     "Vec3::new(sine * cos_phi, sine * sin_phi, -cosine)", "materials::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
+    ("the diffuse lobe chosen too often", "materials/lobes.rs", "let is_diffuse = ⟦lobe < self.diffuse_share()⟧;",
+     "lobe < self.diffuse_share() * 1.05", "materials::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
+    ("a lobe's peak without its normaliser", "materials/phong.rs", "self.specular * ⟦((self.shininess + 2.0) / (2.0 * PI))⟧",
+     "1.0", "materials::phong::tests::the_lobe_of_known_value"),
+    ("a rectangle's density off by 1 %", "lights/rectangle.rs", "Some(spherical) => ⟦1.0 / spherical.solid_angle⟧,",
+     "1.01 / spherical.solid_angle", "lights::tests::the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds"),
+]
+
+
+def copy_with_faults():
+    tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
+    for name in filter(None, tracked.stdout.decode().split("\0")):
+        if (ROOT / name).is_file():
+            (COPY / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ROOT / name, COPY / name)
+    places = {}
+    for fault, file, place, wrong, _ in FAULTS:
+        places.setdefault((file, place), []).append((fault, wrong))
+    for (file, place), faults in places.items():
+        path = COPY / "src" / file
+        head, right, tail = re.split("[⟦⟧]", place)
+        if path.read_text().count(head + right + tail) != 1:
+            sys.exit(f"{faults[0][0]}: {file} does not hold `{place}` once")
+        chosen = right
+        for fault, wrong in faults:
+            chosen = f'if crate::injected("{fault}") {{ {wrong} }} else {{ {chosen} }}'
+        path.write_text(path.read_text().replace(head + right + tail, f"{head}({chosen}){tail}"))
+    lib = COPY / "src" / "lib.rs"
+    lib.write_text(lib.read_text() + SWITCH)
+
+
+def executables(profile):
+    command = ["cargo", "test", "--profile", profile, "--lib", "--test", "suite", "--no-run", "--message-format=json"]
+    env = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target"), "RUSTFLAGS": os.environ.get("RUSTFLAGS", "")}
+    built = subprocess.run(command, cwd=COPY, env=env, stdout=subprocess.PIPE, check=True)
+    messages = [json.loads(line) for line in built.stdout.splitlines() if line.startswith(b"{")]
+    return {m["target"]["kind"][0]: m["executable"] for m in messages if m.get("executable") and m["profile"]["test"]}
+
+
+def passes(programs, test, fault=""):
+    program = programs["test" if test.startswith(GLOBAL) else "lib"]
+    env = {**os.environ, "GLIMT_FAULT": fault}
+    run = subprocess.run([program, "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
+    if "1 passed" not in run.stdout and "1 failed" not in run.stdout:
+        sys.exit(f"there is no test {test}\n{run.stdout}{run.stderr}")
+    return run.returncode == 0
+
+
+def main():
+    profile = sys.argv[1] if len(sys.argv) > 1 else "release"
+    copy_with_faults()
+    programs = executables(profile)
+    for test in dict.fromkeys(row[4] for row in FAULTS):
+        if not passes(programs, test):
+            sys.exit(f"{test} fails without any fault")
+    missed = 0
+    for fault, _, _, _, test in FAULTS:
+        found = not passes(programs, test, fault)
+        missed += not found
+        print(f"{'found ' if found else 'MISSED'}  {fault:45} {test}", flush=True)
+    sys.exit(f"{missed} faults are not found" if missed else 0)
+
+
+main()

@@ -1,0 +1,211 @@
+//! Where paths go on from diffuse and glossy surfaces, sixteen at a time; which of them end by roulette; and what a path counts
+//! that meets a lamp which light samples find too.
+
+use super::light::{LitRow, Response, weight};
+use super::medium::Medium;
+use super::queues::{History, PathRay};
+use super::shot::Shot;
+use super::specular::SCATTERED;
+use crate::geometry::Ray;
+use crate::geometry::rows::lanes;
+use crate::lights::{Met, Source};
+use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::sampling::Decision;
+use crate::world::{Hit, Loops};
+
+/// How paths of a round go on.
+#[derive(Clone, Copy, Debug)]
+pub struct Onward {
+    /// Whether they may, and would find anything: at the last scattering lamps alone.
+    pub leads_on: bool,
+    /// Whether each goes on with a chance only.
+    pub is_risked: bool,
+}
+
+impl Onward {
+    /// Scatterings after which a path goes on with a chance only.
+    const SURE: u32 = 3;
+
+    /// From the vertices after so many scatterings.
+    pub fn new(shot: &Shot<'_>, depth: u32) -> Self {
+        let emits = || shot.world.materials.iter().any(|material| material.emission.max_element() > 0.0);
+        let max_depth = shot.settings.render.max_depth;
+        let shines = || shot.world.lights.are_beyond() || emits();
+        let leads_on = depth + 1 < max_depth || depth + 1 == max_depth && shines();
+        Self { leads_on, is_risked: depth >= Self::SURE }
+    }
+
+    /// The chance of a path to go on.
+    #[inline(always)]
+    fn chance(self, carried: f32) -> f32 {
+        if self.is_risked & (carried < 1.0) { carried } else { 1.0 }
+    }
+
+    /// A path after a mirror or glass: it may end there, else it counts for those that do.
+    pub fn spared(self, shot: &Shot<'_>, mut path: PathRay) -> Option<PathRay> {
+        let chance = self.chance(path.history.carried);
+        if chance < 1.0 {
+            if !(shot.sampler(path.slot).pair(path.path, Decision::Roulette).x < chance) {
+                return None;
+            }
+            path.throughput /= chance;
+            path.history.carried /= chance;
+        }
+        Some(path)
+    }
+}
+
+/// Sends paths on from the vertices of a row.
+pub struct Scattering<'a> {
+    /// What is rendered.
+    pub shot: &'a Shot<'a>,
+    /// The vertices.
+    pub row: &'a LitRow,
+    /// How.
+    pub onward: Onward,
+}
+
+/// The ways that paths go on from the vertices of a row.
+pub struct Ways {
+    /// A bit for each that goes on.
+    alive: u32,
+    /// Unit directions.
+    directions: Lanes3,
+    /// Their densities in sr⁻¹.
+    densities: Lanes,
+    /// What becomes of the throughput.
+    factors: Lanes3,
+    /// What becomes of [`History::carried`].
+    carried: Lanes,
+}
+
+impl Scattering<'_> {
+    /// Add the rays of the next round; the vertices are in these media.
+    pub fn scatter(self, media: &[Medium], next: &mut Vec<PathRay>) {
+        let row = self.row;
+        let ways = self.shot.world.geometry.instructions().run(self);
+        next.extend(lanes(ways.alive).map(|i| {
+            let mut path = PathRay {
+                ray: Ray::new(lane(&row.from, i), lane(&ways.directions, i)),
+                throughput: lane(&row.throughput, i) * lane(&ways.factors, i),
+                slot: row.slot[i],
+                path: row.path[i],
+                medium: media[row.medium[i] as usize],
+                history: History { density: ways.densities[i], carried: ways.carried[i], is_seen: false },
+            };
+            path.path = path.next_path(SCATTERED);
+            path
+        }));
+    }
+}
+
+impl Loops for Scattering<'_> {
+    type Done = Ways;
+
+    #[inline(always)]
+    fn run(self) -> Ways {
+        let Self { shot, row, onward } = self;
+        let sampler = row.sampler(shot);
+        let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
+        let [lobe, _] =
+            if row.is_glossy { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
+        let mut directions = [[0.0; LANES]; 3];
+        if row.is_glossy {
+            for i in 0..LANES {
+                set_lane(&mut directions, i, row.lobes(i).sample(lobe[i], [u[0][i], u[1][i]]));
+            }
+        } else {
+            for i in 0..LANES {
+                set_lane(&mut directions, i, row.lobes(i).sample_diffuse([u[0][i], u[1][i]]));
+            }
+        }
+        let Response { f, cosines, glosses } = row.response(&directions);
+        let [mut densities, mut carried] = [[0.0; LANES]; 2];
+        let mut factors = f;
+        let mut alive = 0_u32;
+        for i in 0..LANES {
+            let lobes = row.lobes(i);
+            densities[i] = lobes.density(lane(&directions, i), glosses[i]);
+            let share = cosines[i] / densities[i];
+            carried[i] = row.carried[i] * lobes.value(glosses[i]) * share;
+            let factor = lane(&f, i) * share;
+            set_lane(&mut factors, i, factor);
+            let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
+            let bit = 1 << i;
+            alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
+        }
+        alive &= row.used & !row.hidden(&directions);
+        if onward.is_risked {
+            let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
+            for i in 0..LANES {
+                let chance = onward.chance(carried[i]);
+                let bit = 1 << i;
+                alive &= if risk[i] < chance { !0 } else { !bit };
+                let factor = lane(&factors, i) / chance;
+                set_lane(&mut factors, i, factor);
+                carried[i] /= chance;
+            }
+        }
+        Ways { alive, directions, densities, factors, carried }
+    }
+}
+
+impl Shot<'_> {
+    /// What a path counts that meets a lamp, of which a light sample might have come.
+    pub fn lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+        let density = path.history.density;
+        if !(density > 0.0) {
+            return 1.0;
+        }
+        let normal = self.world.geometry.surface(&path.ray, hit).normal;
+        let samples = self.settings.render.shadow_samples as f32;
+        weight(self.sample_density(&path.ray, hit, normal) * samples / density)
+    }
+
+    /// What a path brings of the radiance that comes from beyond the scene; light samples bring the rest.
+    pub fn light_beyond(&self, path: &PathRay) -> Vec3 {
+        let (lights, density) = (&self.world.lights, path.history.density);
+        let samples = self.settings.render.shadow_samples as f32;
+        let share = |of_light: f32| if density > 0.0 { weight(of_light * samples / density) } else { 1.0 };
+        lights.beyond_by_density(path.ray.direction, share)
+    }
+
+    /// [`Shot::lamp_radiance`] of a ray that leaves the scene.
+    pub fn radiance_beyond(&self, direction: Vec3, density: f32) -> Vec3 {
+        self.world.lights.beyond_by_density(direction, |of_light| weight(of_light / density))
+    }
+
+    /// Density in sr⁻¹ of light samples that come from a hit; 0 where none do.
+    fn sample_density(&self, ray: &Ray, hit: &Hit, normal: Vec3) -> f32 {
+        let met = Met { direction: ray.direction, distance: hit.shape.t, normal };
+        let light = self.world.lights.of_hit(hit.object, hit.shape.primitive);
+        light.map_or(0.0, |(_, light)| light.pdf(ray.origin, &met))
+    }
+
+    /// What a ray from a lobe brings of the radiance that it meets; light samples, as many as there are such rays, bring the rest.
+    pub fn lamp_radiance(&self, ray: &Ray, hit: &Hit, density: f32) -> Vec3 {
+        let world = self.world;
+        let emission = world.materials[world.material_index(hit)].emission;
+        if emission == Vec3::ZERO {
+            return emission;
+        }
+        let normal = world.geometry.surface(ray, hit).normal;
+        if !(normal.dot(ray.direction) < 0.0) {
+            return Vec3::ZERO;
+        }
+        emission * weight(self.sample_density(ray, hit, normal) / density)
+    }
+
+    /// The same of a lamp that touches glass which the path meets with it: whether light samples find it there is decided by
+    /// what their shadow rays would.
+    pub fn touching_lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+        let Ray { origin, direction, .. } = path.ray;
+        let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
+        if path.history.density > 0.0 && !self.world.geometry.occluded(&shadow, Source::Object(hit.object)) {
+            self.lamp_weight(path, hit)
+        } else {
+            1.0
+        }
+    }
+}

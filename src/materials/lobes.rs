@@ -1,0 +1,92 @@
+//! Directions drawn from the lobes of a Phong surface: the diffuse one by the cosine, the glossy one by cos^α about the mirrored
+//! direction to the eye (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based Rendering*,
+//! 1994). One of them is chosen by albedo; densities are those of both together.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use crate::math::Vec3;
+use crate::math::elementary::{power_f64, sin_cos};
+use crate::math::frame::Frame;
+
+/// The lobes of a Phong surface at one point, for one direction to the eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lobes {
+    /// Unit normal on the eye's side, which the cosine is of.
+    pub normal: Vec3,
+    /// The direction to the eye, mirrored at the normal.
+    pub mirrored_eye: Vec3,
+    /// The largest component of kd.
+    pub diffuse: f32,
+    /// The largest component of ks.
+    pub specular: f32,
+    /// α.
+    pub shininess: f32,
+}
+
+impl Lobes {
+    /// A unit direction; `lobe` chooses the lobe and `u` the direction in it, all in [0, 1).
+    #[inline(always)]
+    pub fn sample(&self, lobe: f32, u: [f32; 2]) -> Vec3 {
+        let is_diffuse = lobe < self.diffuse_share();
+        let rest = 1.0 - u[0];
+        // Of cos^α the cosine is (1 − u)^1/(α + 1). Its sine keeps the digits of narrow lobes in f64.
+        let cosine = power_f64(f64::from(rest), 1.0 / (f64::from(self.shininess) + 1.0));
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt() as f32;
+        let cosine = if is_diffuse { rest.sqrt() } else { cosine as f32 };
+        let sine = if is_diffuse { u[0].sqrt() } else { sine };
+        let x = if is_diffuse { self.normal.x } else { self.mirrored_eye.x };
+        let y = if is_diffuse { self.normal.y } else { self.mirrored_eye.y };
+        let z = if is_diffuse { self.normal.z } else { self.mirrored_eye.z };
+        about(Vec3::new(x, y, z), sine, cosine, u[1])
+    }
+
+    /// [`Lobes::sample`] where there is no glossy lobe.
+    #[inline(always)]
+    pub fn sample_diffuse(&self, u: [f32; 2]) -> Vec3 {
+        about(self.normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1])
+    }
+
+    /// Density in sr⁻¹ of a direction among the samples, by what [`gloss`] says of it.
+    #[inline(always)]
+    pub fn density(&self, direction: Vec3, gloss: f32) -> f32 {
+        let cosine = self.normal.dot(direction);
+        let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
+        let glossy = (self.shininess + 1.0) * (0.5 * FRAC_1_PI) * gloss;
+        let share = self.diffuse_share();
+        share * diffuse + (1.0 - share) * glossy
+    }
+
+    /// f in sr⁻¹ of a grey surface with these albedos.
+    #[inline(always)]
+    pub fn value(&self, gloss: f32) -> f32 {
+        self.diffuse * FRAC_1_PI + self.specular * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI)) * gloss
+    }
+
+    /// How often the diffuse lobe is chosen.
+    #[inline(always)]
+    fn diffuse_share(&self) -> f32 {
+        self.diffuse / (self.diffuse + self.specular)
+    }
+}
+
+/// A unit direction by its angle to an axis and a number in [0, 1) for the one about it.
+#[inline(always)]
+fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
+    let (sin_phi, cos_phi) = sin_cos(2.0 * PI * turn);
+    let local = Vec3::new(sine * cos_phi, sine * sin_phi, cosine);
+    let direction = Frame::from_normal(axis).to_world(local);
+    direction * (1.0 / direction.length_squared().sqrt())
+}
+
+/// What is left of the glossy lobe's peak in a direction: the cosine between it and the mirrored eye, to the power α; 0 behind.
+/// By the distance of their ends, which has the digits that the cosine of a small angle lacks.
+#[inline(always)]
+pub fn gloss(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
+    let cosine = 1.0 - 0.5 * f64::from((mirrored_eye - direction).length_squared());
+    let is_ahead = cosine > 0.0;
+    let left = power_f64(if is_ahead { cosine } else { 1.0 }, f64::from(shininess)) as f32;
+    if is_ahead { left } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests;

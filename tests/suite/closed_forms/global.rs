@@ -1,0 +1,394 @@
+//! Light that bounces, by paths, against closed forms.
+
+use glimt::integrators::View;
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{ColorSource, Falloff, Integrator, MaterialKind, Shape};
+
+use super::distant::sun;
+use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
+use super::{lambert, mean_and_error, v};
+
+/// A scene that is rendered by paths.
+pub fn by_paths(build: Build, max_depth: u32) -> Build {
+    build.with(|scene| scene.render.integrator = Integrator::Path).depth(max_depth)
+}
+
+/// |mean − exact| ≤ 4 standard errors over seeds, which are at most this part of what is right: noise alone does not pass.
+#[track_caller]
+pub fn assert_near(what: &str, values: &[f64], exact: f64, most_error: f64) {
+    assert!(values.len() >= 16, "too few seeds");
+    let (mean, error) = mean_and_error(values);
+    assert!(error <= most_error * exact, "{what}: {mean} ± {error} says nothing about {exact}");
+    let allowed = (4.0 * error).max(2e-5 * exact);
+    assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error} is not {exact}");
+}
+
+/// The room in which walls of a material are all that a ray can meet: a sphere seen from inside is its back, a box of quads its
+/// front.
+fn room(emission: f32, reflectance: f32, specular: f32) -> Build {
+    let wall = || phong(reflectance, specular, 20.0, emission);
+    let (low, side) = (-1.0, 2.0);
+    let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
+    let (o, far) = (v(low, low, low), v(low + side, low + side, low + side));
+    // Fronts along u × v, inwards.
+    scene()
+        .quad(o, x, y, wall())
+        .quad(o, y, z, wall())
+        .quad(o, z, x, wall())
+        .quad(far, -y, -x, wall())
+        .quad(far, -z, -y, wall())
+        .quad(far, -x, -z, wall())
+        .seen(v(0.1, 0.2, -0.3), v(0.3, -1.0, 0.2))
+}
+
+#[test]
+fn a_furnace_sums_its_bounces_to_the_depth_asked_for() {
+    // L = E·(1 + ρ + … + ρᵏ); every vertex of every path is in the same light.
+    for (reflectance, seeds) in [(0.5_f64, 16), (0.8, 32)] {
+        for depth in [0, 1, 2, 3, 8, 60] {
+            let values = by_paths(room(1.0, reflectance as f32, 0.0), depth).values(512, seeds);
+            let exact = (1.0 - reflectance.powi(depth as i32 + 1)) / (1.0 - reflectance);
+            assert_near(&format!("ρ {reflectance}, depth {depth}"), &values, exact, 5e-3);
+        }
+    }
+}
+
+#[test]
+fn an_integrating_sphere_is_lit_everywhere_alike_by_what_bounces() {
+    // R = 1, I = 1 W/sr at x = .5, ρ = .5: indirect irradiance 1; L = ρ/π·(1 + I·cos/d²).
+    let sphere = |to: DVec3| {
+        let walls = scene().sphere(DVec3::ZERO, 1.0, matte(0.5)).seen(v(0.0, 0.1, 0.0), to);
+        by_paths(walls.point_light(v(0.5, 0.0, 0.0), 1.0, Falloff::Square), 60)
+    };
+    for (to, exact) in [(v(1.0, 0.0, 0.0), 0.795_774_715_5), (v(-1.0, 0.0, 0.0), 0.229_890_473_4)] {
+        // 4 at the near wall, 4/9 at the far one, for the direct part.
+        assert_near("integrating sphere", &sphere(to).values(1024, 32), exact, 3e-3);
+    }
+}
+
+#[test]
+fn concentric_spheres_exchange_their_light() {
+    // Inner: R = 1, E = 1, ρ = .5; outer: R = 2, ρ = .8. All that the inner one sends out meets the outer one, of what that
+    // sends a quarter comes back: L₁ = 4/3, L₂ = 2/3, and .2 by direct light alone.
+    let spheres =
+        || scene().sphere(DVec3::ZERO, 1.0, phong(0.5, 0.0, 1.0, 1.0)).sphere(DVec3::ZERO, 2.0, matte(0.8));
+    let inner = by_paths(spheres().seen(v(1.5, 0.2, 0.0), DVec3::ZERO), 80);
+    let outer = |depth| by_paths(spheres().seen(v(1.5, 0.2, 0.0), v(2.0, 0.0, 0.3)), depth);
+    assert_near("inner", &inner.values(1024, 32), 4.0 / 3.0, 2e-3);
+    assert_near("outer", &outer(80).values(1024, 32), 2.0 / 3.0, 4e-3);
+    assert_near("outer, direct", &outer(1).values(256, 16), 0.2, 4e-3);
+}
+
+#[test]
+fn two_plates_exchange_their_light() {
+    // Infinite: L₁ = (E + ρ₁·…): 5/3 and 4/3 for E₁ = 1, ρ = .5 and .8. As quads 1e4 times as wide as their distance.
+    let half = 5e3;
+    let plates = |at: f64| {
+        scene()
+            .quad(
+                v(-half, 0.0, half),
+                v(2.0 * half, 0.0, 0.0),
+                v(0.0, 0.0, -2.0 * half),
+                phong(0.5, 0.0, 1.0, 1.0),
+            )
+            .quad(v(-half, 1.0, -half), v(2.0 * half, 0.0, 0.0), v(0.0, 0.0, 2.0 * half), matte(0.8))
+            .seen(v(0.0, 0.5, 0.0), v(0.1, at, 0.1))
+    };
+    for (at, exact) in [(0.0, 5.0 / 3.0), (1.0, 4.0 / 3.0)] {
+        let values = by_paths(plates(at), 100).values(4096, 48);
+        assert_near("plates", &values, exact, 1e-3);
+        assert!((mean_and_error(&values).0 - exact).abs() < 1.5e-3 * exact);
+    }
+}
+
+#[test]
+fn nothing_is_lost_or_won_at_lossless_mirrors_and_glass() {
+    // A white background is behind everything: 1, whatever the path. Roulette never ends a path that loses nothing.
+    for (what, material) in [("mirror", mirror(1.0)), ("glass", glass(1.5)), ("diamond", glass(2.4))] {
+        let ball =
+            scene().sphere(DVec3::ZERO, 1.0, material).pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 30.0, 16, 16);
+        let picture = by_paths(ball.background(1.0), 200).picture(4, 0);
+        for pixel in picture {
+            assert!((pixel.x - 1.0).abs() < 1e-5, "{what}: {pixel}");
+        }
+    }
+}
+
+#[test]
+fn the_background_lights_nothing_but_is_seen_by_mirrors() {
+    let floor = || scene().quad(v(-5.0, 0.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -10.0), matte(0.9));
+    let lit = by_paths(floor().background(1.0).seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
+    assert_eq!(lit.values(64, 1), [0.0]);
+    let behind = floor().quad(v(-5.0, 4.0, 5.0), v(0.0, 0.0, -10.0), v(10.0, 0.0, 0.0), mirror(0.5));
+    let seen = by_paths(behind.background(1.0).seen(v(0.0, 1.0, 0.0), v(3.0, 4.0, 8.0)), 8);
+    let one = seen.values(4, 1)[0];
+    assert!(one == 0.5 || one == 1.0, "{one}");
+    let indirect = by_paths(seen.seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
+    assert_eq!(indirect.values(64, 1), [0.0], "nor by way of a mirror");
+}
+
+#[test]
+fn emission_through_glass_arrives_by_paths() {
+    let inside = |with_glass: bool| {
+        let mut build = room(1.0, 0.5, 0.0);
+        if with_glass {
+            build = build.sphere(v(0.2, -0.3, 0.1), 0.4, glass(1.5));
+        }
+        by_paths(build, 60).values(512, 16)
+    };
+    // A closed furnace is in equilibrium: 2 in every direction, with lossless glass in it or without.
+    assert_near("without", &inside(false), 2.0, 3e-3);
+    assert_near("with", &inside(true), 2.0, 5e-3);
+}
+
+#[test]
+fn the_parts_of_a_picture_by_paths_add_up_to_it() {
+    let build = |view| {
+        let lamp = emitter(4.0);
+        let room = room(0.0, 0.4, 0.4)
+            .quad(v(-0.3, 0.9, -0.3), v(0.6, 0.0, 0.0), v(0.0, 0.0, 0.6), lamp)
+            .sphere(v(0.5, -0.5, 0.0), 0.4, glass(1.5))
+            .sphere(v(-0.5, -0.5, 0.0), 0.4, mirror(0.8))
+            .point_light(v(0.0, 0.5, 0.8), 0.5, Falloff::Square)
+            .pictured(v(0.0, 0.0, 0.9), v(0.0, -0.3, 0.0), 80.0, 24, 16);
+        by_paths(room, 6).viewed(view).picture(8, 3)
+    };
+    let beauty = build(View::Beauty);
+    let parts = [View::Ambient, View::Diffuse, View::Specular, View::Emission].map(build);
+    assert!(parts[0].iter().all(|pixel| *pixel == DVec3::ZERO), "paths have no ambient light");
+    for (i, whole) in beauty.iter().enumerate() {
+        let sum: DVec3 = parts.iter().map(|part| part[i]).sum();
+        assert!(
+            (sum - *whole).abs().max_element() <= 1e-5 * whole.max_element().max(0.1),
+            "{i}: {sum} {whole}"
+        );
+    }
+    assert!(
+        parts[1..].iter().all(|part| part.iter().any(|pixel| pixel.x > 0.01)),
+        "every part shows something"
+    );
+}
+
+/// Every kind of lamp, wide and near above a floor of these lobes.
+fn lamps_over_a_floor(diffuse: f32, specular: f32, shininess: f32) -> Vec<(&'static str, Build)> {
+    let floor = || {
+        let corner = v(-0.05, 0.0, 0.05);
+        let floor = scene().quad(
+            corner,
+            v(0.1, 0.0, 0.0),
+            v(0.0, 0.0, -0.1),
+            phong(diffuse, specular, shininess, 0.0),
+        );
+        // From −45°: the mirrored direction goes through (1, 1, 0).
+        floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
+    };
+    let at = v(0.8, 0.9, 0.1);
+    let ball = lat_long_sphere(5, 7, 0.6, DVec3::ZERO);
+    let shaped = |shape| floor().shape(shape, emitter(2.0));
+    vec![
+        ("quad", floor().quad(v(0.2, 1.2, -0.5), v(0.9, -0.5, 0.0), v(0.0, 0.0, 1.0), emitter(2.0))),
+        ("skewed quad", floor().quad(v(0.2, 1.2, -0.5), v(0.9, -0.5, 0.3), v(0.0, 0.2, 1.0), emitter(2.0))),
+        ("sphere", floor().sphere(at, 0.6, emitter(2.0))),
+        ("box", floor().cuboid(at, v(0.7, 0.5, 0.8), v(10.0, 30.0, 5.0), emitter(2.0))),
+        (
+            "triangle",
+            floor().triangle([v(0.2, 1.2, -0.8), v(1.3, 0.4, -0.2), v(0.6, 0.9, 1.0)], emitter(2.0)),
+        ),
+        ("disk", shaped(Shape::Disk { center: at, normal: v(-0.7, -1.0, 0.1), radius: 0.6 })),
+        (
+            "cylinder",
+            shaped(Shape::Cylinder { a: v(0.5, 0.8, -0.5), b: v(0.9, 0.9, 0.6), radius: 0.4, caps: true }),
+        ),
+        (
+            "cone",
+            shaped(Shape::Cone { base: v(1.0, 1.2, 0.0), tip: v(0.5, 0.4, 0.1), radius: 0.6, cap: true }),
+        ),
+        ("torus", shaped(Shape::Torus { center: at, axis: v(0.5, 1.0, 0.2), radius: 0.5, tube: 0.25 })),
+        ("mesh", floor().mesh(ball, [DVec3::ONE, DVec3::ZERO, at], emitter(2.0))),
+        ("two", floor().sphere(at, 0.4, emitter(2.0)).sphere(v(0.1, 0.6, 0.0), 0.3, emitter(1.0))),
+        (
+            "beside a point",
+            floor().sphere(at, 0.4, emitter(2.0)).point_light(v(0.1, 0.6, 0.0), 0.3, Falloff::Square),
+        ),
+        ("sun", sun(floor(), -at, 2.0, 40.0)),
+        ("narrow sun", sun(floor(), v(-1.0, -1.05, 0.0), 2.0, 3.0)),
+        (
+            "sharp sun beside a sphere",
+            sun(floor().sphere(at, 0.4, emitter(2.0)), v(1.0, -2.0, 0.0), 0.5, 0.0),
+        ),
+        ("half a sun", sun(floor().sphere(at * 3.0, 1.0, matte(0.0)), -at, 2.0, 60.0)),
+    ]
+}
+
+#[test]
+fn direct_light_by_paths_is_that_of_whitted() {
+    // Both ways to find a lamp: the narrower the lobe, the more is found by its own samples.
+    for (diffuse, specular, shininess) in [(0.7, 0.0, 1.0), (0.3, 0.6, 10.0), (0.1, 0.8, 90.0)] {
+        for (what, build) in lamps_over_a_floor(diffuse, specular, shininess) {
+            let path = by_paths(build.clone(), 1).values(512, 16);
+            let whitted = build.depth(1).values(2048, 16);
+            let ((a, of_a), (b, of_b)) = (mean_and_error(&path), mean_and_error(&whitted));
+            let error = of_a.hypot(of_b);
+            assert!(error < 0.01 * b, "{what}, α {shininess}: ± {error} of {b} says nothing");
+            assert!(
+                (a - b).abs() < 5.0 * error + 1e-5 * b,
+                "{what}, α {shininess}: {a} ± {of_a}, {b} ± {of_b}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_sharp_highlight_of_a_lamp_has_little_noise() {
+    // All of the lobe is on the lamp: ∫(α + 2)/2π·cos^α·cos θ = cos θ of the mirrored direction, here 45°; and the diffuse part.
+    let corners = [v(0.2, 1.8, -0.9), v(1.8, 0.2, -0.9), v(1.8, 0.2, 0.9), v(0.2, 1.8, 0.9)];
+    let (u, w) = (corners[1] - corners[0], corners[3] - corners[0]);
+    for shininess in [1e3_f32, 1e5] {
+        let corner = v(-0.05, 0.0, 0.05);
+        let floor =
+            scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.2, 0.5, shininess, 0.0));
+        let lit = floor.quad(corners[0], u, w, emitter(3.0)).seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
+        let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &corners);
+        let exact = 3.0 * (diffuse + 0.5 * 0.5_f64.sqrt());
+        // A disc in the sky of the same radiance, whose irradiance at normal incidence is π·sin² of half its angle.
+        let disc = std::f64::consts::PI * 20_f64.to_radians().sin().powi(2);
+        let floor =
+            scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.2, 0.5, shininess, 0.0));
+        let sunny = sun(floor, v(-1.0, -1.0, 0.0), (3.0 * disc) as f32, 40.0);
+        let sunny = sunny.seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
+        let exact_sunny = 3.0 * (0.2 / std::f64::consts::PI * disc + 0.5) * 0.5_f64.sqrt();
+        for (what, build) in [("whitted", sunny.clone()), ("path", by_paths(sunny, 1))] {
+            let values = build.values(256, 16);
+            let worst = values.iter().map(|value| (value / exact_sunny - 1.0).abs()).fold(0.0, f64::max);
+            assert!(worst < 0.02, "sun, {what}, α {shininess}: {worst}");
+        }
+        for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit.clone(), 1))] {
+            for value in build.values(256, 16) {
+                assert!((value / exact - 1.0).abs() < 0.02, "{what}, α {shininess}: {value} is not {exact}");
+            }
+            let mean = mean_and_error(&build.values(256, 64)).0;
+            assert!((mean / exact - 1.0).abs() < 3e-3, "{what}, α {shininess}: {mean} is not {exact}");
+        }
+        // At the edge of the lamp half of the lobe misses it.
+        let cut = lit.with(|scene| {
+            if let Some(Shape::Quad { v: side, corner, .. }) =
+                scene.objects.last_mut().map(|object| &mut object.shape)
+            {
+                (*corner, *side) = (corners[0] + v(0.0, 0.0, 0.9), v(0.0, 0.0, 0.9));
+            }
+        });
+        let half = [v(0.2, 1.8, 0.0), v(1.8, 0.2, 0.0), v(1.8, 0.2, 0.9), v(0.2, 1.8, 0.9)];
+        let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &half);
+        let exact = 3.0 * (diffuse + 0.25 * 0.5_f64.sqrt());
+        let mean = mean_and_error(&cut.values(256, 32)).0;
+        assert!((mean / exact - 1.0).abs() < 0.02, "α {shininess} at the edge: {mean} is not {exact}");
+    }
+}
+
+#[test]
+fn only_sharp_highlights_of_lamps_that_rays_can_meet_cost_rays() {
+    let scattered = |shininess: f32, lamp: bool, max_depth: u32| {
+        let floor = scene().quad(
+            v(-1.0, 0.0, 1.0),
+            v(2.0, 0.0, 0.0),
+            v(0.0, 0.0, -2.0),
+            phong(0.2, 0.5, shininess, 0.0),
+        );
+        let floor = floor.seen(v(-0.1, 0.1, 0.0), DVec3::ZERO).depth(max_depth);
+        let lit = if lamp {
+            floor.sphere(v(1.0, 1.0, 0.0), 0.3, emitter(1.0))
+        } else {
+            floor.point_light(v(1.0, 1.0, 0.0), 1.0, Falloff::Square)
+        };
+        let rect = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
+        let token = glimt::control::CancelToken::new();
+        let tile = glimt::integrators::render_tile(&lit.world(), &lit.settings(0), rect, 0..32, &token);
+        tile.expect("nobody cancels").1.scattered_rays
+    };
+    assert_eq!((scattered(99.0, true, 4), scattered(1e4, false, 4), scattered(1e4, true, 0)), (0, 0, 0));
+    assert!(scattered(1e4, true, 1) > 24);
+}
+
+#[test]
+fn mirrors_and_glass_are_followed_as_by_whitted() {
+    // Emission by δ lobes alone: whitted splits its rays, a path chooses; both count each surface as a scattering.
+    let build = || {
+        scene()
+            .quad(v(-9.0, -9.0, -9.0), v(18.0, 0.0, 0.0), v(0.0, 18.0, 0.0), emitter(1.0))
+            .quad(v(9.0, -9.0, 9.0), v(-18.0, 0.0, 0.0), v(0.0, 18.0, 0.0), emitter(3.0))
+            .sphere(v(-1.1, 0.0, 0.0), 1.0, glass(1.5))
+            .cuboid(v(1.1, 0.0, 0.0), v(1.2, 1.6, 1.0), v(20.0, 30.0, 0.0), glass(1.3))
+            .sphere(v(0.0, 1.3, -0.5), 0.6, mirror(0.7))
+            .background(0.25)
+            .pictured(v(0.0, 0.3, 6.0), DVec3::ZERO, 35.0, 12, 8)
+    };
+    for depth in [0, 1, 2, 3, 8] {
+        let mean = |build: Build| {
+            let values: Vec<f64> = (0..16)
+                .map(|seed| build.picture(64, seed).iter().map(|pixel| pixel.x).sum::<f64>() / 96.0)
+                .collect();
+            mean_and_error(&values)
+        };
+        let ((a, of_a), (b, of_b)) = (mean(by_paths(build(), depth)), mean(build().depth(depth)));
+        let error = of_a.hypot(of_b);
+        assert!(
+            error < 2e-3 * b && (a - b).abs() < 5.0 * error + 1e-6,
+            "depth {depth}: {a} ± {of_a}, {b} ± {of_b}"
+        );
+    }
+}
+
+#[test]
+fn light_behind_glass_is_found_by_paths_alone_and_counted_once() {
+    // A lamp that lies on a pane and one in the open: the pane's lamp reaches the floor through its glass, which light samples
+    // take for opaque. A slab passes (1 − R)/(1 + R); over all angles the floor gets what a numeric integral says. Here the
+    // check is by equality: glass of index 1 is no glass.
+    let lit = |ior: Option<f32>| {
+        let floor =
+            scene().quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.4, 0.4, 8.0, 0.0));
+        let floor = floor.quad(v(-1.0, 1.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(1.0));
+        let floor = match ior {
+            Some(ior) => floor.cuboid(v(0.0, 0.75, 0.0), v(4.0, 0.5, 4.0), DVec3::ZERO, glass(ior)),
+            None => floor,
+        };
+        mean_and_error(&by_paths(floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO), 6).values(1024, 32))
+    };
+    let ((open, of_open), (behind, of_behind)) = (lit(None), lit(Some(1.0)));
+    let error = of_open.hypot(of_behind);
+    assert!(
+        error < 0.02 * open && (open - behind).abs() < 5.0 * error,
+        "{open} ± {of_open}, {behind} ± {of_behind}"
+    );
+}
+
+#[test]
+fn a_clamp_is_a_bias_downwards_and_off_by_default() {
+    let dark = |clamp: f32| {
+        let lamp = emitter(200.0);
+        let room = room(0.0, 0.7, 0.0).quad(v(-0.05, 0.9, -0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, 0.1), lamp);
+        let room = room.with(|scene| scene.render.clamp = clamp);
+        mean_and_error(&by_paths(room, 20).values(512, 16)).0
+    };
+    let (free, loose, tight) = (dark(0.0), dark(1e9), dark(0.05));
+    assert_eq!(free, loose);
+    assert!(tight < 0.98 * free && tight > 0.2 * free, "{tight} of {free}");
+}
+
+#[test]
+fn coloured_walls_multiply_their_colours() {
+    // A furnace of another reflectance for each colour: L = E/(1 − ρ).
+    let colors = Vec3::new(0.2, 0.5, 0.75);
+    let room = room(1.0, 0.5, 0.0).with(|scene| {
+        for material in &mut scene.materials {
+            if let MaterialKind::Phong { diffuse, .. } = &mut material.kind {
+                *diffuse = ColorSource::Constant(colors);
+            }
+        }
+    });
+    let build = by_paths(room, 60);
+    let pixels: Vec<DVec3> = (0..32).map(|seed| build.picture(512, seed)[0]).collect();
+    for axis in 0..3 {
+        let values: Vec<f64> = pixels.iter().map(|pixel| pixel[axis]).collect();
+        assert_near("a colour", &values, 1.0 / (1.0 - f64::from(colors[axis])), 4e-3);
+    }
+}
