@@ -580,8 +580,24 @@ impl Lighting<'_> {
             let density = self.lobes(i).density(lane(&samples.directions, i), glosses[i]);
             let weight = weight(density * of_light[i] * others);
             let weight = if self.shares(i) { weight } else { 1.0 };
-            set_lane(values, i, lane(values, i) * weight);
+            let left = match self.others {
+                Others::Paths => Vec3::splat(weight),
+                Others::Lobes(_) => self.left_of_gloss(i, glosses[i], weight),
+            };
+            set_lane(values, i, lane(values, i) * left);
         }
+    }
+
+    /// What is left of the light that a vertex reflects where the glossy part of it counts so much: rays in a lobe bring no other,
+    /// so that the parts of a picture add up to it.
+    #[inline(always)]
+    fn left_of_gloss(&self, i: usize, gloss: f32, weight: f32) -> Vec3 {
+        let (diffuse, glossy) = (lane(&self.row.diffuse, i), lane(&self.row.specular, i) * gloss);
+        let part = |diffuse: f32, glossy: f32| {
+            let all = diffuse + glossy;
+            if all > 0.0 { (diffuse + glossy * weight) / all } else { 0.0 }
+        };
+        Vec3::new(part(diffuse.x, glossy.x), part(diffuse.y, glossy.y), part(diffuse.z, glossy.z))
     }
 
     /// The lobes in which rays are sent out from a vertex.
@@ -614,7 +630,7 @@ impl Lighting<'_> {
             for i in 0..LANES {
                 set_lane(&mut directions, i, self.lobes(i).sample(1.0, [u[0][i], u[1][i]]));
             }
-            let Response { f, cosines, glosses } = row.response(&directions);
+            let Response { cosines, glosses, .. } = row.response(&directions);
             let mut sent = sharp & !row.hidden(&directions);
             let mut ends = [-1.0; LANES];
             for i in 0..LANES {
@@ -634,7 +650,8 @@ impl Lighting<'_> {
                     }
                     None => self.shot.radiance_beyond(lane(&directions, i), density),
                 };
-                let value = lane(&f, i) * radiance * (cosines[i] / (density * count as f32));
+                let f = lane(&row.specular, i) * glosses[i];
+                let value = f * radiance * (cosines[i] / (density * count as f32));
                 let sum = lane(&sums.light, i) + value;
                 set_lane(&mut sums.light, i, sum);
             }

@@ -1,6 +1,6 @@
 //! `[environment]`.
 
-use super::super::description::Environment;
+use super::super::description::{Environment, Scene};
 use super::context::Issue;
 use super::limits::Limits;
 use super::table::Table;
@@ -30,4 +30,13 @@ pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
         table.context.report(issue.help("the environment is the same in every direction"));
     }
     Some(Some(Environment { color: radiance?, file: map?, rotate: degrees? }))
+}
+
+/// Warns about a background that is not seen.
+pub(super) fn warn_about_background(root: &Table<'_>, scene: &Scene) {
+    let Some(span) = root.optional("environment").key_span() else { return };
+    if scene.environment.is_some() && scene.render.background != Vec3::ZERO {
+        let issue = Issue::warning(span, "[environment] takes the place of `background`, which is not seen");
+        root.context.report(issue.help("leave out one of them; an environment also gives light"));
+    }
 }

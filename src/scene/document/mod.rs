@@ -79,6 +79,7 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
         warn_about_darkness(root.context, &scene);
+        environment::warn_about_background(root, &scene);
     }
     Some(scene)
 }
