@@ -283,9 +283,9 @@ fn bright_texels_are_as_many_suns() {
     assert_same_picture("the same by paths", &path(map), &suns, [64, 4], 16);
 }
 
-/// About a minute: `cargo test --release --test suite a_thousand_texels -- --ignored`.
+/// Ten seconds of a processor: `cargo test --release --test suite a_thousand_texels -- --ignored`.
 #[test]
-#[ignore = "a minute: cargo test --release --test suite a_thousand_texels -- --ignored"]
+#[ignore = "ten seconds: cargo test --release --test suite a_thousand_texels -- --ignored"]
 fn a_thousand_texels_of_a_large_map_are_a_thousand_suns() {
     let [map, suns] = dotted(4096, 2048, 1000);
     assert_same_picture("1000 of 4096 × 2048", &map, &suns, [64, 1], 16);
