@@ -15,7 +15,7 @@
 //! | [`accel`] | trees over boxes and ids, a closure tests the shape; over triangles, of boxes by vector instructions and of planes |
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | phong and its lobes, mirror, glass; texture lookup, normal maps, Fresnel |
-//! | [`lights`] | point and area lights |
+//! | [`lights`] | point and area lights, light from beyond the scene |
 //! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |
 //! | [`world`] | everything ready to trace, immutable |
@@ -41,7 +41,7 @@
 //! accel       -> geometry math control
 //! sampling    -> math choice
 //! materials   -> math choice
-//! lights      -> geometry sampling math choice
+//! lights      -> geometry sampling materials math choice
 //! scene       -> geometry materials lights sampling film math choice system
 //! assets      -> geometry materials math control system
 //! world       -> scene assets accel materials lights geometry math control

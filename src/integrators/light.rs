@@ -516,12 +516,18 @@ impl Loops for Lighting<'_> {
         for (number, light) in self.shot.world.lights.iter() {
             // Where one ray decides for all of a light, what it could send waits for that.
             let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
+            let middle = light.middle();
+            let waits = match render.shadows {
+                Shadows::Soft => false,
+                Shadows::Hard => middle.is_some(),
+                Shadows::Off => true,
+            };
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
-                let samples = light.sample_row(&self.row.from, self.used, &nowhere);
+                let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
                 let (mut values, active) = self.values(&samples, 1.0);
                 self.absorb(&samples, &mut values);
-                self.add(&samples, &values, active, &mut sums, &mut waiting);
+                self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting));
             } else {
                 let count = render.shadow_samples;
                 if sampler.is_none() {
@@ -530,7 +536,7 @@ impl Loops for Lighting<'_> {
                 let Some(sampler) = &sampler else { continue };
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
-                    let samples = light.sample_row(&self.row.from, self.used, &u);
+                    let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32);
                     self.absorb(&samples, &mut values);
                     match self.others {
@@ -538,11 +544,11 @@ impl Loops for Lighting<'_> {
                         Others::Lobes(0) => {}
                         Others::Lobes(_) => self.weigh(light, &samples, 1.0, &mut values),
                     }
-                    self.add(&samples, &values, active, &mut sums, &mut waiting);
+                    self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting));
                 }
             }
             if waiting.active != 0 {
-                self.add_waiting(light, &waiting, &mut sums);
+                self.add_waiting(middle, &waiting, &mut sums);
             }
         }
         if let Others::Lobes(sharp @ 1..) = self.others {
@@ -605,8 +611,24 @@ impl Lighting<'_> {
             let density = self.lobes(i).density(lane(&samples.directions, i), glosses[i]);
             let weight = weight(density * of_light[i] * others);
             let weight = if self.shares(i) { weight } else { 1.0 };
-            set_lane(values, i, lane(values, i) * weight);
+            let left = match self.others {
+                Others::Paths => Vec3::splat(weight),
+                Others::Lobes(_) => self.left_of_gloss(i, glosses[i], weight),
+            };
+            set_lane(values, i, lane(values, i) * left);
         }
+    }
+
+    /// What is left of the light that a vertex reflects where the glossy part of it counts so much: rays in a lobe bring no other,
+    /// so that the parts of a picture add up to it.
+    #[inline(always)]
+    fn left_of_gloss(&self, i: usize, gloss: f32, weight: f32) -> Vec3 {
+        let (diffuse, glossy) = (lane(&self.row.diffuse, i), lane(&self.row.specular, i) * gloss);
+        let part = |diffuse: f32, glossy: f32| {
+            let all = diffuse + glossy;
+            if all > 0.0 { (diffuse + glossy * weight) / all } else { 0.0 }
+        };
+        Vec3::new(part(diffuse.x, glossy.x), part(diffuse.y, glossy.y), part(diffuse.z, glossy.z))
     }
 
     /// The lobes in which rays are sent out from a vertex.
@@ -639,7 +661,7 @@ impl Lighting<'_> {
             for i in 0..LANES {
                 set_lane(&mut directions, i, self.lobes(i).sample(1.0, [u[0][i], u[1][i]]));
             }
-            let Response { f, cosines, glosses } = row.response(&directions);
+            let Response { cosines, glosses, .. } = row.response(&directions);
             let mut sent = sharp & !row.hidden(&directions);
             let mut ends = [-1.0; LANES];
             for i in 0..LANES {
@@ -663,16 +685,24 @@ impl Lighting<'_> {
                         radiance * self.transmittance(i, f32::MAX)
                     }
                 };
-                let value = lane(&f, i) * radiance * (cosines[i] / (density * count as f32));
+                let f = lane(&row.specular, i) * glosses[i];
+                let value = f * radiance * (cosines[i] / (density * count as f32));
                 let sum = lane(&sums.light, i) + value;
                 set_lane(&mut sums.light, i, sum);
             }
         }
     }
 
-    /// Add what samples of one light bring, if they bring anything; what waits for one ray is put beside.
+    /// Add what samples of one light bring, if they bring anything; where it waits for one ray, it is put beside.
     #[inline(always)]
-    fn add(&self, samples: &LightRow, values: &Lanes3, active: u32, sums: &mut Sums, waiting: &mut Waiting) {
+    fn add(
+        &self,
+        samples: &LightRow,
+        values: &Lanes3,
+        active: u32,
+        sums: &mut Sums,
+        waiting: Option<&mut Waiting>,
+    ) {
         if active == 0 {
             return;
         }
@@ -680,22 +710,22 @@ impl Lighting<'_> {
             let is_active = active & 1 << i != 0;
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
-        if self.shot.settings.render.shadows == Shadows::Soft {
-            let (rays, ends) = self.shadow_rays(samples, active & !self.row.hidden(&samples.directions));
-            self.add_seen(&rays, &ends, &samples.sources, values, sums);
-        } else {
+        if let Some(waiting) = waiting {
             waiting.active |= active;
             add_where(active, values, &mut waiting.light);
+        } else {
+            let (rays, ends) = self.shadow_rays(samples, active & !self.row.hidden(&samples.directions));
+            self.add_seen(&rays, &ends, &samples.sources, values, sums);
         }
     }
 
     /// What waits for one ray to the middle of its light.
     #[inline(always)]
-    fn add_waiting(&self, light: &Light, waiting: &Waiting, sums: &mut Sums) {
-        if self.shot.settings.render.shadows == Shadows::Off {
+    fn add_waiting(&self, middle: Option<(Middle, Source)>, waiting: &Waiting, sums: &mut Sums) {
+        let Some((middle, source)) = middle.filter(|_| self.shot.settings.render.shadows != Shadows::Off)
+        else {
             return add_where(waiting.active, &waiting.light, &mut sums.light);
-        }
-        let (middle, source) = light.middle();
+        };
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
         for i in 0..LANES {
             let from = lane(&self.row.from, i);

@@ -4,6 +4,7 @@ pub mod cuboid;
 pub mod directional;
 pub mod disk;
 pub mod emitter;
+pub mod environment;
 mod linear;
 mod meridians;
 pub mod mesh;
@@ -12,6 +13,7 @@ pub mod rectangle;
 pub mod round;
 mod row;
 mod set;
+pub mod sky;
 pub mod sphere;
 pub mod spot;
 pub mod torus;
@@ -19,9 +21,11 @@ pub mod triangle;
 
 pub use directional::DirectionalLight;
 pub use emitter::{AreaLight, Part, area_light};
+pub use environment::Environment;
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
 pub use set::Lights;
+pub use sky::SkyMap;
 pub use spot::SpotLight;
 
 use crate::math::Vec3;
@@ -35,6 +39,8 @@ pub enum Light {
     Spot(SpotLight),
     /// From beyond the scene.
     Directional(DirectionalLight),
+    /// From all around.
+    Environment(Environment),
     /// A shape that emits.
     Area(AreaLight),
 }
@@ -106,17 +112,19 @@ impl Light {
     /// of lights that no ray meets.
     pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
         match self {
-            Self::Point(_) | Self::Spot(_) | Self::Directional(_) => 0.0,
+            Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => 0.0,
             Self::Area(light) => light.pdf(from, met),
         }
     }
 
-    /// A way for its light to arrive at a point, by numbers in [0, 1); none where what was chosen sends nothing there.
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    /// A way for its light to arrive at a point of a surface with this normal, by numbers in [0, 1); none where what was chosen
+    /// sends nothing there.
+    pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Point(light) => light.sample(point),
             Self::Spot(light) => light.sample(point),
             Self::Directional(light) => light.sample(u),
+            Self::Environment(light) => light.sample(normal, u),
             Self::Area(light) => light.sample(point, u),
         }
     }
@@ -126,20 +134,21 @@ impl Light {
         match self {
             Self::Point(_) | Self::Spot(_) => true,
             Self::Directional(light) => light.is_sharp(),
-            Self::Area(_) => false,
+            Self::Environment(_) | Self::Area(_) => false,
         }
     }
 
-    /// The middle of the light, and what a ray to there need not hit: the light itself.
-    pub fn middle(&self) -> (Middle, Source) {
-        match self {
+    /// The middle of the light, and what a ray to there need not hit: the light itself. Light from all around has none.
+    pub fn middle(&self) -> Option<(Middle, Source)> {
+        Some(match self {
             Self::Point(PointLight { position, .. })
             | Self::Spot(SpotLight { point: PointLight { position, .. }, .. }) => {
                 (Middle::At(position.as_vec3()), Source::Nothing)
             }
             Self::Directional(light) => (Middle::Towards(light.to_light), Source::Nothing),
+            Self::Environment(_) => return None,
             Self::Area(light) => (Middle::At(light.middle().as_vec3()), Source::Object(light.object)),
-        }
+        })
     }
 }
 

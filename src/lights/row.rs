@@ -93,7 +93,7 @@ impl LightRow {
 impl Light {
     /// [`Light::sample`] for the points whose bits are set, each by numbers of its own.
     #[inline(always)]
-    pub fn sample_row(&self, points: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
+    pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
         let light = match self {
             Self::Point(light) => {
                 let mut row = LightRow::dark(Source::Nothing);
@@ -119,6 +119,15 @@ impl Light {
                 let mut row = LightRow::dark(Source::Nothing);
                 for i in 0..LANES {
                     let (direction, weight) = light.arriving([u[0][i], u[1][i]]);
+                    set_lane(&mut row.directions, i, direction);
+                    set_lane(&mut row.weights, i, weight);
+                }
+                return LightRow { beyond: u32::MAX, ..row };
+            }
+            Self::Environment(light) => {
+                let mut row = LightRow::dark(Source::Nothing);
+                for i in 0..LANES {
+                    let (direction, weight) = light.arriving_at(lane(normals, i), [u[0][i], u[1][i]]);
                     set_lane(&mut row.directions, i, direction);
                     set_lane(&mut row.weights, i, weight);
                 }
@@ -183,6 +192,11 @@ impl Light {
         match self {
             Self::Point(_) | Self::Spot(_) => {}
             Self::Directional(light) => inverse = [light.inverse_density(); LANES],
+            Self::Environment(light) => {
+                for i in 0..LANES {
+                    inverse[i] = light.inverse_density(lane(&samples.directions, i));
+                }
+            }
             Self::Area(light) => {
                 let of_radiance = 1.0 / light.radiance.max_element();
                 for i in 0..LANES {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::emitter::{Emitter, Part};
-use super::{AreaLight, DirectionalLight, Light};
+use super::{AreaLight, DirectionalLight, Environment, Light};
 use crate::math::Vec3;
 
 /// The lights of a scene, known by their index.
@@ -13,6 +13,8 @@ pub struct Lights {
     by_object: HashMap<u32, OfObject>,
     /// Those that rays see which leave the scene.
     suns: Vec<DirectionalLight>,
+    /// The same of light from all around.
+    environment: Option<Environment>,
 }
 
 /// The lights that an object is.
@@ -33,6 +35,7 @@ impl Lights {
                 Light::Point(_) | Light::Spot(_) => {}
                 Light::Directional(sun) if sun.is_sharp() => {}
                 Light::Directional(sun) => lights.suns.push(*sun),
+                Light::Environment(light) => lights.environment = Some(light.clone()),
                 Light::Area(light) => lights.note(number, light),
             }
         }
@@ -91,17 +94,16 @@ impl Lights {
 
     /// Whether a ray that leaves the scene may see light.
     pub fn are_beyond(&self) -> bool {
-        !self.suns.is_empty()
+        !self.suns.is_empty() || self.environment.is_some()
     }
 
     /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by the density in
     /// sr⁻¹ of its samples from there.
     pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
-        let of_sun = |sun: &DirectionalLight| match sun.radiance(direction) {
-            Vec3::ZERO => Vec3::ZERO,
-            radiance => radiance * share(sun.pdf(direction)),
-        };
-        self.suns.iter().map(of_sun).sum()
+        let suns = self.suns.iter().map(|sun| (sun.radiance(direction), sun.pdf(direction)));
+        let environment = self.environment.iter().map(|environment| environment.arriving(direction));
+        let seen = suns.chain(environment).filter(|(radiance, _)| *radiance != Vec3::ZERO);
+        seen.map(|(radiance, density)| radiance * share(density)).sum()
     }
 
     /// The light that a primitive of an object is, with its number.

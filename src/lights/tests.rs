@@ -55,7 +55,7 @@ pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)
 fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
     let one = |sample: u32| {
         let u = PixelSampler::new(1, 2, 3, sample).pair(1, Decision::Light(number));
-        let sample = light.sample(from, u.to_array())?;
+        let sample = light.sample(from, Vec3::Y, u.to_array())?;
         let End::At(target) = sample.end else { return None };
         Some((sample.direction, target, sample.weight.x))
     };
@@ -72,10 +72,11 @@ fn rows_hold_the_samples_of_their_points() {
     for shape in shapes() {
         for (_, light) in lights_of(&shape).iter() {
             let points: Lanes3 = std::array::from_fn(|_| std::array::from_fn(|_| next() * 6.0 - 3.0));
+            let normals: Lanes3 = [[0.0; LANES], [1.0; LANES], [0.0; LANES]];
             let u: [Lanes; 2] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
-            let row = light.sample_row(&points, u32::MAX, &u);
+            let row = light.sample_row(&points, &normals, u32::MAX, &u);
             for i in 0..LANES {
-                let alone = light.sample(lane(&points, i), [u[0][i], u[1][i]]);
+                let alone = light.sample(lane(&points, i), lane(&normals, i), [u[0][i], u[1][i]]);
                 let weight = lane(&row.weights, i);
                 let Some(alone) = alone else {
                     assert_eq!(weight, Vec3::ZERO, "{shape:?}");

@@ -47,7 +47,7 @@ mod tests {
 
     fn map(normal: Vec3) -> NormalMap {
         let data = TexelData::Float(vec![(normal + Vec3::ONE) * 0.5]);
-        let texels = Arc::new(Texels { width: 1, height: 1, data });
+        let texels = Arc::new(Texels { width: 1, height: 1, data, unusable: 0 });
         let texture =
             Texture { texels, filter: TextureFilter::Nearest, wrap: Wrap::Repeat, repeat: Vec2::ONE };
         NormalMap { texture: Arc::new(texture), strength: 1.0 }

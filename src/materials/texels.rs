@@ -18,6 +18,8 @@ pub struct Texels {
     pub height: u32,
     /// `width·height` texels.
     pub data: TexelData,
+    /// Texels of the file that were negative or not finite, and are 0 there.
+    pub unusable: u64,
 }
 
 /// How texels are stored.
@@ -48,6 +50,14 @@ impl Texels {
             TexelData::Srgb8(bytes) => bytes.into_iter().map(of_srgb).collect(),
             TexelData::Linear8(bytes) => bytes.into_iter().map(of_linear).collect(),
             TexelData::Float(floats) => floats,
+        }
+    }
+
+    /// Whether all of it is 0.
+    pub fn is_black(&self) -> bool {
+        match &self.data {
+            TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => bytes.iter().all(|texel| *texel == [0; 3]),
+            TexelData::Float(floats) => floats.iter().all(|texel| *texel == Vec3::ZERO),
         }
     }
 

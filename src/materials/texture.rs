@@ -134,7 +134,7 @@ mod tests {
     /// [[0, 1], [2, 3]], bottom row first.
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
-        let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data) });
+        let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });
         Texture { texels, filter, wrap, repeat: Vec2::ONE }
     }
 

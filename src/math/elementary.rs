@@ -85,6 +85,28 @@ pub fn acos(x: f32) -> f32 {
     if x < 0.0 { negative } else { of_size + rest }
 }
 
+/// Angle of (x, y) from the x axis in [−π, π], within 3 ulp; 0 at (0, 0). By the arc tangent of a number in [0, 1], taken to
+/// within ±tan(π/8) (the polynomial is that of Moshier's Cephes library).
+#[inline(always)]
+pub fn atan2(y: f32, x: f32) -> f32 {
+    const TAN_EIGHTH: f32 = 0.414_213_57;
+    let (ax, ay) = (x.abs(), y.abs());
+    let is_steep = ay > ax;
+    let (large, small) = if is_steep { (ay, ax) } else { (ax, ay) };
+    let is_far = small > TAN_EIGHTH * large;
+    let above = if is_far { small - large } else { small };
+    let below = if is_far { small + large } else { large };
+    let t = above / if below > 0.0 { below } else { 1.0 };
+    let z = t * t;
+    let p = 1.997_771_1e-1 + z * (-1.387_768_6e-1 + z * 8.053_744_5e-2);
+    let rest = t + t * z * (-3.333_295e-1 + z * p);
+    let first = if is_far { FRAC_PI_2 * 0.5 + rest } else { rest };
+    // What π/2 and π lack of themselves as `f32`.
+    let quarter = if is_steep { FRAC_PI_2 - (first + 4.371_139e-8) } else { first };
+    let half = if x < 0.0 { PI - (quarter + 8.742_278e-8) } else { quarter };
+    half.copysign(y)
+}
+
 /// Sine and cosine of an angle of at most 1000, within 1.2e-7: the angle is taken to [−π/4, π/4] around a multiple of π/2, which
 /// is subtracted in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980), and there the
 /// polynomials are those of Moshier's Cephes library.
@@ -126,6 +148,25 @@ mod tests {
         }
         assert!(worst <= 2.0, "{worst} ulp");
         assert_eq!((acos(1.0), acos(-1.0), acos(0.0)), (0.0, PI, FRAC_PI_2));
+    }
+
+    #[test]
+    fn angles_all_around() {
+        let mut worst = 0.0_f64;
+        for i in 0..400_000 {
+            let angle = f64::from(i) / 400_000.0 * std::f64::consts::TAU - std::f64::consts::PI;
+            for radius in [1.0, 1e-20, 3e18] {
+                let (x, y) = ((libm::cos(angle) * radius) as f32, (libm::sin(angle) * radius) as f32);
+                worst = worst.max(ulps(atan2(y, x), libm::atan2(f64::from(y), f64::from(x))));
+            }
+        }
+        assert!(worst <= 3.0, "{worst} ulp");
+        for (y, x, angle) in
+            [(0.0, 1.0, 0.0), (1.0, 0.0, FRAC_PI_2), (0.0, -1.0, PI), (-1.0, 0.0, -FRAC_PI_2)]
+        {
+            assert_eq!(atan2(y, x), angle);
+        }
+        assert_eq!([atan2(0.0, 0.0), atan2(-0.0, -1.0)], [0.0, -PI]);
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub struct Checked {
     pub triangles: u64,
     /// Image files read, each reading of its numbers counted.
     pub textures: u64,
-    /// Lights without extent, and objects that emit.
+    /// Lights without extent, an environment, and objects that emit.
     pub lights: u64,
     /// What is probably not meant.
     pub warnings: Vec<Diagnostic>,
@@ -48,11 +48,12 @@ pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
         }
         (None, None) => false,
     };
+    let environment = scene.environment.iter().filter(|environment| environment.color != Vec3::ZERO).count();
     Ok(Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
         textures: textures.texels.len() as u64,
-        lights: (scene.lights.len() + scene.objects.iter().filter(emits).count()) as u64,
+        lights: (scene.lights.len() + environment + scene.objects.iter().filter(emits).count()) as u64,
         warnings,
     })
 }

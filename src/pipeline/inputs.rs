@@ -44,6 +44,9 @@ impl Inputs {
         for texture in &scene.textures {
             add(&texture.file.value, &texture.file.span, format!("the file of texture `{}`", texture.name));
         }
+        if let Some(file) = scene.environment.as_ref().and_then(|environment| environment.file.as_ref()) {
+            add(&file.value, &file.span, "the map of the environment".to_owned());
+        }
         for mesh in &scene.mesh_files {
             add(&mesh.value, &mesh.span, "a mesh file of the scene".to_owned());
         }

@@ -8,6 +8,7 @@ use super::targets::NamedBy;
 use crate::film::Rect;
 use crate::film::tone::{Distances, ToneMapping};
 use crate::integrators::{FirstHit, Measure, RenderSettings, Shown};
+use crate::math::Vec3;
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Integrator, MaterialKind, Render, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -37,7 +38,10 @@ pub(super) struct Plan {
 /// # Errors
 /// A crop outside the picture, or a file that cannot hold it.
 pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
-    let render = overrides.applied(&scene.render);
+    let mut render = overrides.applied(&scene.render);
+    if scene.environment.is_some() {
+        render.background = Vec3::ZERO;
+    }
     check_crop(overrides.crop, render.width, render.height)?;
     let aperture = scene.camera.aperture();
     let settings = RenderSettings {

@@ -2,6 +2,7 @@
 
 pub mod distribution;
 pub mod filter;
+pub mod grid;
 pub mod stream;
 pub mod warp;
 

@@ -6,13 +6,21 @@ use super::lower::file_emission;
 use super::{Geometry, MeshInstance, Object};
 use crate::lights::emitter::{Emitter, Part};
 use crate::lights::mesh::MeshEmitter;
-use crate::lights::{AreaLight, DirectionalLight, Light, Lights, PointLight, SpotLight, area_light};
+use crate::lights::{
+    AreaLight, DirectionalLight, Environment, Light, Lights, PointLight, SkyMap, SpotLight, area_light,
+};
+use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
-/// The lights of a scene with these objects: those without extent first, then the objects that emit. A mesh is
-/// a light for each of its emitting materials.
-pub fn lights(scene: &Scene, geometry: &Geometry) -> Arc<Lights> {
+/// The map of the environment, by the texels of its file; none where they are black.
+pub fn sky(texels: &Arc<Texels>) -> Option<Arc<SkyMap>> {
+    SkyMap::new(Arc::clone(texels)).map(Arc::new)
+}
+
+/// The lights of a scene with these objects: those without extent first, then the environment, then the objects that emit.
+/// A mesh is a light for each of its emitting materials. `sky` is the map of an environment that has one.
+pub fn lights(scene: &Scene, geometry: &Geometry, sky: Option<Arc<SkyMap>>) -> Arc<Lights> {
     let points = scene.lights.iter().map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let areas = objects.flat_map(|((id, object), described)| {
@@ -27,7 +35,21 @@ pub fn lights(scene: &Scene, geometry: &Geometry) -> Arc<Lights> {
             Object::Mesh(mesh) => mesh_lights(id, mesh, emission),
         }
     });
-    Arc::new(Lights::new(points.chain(areas.map(Light::Area)).collect()))
+    let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));
+    let all = points.chain(environment.map(Light::Environment)).chain(areas.map(Light::Area));
+    Arc::new(Lights::new(all.collect()))
+}
+
+/// Light from all around; none where it is black.
+fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> Option<Environment> {
+    let description::Environment { color, file, rotate } = environment;
+    if *color == Vec3::ZERO {
+        return None;
+    }
+    match file {
+        Some(_) => Some(Environment::map(sky?, *color, *rotate)),
+        None => Some(Environment::Constant(*color)),
+    }
 }
 
 /// A light that is no shape, in coordinates that start at `origin`.

@@ -119,6 +119,7 @@ fn file_texture(parts: &Parts, source: &TextureSource) -> Arc<Texture> {
 /// The texels that were loaded. A material that no object has names textures that were not: they are never looked up.
 fn texels(parts: &Parts, source: &TextureSource) -> Arc<Texels> {
     parts.textures.get(source).cloned().unwrap_or_else(|| {
-        Arc::new(Texels { width: 1, height: 1, data: TexelData::Linear8(vec![[128, 128, 255]]) })
+        let data = TexelData::Linear8(vec![[128, 128, 255]]);
+        Arc::new(Texels { width: 1, height: 1, data, unusable: 0 })
     })
 }

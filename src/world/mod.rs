@@ -19,14 +19,14 @@ use std::sync::Arc;
 pub use crate::accel::{Loops, PACKET};
 pub use camera::Camera;
 pub use contact::{Meeting, Near, NearTriangles, Sides};
-pub use emitters::lights;
+pub use emitters::{lights, sky};
 pub use geometry::{Geometry, Hit};
 pub use lower::file_emission;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use object::Object;
 pub use origin::origin;
-pub use textures::{NeededTexture, TextureSource, textures_needed};
+pub use textures::{NeededTexture, TextureSource, environment_source, textures_needed};
 
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;

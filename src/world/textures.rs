@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
+use crate::math::Vec3;
 use crate::scene::description::{Encoding, Scene, TextureUse};
 
 /// An image file, and how its numbers are read.
@@ -28,6 +29,8 @@ pub struct NeededTexture {
     pub declared: Option<usize>,
     /// Index into [`Scene::mesh_files`] of the mesh whose material names it.
     pub mesh_file: Option<usize>,
+    /// Whether `[environment]` names it.
+    pub is_environment: bool,
 }
 
 /// The image files that materials of objects look up, each once. Textures that no such material names are not among
@@ -48,6 +51,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
+                is_environment: false,
             });
         }
     }
@@ -59,10 +63,22 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
                 name,
                 declared: None,
                 mesh_file: Some(file),
+                is_environment: false,
             });
         }
     }
+    if let Some(source) = environment_source(scene) {
+        let name = "environment".to_owned();
+        add(NeededTexture { source, name, declared: None, mesh_file: None, is_environment: true });
+    }
     needed
+}
+
+/// Where the map of the environment comes from, where that has one that is not made black.
+pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
+    let environment = scene.environment.as_ref().filter(|environment| environment.color != Vec3::ZERO)?;
+    let path = environment.file.as_ref()?.value.clone();
+    Some(TextureSource { path, encoding: ImageEncoding::Color })
 }
 
 /// Which materials of the scene some object has, and which mesh files' own materials some instance takes.

@@ -103,6 +103,23 @@ const BROKEN: &[(&str, &[Said])] = &[
         ],
     ),
     (
+        "environment",
+        &[
+            (7, 13, "`color` must be at least 0; found -1"),
+            (8, 8, "there is no file …/files/brick.ppm"),
+            (9, 10, r#"`rotate` must be a number; found the string "left""#),
+            (10, 1, "unknown key `rotation` in [environment]"),
+        ],
+    ),
+    (
+        "environment_warnings",
+        &[
+            (1, 1, "warning: nothing lights this scene"),
+            (9, 2, "warning: [environment] takes the place of `background`, which is not seen"),
+            (10, 9, "warning: `color` is black, and so is the environment; a factor of `file`"),
+        ],
+    ),
+    (
         "escapes",
         &[
             (11, 11, "`radius` must be greater than 0; found -1"),
@@ -311,7 +328,6 @@ const BROKEN: &[(&str, &[Said])] = &[
         &[
             (5, 9, "`error` > 0 is not available in this version"),
             (13, 10, r#"filter "mipmap" is not available in this version; use one of "nearest", "bilinear""#),
-            (23, 2, "[environment] is not available in this version"),
         ],
     ),
     (

@@ -217,7 +217,10 @@ const TABLES: &[(&str, &[Key])] = &[
             ("angle", "0", Default),
         ],
     ),
-    ("[environment]", &[("color", "[0, 0, 0]", Default)]),
+    (
+        "[environment]",
+        &[("color", "[1, 1, 1]", Default), ("file", "\"sky.hdr\"", Other), ("rotate", "0.0", Default)],
+    ),
 ];
 
 /// What the materials refer to besides.
@@ -229,9 +232,13 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     for name in ["scenes/textures", "assets"] {
         fs::create_dir_all(folder.path().join(name)).expect("a folder");
     }
-    for name in
-        ["scenes/textures/bricks.png", "scenes/textures/bumps.png", "assets/knot.obj", "scenes/camera.txt"]
-    {
+    for name in [
+        "scenes/textures/bricks.png",
+        "scenes/textures/bumps.png",
+        "scenes/sky.hdr",
+        "assets/knot.obj",
+        "scenes/camera.txt",
+    ] {
         fs::write(folder.path().join(name), "").expect("written");
     }
     let scene = folder.path().join("scenes/cornell.toml");
@@ -260,6 +267,8 @@ fn placeless(mut scene: Scene) -> Scene {
     scene.objects.iter_mut().for_each(|object| object.span = 0..0);
     scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);
     scene.mesh_files.iter_mut().for_each(|file| file.span = 0..0);
+    let maps = scene.environment.iter_mut().filter_map(|environment| environment.file.as_mut());
+    maps.for_each(|file| file.span = 0..0);
     scene
 }
 
@@ -288,6 +297,18 @@ fn every_key_may_be_left_out_but_those_marked() {
             }
         }
     }
+}
+
+#[test]
+fn an_environment_without_a_map_is_black() {
+    let (_folder, path) = folder();
+    let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+    let color = |text: &str| {
+        let scene = parse(format!("{camera}{text}").into(), &path).scene.expect("a scene");
+        scene.environment.map(|environment| environment.color.to_array())
+    };
+    assert_eq!([color(""), color("[environment]\n")], [None, Some([0.0; 3])]);
+    assert_eq!(color("[environment]\nfile = \"sky.hdr\"\n"), Some([1.0; 3]));
 }
 
 #[test]
@@ -358,6 +379,9 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[materials.a]\ntype = \"glass\"\nior = 0.75",
         "[materials.a]\nambient = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[environment]",
+        "[environment]\ncolor = [1, 1, 1]",
+        "[environment]\ncolor = \"skyblue\"\nrotate = -720",
+        "[environment]\nfile = \"textures/bricks.png\"",
     ] {
         assert_eq!(said(right), 0, "{right}");
     }
@@ -367,8 +391,11 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[render]\nsamples = 0",
         "[render]\nerror = -1",
         "[render]\nbackground = [0, -1, 0]",
-        "[environment]\ncolor = [1, 1, 1]",
+        "[environment]\ncolor = [1, -1, 1]",
         "[environment]\ncolour = [0, 0, 0]",
+        "[environment]\nfile = \"textures/brick.png\"",
+        "[environment]\nfile = \"sky.txt\"",
+        "[environment]\nrotate = \"left\"",
     ] {
         assert_eq!(said(wrong), 1, "{wrong}");
     }
@@ -397,7 +424,7 @@ fn the_starter_and_the_readme_have_every_key() {
                 row.contains(&format!("`{key}`")) || *key == "material" && reference.contains("`material`");
             assert!(in_row, "README: {header} {key}");
             let has = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} = "));
-            assert!(*header == "[environment]" || starter().lines().any(has), "starter: {header} {key}");
+            assert!(starter().lines().any(has), "starter: {header} {key}");
         }
     }
 }
@@ -405,7 +432,7 @@ fn the_starter_and_the_readme_have_every_key() {
 #[test]
 fn every_line_of_the_starter_may_be_uncommented() {
     let folder = tempfile::tempdir().expect("a folder");
-    for name in ["bricks.png", "knot.obj"] {
+    for name in ["bricks.png", "knot.obj", "sky.hdr"] {
         fs::write(folder.path().join(name), "").expect("written");
     }
     let is_key = |text: &str| {

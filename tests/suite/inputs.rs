@@ -295,3 +295,30 @@ fn new_takes_the_place_of_nothing() {
     let stderr = desk.expect("new dangling.toml", 2);
     assert!(stderr.contains("symbolic link"), "{stderr}");
 }
+
+#[test]
+fn the_map_of_an_environment_is_no_output() {
+    let desk = Desk::new();
+    // One that is read, and one that is only named: a black factor needs no map.
+    for (name, color) in [("lit.toml", ""), ("dark.toml", "color = 0\n")] {
+        desk.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
+        desk.write("sky.ppm", PHOTOGRAPH);
+        let said = refused(
+            &desk,
+            &format!("{name} {ENDLESS} -o sky.ppm"),
+            &["sky.ppm", "the map of the environment"],
+        );
+        assert!(said.contains(name), "{said}");
+        let checked = desk.glimt(&format!("check {name}")).output().expect("it runs");
+        let counted = String::from_utf8_lossy(&checked.stdout).into_owned();
+        let lights = if color.is_empty() { "2 lights" } else { "1 light" };
+        assert!(counted.contains("1 texture") && counted.contains(lights), "{counted}");
+    }
+    fs::remove_file(desk.path("sky.ppm")).expect("removed");
+    let missing = desk.expect("check lit.toml", 2);
+    assert!(missing.contains("there is no file") && missing.contains("sky.ppm"), "{missing}");
+    desk.write("sky.ppm", "P6 no picture");
+    for call in ["check lit.toml", "check dark.toml", "lit.toml --once"] {
+        assert!(desk.expect(call, 2).contains("sky.ppm"), "{call}");
+    }
+}

@@ -24,6 +24,7 @@ fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
         "shapes",
         "spheres",
         "sun",
+        "environment",
         "textures",
     ] {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));

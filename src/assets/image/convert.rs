@@ -6,10 +6,12 @@ use super::ImageEncoding;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
+use crate::math::limits::LARGEST;
 
 pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding) -> Texels {
     let (width, height) = (image.width(), image.height());
     let channels = usize::from(image.color().channel_count());
+    let mut unusable = 0;
     let data = match image {
         DynamicImage::ImageLuma8(pixels) => bytes(&pixels, channels, encoding),
         DynamicImage::ImageLumaA8(pixels) => bytes(&pixels, channels, encoding),
@@ -19,12 +21,12 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding) -> Texels {
         DynamicImage::ImageLumaA16(pixels) => words(&pixels, channels, encoding),
         DynamicImage::ImageRgb16(pixels) => words(&pixels, channels, encoding),
         DynamicImage::ImageRgba16(pixels) => words(&pixels, channels, encoding),
-        DynamicImage::ImageRgb32F(pixels) => floats(&pixels, channels, encoding),
-        DynamicImage::ImageRgba32F(pixels) => floats(&pixels, channels, encoding),
+        DynamicImage::ImageRgb32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
+        DynamicImage::ImageRgba32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
         // Kinds that a later `image` may add.
-        other => floats(&other.into_rgb32f(), 3, encoding),
+        other => floats(&other.into_rgb32f(), 3, encoding, &mut unusable),
     };
-    Texels { width, height, data }
+    Texels { width, height, data, unusable }
 }
 
 /// Red, green and blue of a pixel of 1 (grey), 2 (grey, alpha), 3 or 4 samples.
@@ -52,13 +54,19 @@ fn words(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData
     TexelData::Float(samples.chunks_exact(channels).map(texel).collect())
 }
 
-fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding) -> TexelData {
-    let clean = |value: f32| if value.is_finite() { value.max(0.0) } else { 0.0 };
+fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding, unusable: &mut u64) -> TexelData {
+    let clean = |value: f32| if value <= LARGEST as f32 { value.max(0.0) } else { 0.0 };
     let decode = |value: f32| match encoding {
         ImageEncoding::Srgb => clean(srgb_to_linear(clean(value))),
         ImageEncoding::Color | ImageEncoding::Linear => clean(value),
         ImageEncoding::Raw => value,
     };
-    let texel = |pixel| Vec3::from_array(rgb(pixel).map(decode));
-    TexelData::Float(samples.chunks_exact(channels).map(texel).collect())
+    let mut texel = |pixel| {
+        let rgb = rgb(pixel);
+        if encoding != ImageEncoding::Raw {
+            *unusable += u64::from(!rgb.iter().all(|value| (0.0..=LARGEST as f32).contains(value)));
+        }
+        Vec3::from_array(rgb.map(decode))
+    };
+    TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
 }

@@ -5,6 +5,7 @@ mod noise;
 mod pictures;
 mod room;
 mod shapes;
+mod sky;
 mod surface;
 mod vector;
 
@@ -61,6 +62,7 @@ fn stored() -> Vec<Asset> {
         ("textures/planks.png", pictures::planks()),
         ("textures/marble.png", pictures::marble()),
         ("textures/tiles.ppm", pictures::tiles()),
+        ("textures/evening.hdr", sky::evening()),
     ]
 }
 

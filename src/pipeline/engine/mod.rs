@@ -22,6 +22,7 @@ use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel, needed};
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
+use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
 use super::stages::preview::Screen;
@@ -29,7 +30,7 @@ use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::world::{Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
-use super::stages::{Findings, Reading, Staged, Stop, keys, lights::lights, photons::photons};
+use super::stages::{Findings, Reading, Staged, Stop, keys, photons::photons};
 use super::table::StageTable;
 use super::targets::{NamedBy, conflicts};
 use super::trace::{Kernel, Tracer};
@@ -67,6 +68,7 @@ pub(super) struct Engine {
     textures: TextureCache,
     accel: AccelCache,
     lights: Memo<Arc<Lights>>,
+    sky: SkyMemo,
     world: Memo<Arc<World>>,
     films: Films,
     written: Written,
@@ -115,6 +117,7 @@ impl Engine {
             textures: TextureCache::default(),
             accel: AccelCache::default(),
             lights: Memo::default(),
+            sky: SkyMemo::default(),
             world: Memo::default(),
             films: Films::default(),
             written: Written::default(),
@@ -243,8 +246,9 @@ impl Engine {
         let origin = origin(&scene.camera, parsed.orbiter.as_ref());
         let build = || accel(scene, (&of, origin), &meshes, &mut self.accel, &reading);
         let built = table.run(Stage::Accel, build)?;
-        let lights =
-            table.run(Stage::Lights, || Ok(lights(scene, &of, &built.geometry, &mut self.lights)))?;
+        let memos = (&mut self.lights, &mut self.sky);
+        let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos));
+        let lights = table.run(Stage::Lights, gather)?;
         let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
         let texels_loaded = textures.texels_loaded;
         Ok(Ready { parsed, plan, world, texels_loaded })

@@ -44,13 +44,24 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// What gives light, where it is, and which objects it is.
-pub(in crate::pipeline) fn lights(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
-    from(&described_lights(scene, of), origin)
+/// What gives light, where it is, and which objects it is. `sky` is the map of the environment.
+pub(in crate::pipeline) fn lights(
+    scene: &Scene,
+    of: &Referents<'_>,
+    origin: DVec3,
+    sky: Option<&Key>,
+) -> Key {
+    let mut key = Fingerprint::new("lights");
+    key.key(&from(&described_lights(scene, of), origin)).flag(sky.is_some());
+    if let Some(sky) = sky {
+        key.key(sky);
+    }
+    key.finish()
 }
 
 fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
-    let mut key = Fingerprint::new("lights");
+    let mut key = Fingerprint::new("described lights");
+    key.add(&scene.environment, of);
     for light in &scene.lights {
         key.add(light, of);
     }
@@ -108,7 +119,7 @@ mod tests {
     fn keys(text: &str) -> (Key, Key, Key) {
         let scene = loaded_of(text).scene;
         let of = referents(&scene, &[], None);
-        (geometry(&scene, &of, DVec3::ZERO), lights(&scene, &of, DVec3::ZERO), world(&scene, &of, &[]))
+        (geometry(&scene, &of, DVec3::ZERO), lights(&scene, &of, DVec3::ZERO, None), world(&scene, &of, &[]))
     }
 
     #[test]
@@ -144,6 +155,14 @@ mod tests {
         let (dark, lamp) = ("[materials.dark]\n".to_owned(), BALL.replace("diffuse", "emission"));
         let [behind, before] = [dark.clone() + &lamp + ball, dark + ball + &lamp].map(|text| keys(&text).1);
         assert_ne!(behind, before);
+    }
+
+    #[test]
+    fn an_environment_changes_the_lights_and_no_tree() {
+        let around = |color: &str| keys(&format!("[environment]\ncolor = {color}\n{BALL}"));
+        let (none, grey, red) = (keys(BALL), around("0.5"), around("\"red\""));
+        assert_eq!((none.0, none.0), (grey.0, red.0));
+        assert!(none.1 != grey.1 && grey.1 != red.1 && none.2 != grey.2 && grey.2 != red.2);
     }
 
     #[test]

@@ -3,28 +3,47 @@
 use std::sync::Arc;
 
 use super::super::cache::Memo;
+use super::textures::Textures;
 use super::{Staged, keys};
-use crate::lights::Lights;
+use crate::lights::{Lights, SkyMap};
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::Referents;
 use crate::world::{self, Geometry};
+
+/// The distribution over the map of an environment, which stays while the file does, however it is turned.
+pub(in crate::pipeline) type SkyMemo = Memo<Option<Arc<SkyMap>>>;
 
 /// Gather them.
 pub(in crate::pipeline) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
     geometry: &Geometry,
-    memo: &mut Memo<Arc<Lights>>,
+    textures: &Textures,
+    (memo, skies): (&mut Memo<Arc<Lights>>, &mut SkyMemo),
 ) -> Staged<Arc<Lights>> {
-    let key = keys::lights(scene, of, geometry.origin());
+    let map = textures.environment.as_ref().map(|(key, _)| key);
+    let key = keys::lights(scene, of, geometry.origin(), map);
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
         return Staged::reused(lights.clone(), "no light changed");
     }
-    let lights = world::lights(scene, geometry);
+    let lights = world::lights(scene, geometry, sky(textures, skies));
     memo.set(key, lights.clone());
     match lights.len() {
         0 => Staged::skipped(lights, "the scene has no light"),
         1 => Staged::done(lights, "1 light"),
         count => Staged::done(lights, format!("{count} lights")),
     }
+}
+
+fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<SkyMap>> {
+    let Some((key, texels)) = &textures.environment else {
+        *memo = SkyMemo::default();
+        return None;
+    };
+    if let Some(sky) = memo.get(*key) {
+        return sky.clone();
+    }
+    let sky = world::sky(texels);
+    memo.set(*key, sky.clone());
+    sky
 }

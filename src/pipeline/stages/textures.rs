@@ -16,9 +16,9 @@ use crate::assets::image::{ImageEncoding, ImageLimits, load, texel_bytes};
 use crate::control::{Cancelled, Progress};
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
-use crate::scene::description::Encoding;
+use crate::scene::description::{Encoding, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
-use crate::world::{NeededTexture, TextureSource};
+use crate::world::{NeededTexture, TextureSource, environment_source};
 
 /// Most bytes that the texels of a scene's images may take together.
 const MOST_BYTES: u64 = 2 << 30;
@@ -35,6 +35,8 @@ pub(in crate::pipeline) struct Textures {
     pub(in crate::pipeline) texels: HashMap<TextureSource, Arc<Texels>>,
     /// Of what each was made, in the order asked for.
     pub(in crate::pipeline) keys: Vec<Key>,
+    /// The map of the environment, with its key.
+    pub(in crate::pipeline) environment: Option<(Key, Arc<Texels>)>,
     /// Texels read from files by this request.
     pub(in crate::pipeline) texels_loaded: u64,
 }
@@ -60,8 +62,9 @@ pub(in crate::pipeline) fn textures(
 ) -> Result<Staged<Textures>, Stop> {
     let mut textures = Textures::default();
     if needed.is_empty() {
-        return Ok(Staged::skipped(textures, "no visible material names a texture"));
+        return Ok(Staged::skipped(textures, "nothing that is seen names a texture"));
     }
+    let environment = environment_source(&loaded.scene);
     let images = images(needed, cache, reading)?;
     let assets = load_all(&images, MOST_BYTES, reading);
     let mut counts = Counts::default();
@@ -78,7 +81,11 @@ pub(in crate::pipeline) fn textures(
                 textures.keys.push(key);
                 for one in &image.asked_by {
                     textures.texels.insert(one.source.clone(), texels.clone());
+                    if Some(&one.source) == environment.as_ref() {
+                        textures.environment = Some((key, texels.clone()));
+                    }
                 }
+                warn_of_unusable(loaded, &image, &texels, findings);
                 cache.insert(image.name, key, texels);
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
@@ -90,7 +97,30 @@ pub(in crate::pipeline) fn textures(
             }
         }
     }
+    if let Some((_, texels)) = textures.environment.as_ref().filter(|(_, texels)| texels.is_black()) {
+        let size = format!("{} × {}", texels.width, texels.height);
+        let message = format!("the map of the environment is black: none of its {size} pixels gives light");
+        findings.warn(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
+    }
     Ok(loaded_and_kept(textures, counts))
+}
+
+/// Says how much of an image cannot be shown.
+fn warn_of_unusable(loaded: &Loaded, image: &Image<'_>, texels: &Texels, findings: &mut Findings) {
+    let count = match texels.unusable {
+        0 => return,
+        1 => "1 pixel is".to_owned(),
+        count => format!("{count} pixels are"),
+    };
+    let path = image.path().display();
+    let message =
+        format!("{path}: {count} negative, not finite or beyond 1e18 in red, green or blue; 0 stands there");
+    findings.warn(loaded, place(loaded, image.asked_by[0]), message);
+}
+
+/// Where the scene names the map of its environment.
+fn environment_span(scene: &Scene) -> Option<Range<usize>> {
+    scene.environment.as_ref()?.file.as_ref().map(|file| file.span.clone())
 }
 
 impl Image<'_> {
@@ -180,7 +210,7 @@ fn load_one(image: &Image<'_>, reading: &Reading<'_>) -> Result<(Arc<Texels>, bo
     Ok((Arc::new(reading.sink.asset(&one.name, load)?), false))
 }
 
-/// For `check`: also the textures of the scene file that no visible material names.
+/// For `check`: also the textures of the scene file that no visible material names, and the map of a black environment.
 pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
     let mut known: HashSet<PathBuf> = wanted.iter().map(|one| one.source.path.clone()).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {
@@ -198,7 +228,14 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
             name: texture.name.clone(),
             declared: Some(index),
             mesh_file: None,
+            is_environment: false,
         });
+    }
+    let environment = loaded.scene.environment.as_ref().and_then(|environment| environment.file.as_ref());
+    if let Some(file) = environment.filter(|file| known.insert(file.value.clone())) {
+        let source = TextureSource { path: file.value.clone(), encoding: ImageEncoding::Color };
+        let name = "environment".to_owned();
+        wanted.push(NeededTexture { source, name, declared: None, mesh_file: None, is_environment: true });
     }
 }
 
@@ -207,7 +244,8 @@ fn place(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
     let scene = &loaded.scene;
     let declared = one.declared.map(|index| scene.textures[index].file.span.clone());
     let mesh = || one.mesh_file.map(|index| scene.mesh_files[index].span.clone());
-    declared.or_else(mesh).unwrap_or(0..0)
+    let environment = || environment_span(scene).filter(|_| one.is_environment);
+    declared.or_else(mesh).or_else(environment).unwrap_or(0..0)
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ use crate::pipeline::settings::Overrides;
 use crate::pipeline::trace::Kernel;
 use crate::pipeline::worker::{Handle, start_with};
 use crate::scene::Loaded;
+use crate::scene::diagnostic::Diagnostic;
 
 /// A scene of this text; a camera is added where there is none.
 pub(in crate::pipeline) fn loaded_of(text: &str) -> Loaded {
@@ -155,6 +156,14 @@ impl Bench {
         let of = self.send();
         match self.until_end(of).pop() {
             Some(Event::Done { report, unchanged, .. }) => (*report, unchanged),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(super) fn done_with_warnings(&mut self) -> (Report, Vec<Diagnostic>) {
+        let of = self.send();
+        match self.until_end(of).pop() {
+            Some(Event::Done { report, warnings, .. }) => (*report, warnings),
             other => panic!("{other:?}"),
         }
     }

@@ -130,7 +130,7 @@ fn a_scene_without_files_says_why_stages_are_skipped() {
     assert_statuses(&report, "dssddsdd");
     let why = |stage: Stage| report.stages[stage as usize].why.clone();
     assert_eq!(why(Stage::Meshes), "the scene has no mesh");
-    assert_eq!(why(Stage::Textures), "no visible material names a texture");
+    assert_eq!(why(Stage::Textures), "nothing that is seen names a texture");
     assert_eq!(why(Stage::Photons), "the scene does not enable photons");
 }
 
@@ -241,4 +241,66 @@ fn more_samples_go_on_from_those_that_are_there_to_the_same_picture() {
     let again = bench.done().0;
     assert_eq!(bench.picture(), went_on);
     assert_eq!(again.counters.camera_rays - report.counters.camera_rays, rays(4));
+}
+
+#[test]
+fn an_environment_is_a_file_among_others_and_turning_it_reloads_nothing() {
+    let around = "[environment]\nfile = \"sky.ppm\"\nrotate = 0\n";
+    let mut bench = Bench::new(&format!("{SCENE}{around}"));
+    let sky = "P6\n2 1\n255\nabcdef";
+    bench.write("sky.ppm", sky);
+    let report = bench.done().0;
+    assert_statuses(&report, "dddddsdd");
+    assert_eq!(report.counters.texels_loaded, 3);
+    assert_eq!(report.stages[Stage::Lights as usize].why, "2 lights");
+    assert_statuses(&bench.done().0, "rrrrrsrr");
+    // No texel is read again, no tree built.
+    for (old, new) in [("rotate = 0", "rotate = 90"), ("rotate = 90", "color = [1, 0.5, 1]")] {
+        bench.edit(old, new);
+        let report = bench.done().0;
+        assert_statuses(&report, "drrrdsdd");
+        assert_eq!(report.counters.texels_loaded, 0);
+    }
+    // The file is watched.
+    bench.write("sky.ppm", "P6\n2 1\n255\nabcdeg");
+    let report = bench.done().0;
+    assert_statuses(&report, "rrdrdsdd");
+    assert_eq!(report.counters.texels_loaded, 2);
+    // In place of it a colour: nothing of the map is left.
+    bench.edit("file = \"sky.ppm\"\n", "");
+    assert_statuses(&bench.done().0, "drrrdsdd");
+    bench.edit("[environment]\n", "# ");
+    assert_statuses(&bench.done().0, "drrrdsdd");
+}
+
+#[test]
+fn a_black_map_and_texels_that_are_no_light_are_answered() {
+    let around = "[environment]\nfile = \"sky.exr\"\n";
+    let said = |values: &[f32]| {
+        let mut bench = Bench::new(&format!("{SCENE}{around}"));
+        let raw: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
+        let kind = image::ExtendedColorType::Rgb32F;
+        image::save_buffer(bench.path("sky.exr"), &raw, values.len() as u32 / 3, 1, kind).expect("written");
+        let (report, warnings) = bench.done_with_warnings();
+        assert_eq!(report.counters.non_finite_samples, 0);
+        warnings.into_iter().map(|one| one.message).collect::<Vec<_>>()
+    };
+    assert_eq!(said(&[1.0; 6]), Vec::<String>::new());
+    let bad =
+        said(&[1.0, f32::NAN, 1.0, 0.5, 0.5, 0.5, -1.0, 1.0, 1.0, 1.0, 1.0, f32::INFINITY, 3e38, 0.0, 0.0]);
+    assert!(bad.len() == 1 && bad[0].contains("sky.exr: 4 pixels are negative, not finite"), "{bad:?}");
+    let black = said(&[0.0; 6]);
+    assert!(black.len() == 1 && black[0].contains("is black: none of its 2 × 1 pixels"), "{black:?}");
+    assert_eq!(said(&[f32::NAN; 3]).len(), 2);
+}
+
+#[test]
+fn a_map_that_is_no_picture_is_an_error_where_the_scene_names_it() {
+    let mut bench = Bench::new(&format!("{SCENE}[environment]\nfile = \"sky.hdr\"\n"));
+    bench.write("sky.hdr", "no picture");
+    let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
+    assert_eq!(errors.len(), 1, "{errors:?}");
+    let place = errors[0].place.as_ref().expect("a place");
+    assert_eq!(&place.source[place.span.clone()], "\"sky.hdr\"");
+    assert!(errors[0].message.contains("sky.hdr"), "{}", errors[0].message);
 }

@@ -1,6 +1,9 @@
 //! `[[light]]`.
 
+use std::path::PathBuf;
+
 use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::Located;
 pub use crate::lights::point::Falloff;
 use crate::math::{DVec3, Vec3};
 
@@ -50,6 +53,17 @@ pub struct DirectionalLight {
     pub angle: f64,
 }
 
+/// Light from all around: `[environment]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Environment {
+    /// Radiance; with a map, what its numbers are multiplied by.
+    pub color: Vec3,
+    /// An equirectangular map, resolved against the scene's folder.
+    pub file: Option<Located<PathBuf>>,
+    /// How far the map is turned about +y, in degrees, counterclockwise seen from above.
+    pub rotate: f64,
+}
+
 impl Fingerprinted for Light {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         match self {
@@ -69,5 +83,16 @@ impl Fingerprinted for PointLight {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self { position, intensity, falloff } = *self;
         key.dvec3(position).vec3(intensity).choice(falloff);
+    }
+}
+
+/// How it is looked up; its texels have a key of their own.
+impl Fingerprinted for Environment {
+    fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
+        let Self { color, file, rotate } = self;
+        key.vec3(*color).f64(*rotate).flag(file.is_some());
+        if let Some(file) = file {
+            key.path(&file.value);
+        }
     }
 }

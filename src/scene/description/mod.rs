@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 pub use camera::Camera;
-pub use light::{DirectionalLight, Falloff, Light, PointLight, SpotLight};
+pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
     ColorSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter, TextureUse, Wrap,
 };
@@ -41,6 +41,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// `[[light]]`, in the order of the file.
     pub lights: Vec<Light>,
+    /// `[environment]`; it takes the place of [`Render::background`].
+    pub environment: Option<Environment>,
 }
 
 /// A value with its place in the scene file.

@@ -3,6 +3,7 @@
 
 mod camera;
 mod context;
+mod environment;
 mod key;
 mod lights;
 mod limits;
@@ -59,7 +60,7 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     let materials = materials::read(root, &textures.names);
     let (objects, mesh_files) = shapes::read(root, &materials);
     let lights = lights::read(root);
-    environment(root);
+    let environment = environment::read(root);
     root.finish();
 
     let scene = Scene {
@@ -71,28 +72,17 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
         mesh_files,
         objects: objects?,
         lights: lights?,
+        environment: environment?,
         materials: materials.list?,
     };
     if !root.context.has_errors() {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
         warn_about_darkness(root.context, &scene);
+        environment::warn_about_background(root, &scene);
     }
     Some(scene)
 }
-
-/// Light from all around is for a later version; none is the default.
-fn environment(root: &Table<'_>) {
-    let header = root.optional("environment").key_span();
-    let Some((table, span)) = root.table("environment").zip(header) else { return };
-    if table.optional("color").color().is_some_and(|color| color != Vec3::ZERO) {
-        let issue = Issue::error(span, "[environment] is not available in this version").help(ENVIRONMENT);
-        root.context.report(issue);
-    }
-    table.finish();
-}
-
-const ENVIRONMENT: &str = "use `background` in [render] for what rays see that leave the scene";
 
 /// Warns about a scene without shapes, or without light.
 fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
@@ -104,8 +94,14 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
     let own_materials = scene.objects.iter().any(|object| object.material.is_none());
     let emits = |index: usize| scene.materials[index].emits();
     let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
-    if scene.lights.is_empty() && !own_materials && !lamps && scene.render.ambient == Vec3::ZERO {
-        let help = "add a [[light]], give a material in use `emission`, or set `ambient` in [render]";
+    let is_sky_dark = scene.environment.as_ref().is_none_or(|sky| sky.color == Vec3::ZERO);
+    if scene.lights.is_empty()
+        && is_sky_dark
+        && !own_materials
+        && !lamps
+        && scene.render.ambient == Vec3::ZERO
+    {
+        let help = "add a [[light]] or an [environment], give a material in use `emission`, or set `ambient` in [render]";
         context.report(Issue::warning(0..0, "nothing lights this scene").help(help));
     }
 }

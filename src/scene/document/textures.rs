@@ -7,7 +7,7 @@ use super::table::Table;
 use crate::math::Vec2;
 
 /// Endings of pictures that can be read.
-const PICTURES: [&str; 12] =
+pub(super) const PICTURES: [&str; 12] =
     ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pnm", "tga", "bmp", "hdr", "exr", "webp"];
 
 /// The textures of a file.

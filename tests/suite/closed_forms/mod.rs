@@ -17,6 +17,7 @@ mod round_properties;
 mod rows;
 mod scenes;
 mod shading;
+mod sky;
 mod speckle;
 mod touching;
 

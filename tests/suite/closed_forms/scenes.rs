@@ -11,11 +11,11 @@ use glimt::integrators::{RenderSettings, View, render_tile};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, Encoding, Falloff, Integrator, Light, Located, Material, MaterialKind, Mesh,
-    Object, Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap,
-    Wrap,
+    Accel, Camera, ColorSource, Encoding, Environment, Falloff, Integrator, Light, Located, Material,
+    MaterialKind, Mesh, Object, Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture,
+    TextureFilter, Tonemap, Wrap,
 };
-use glimt::world::{Geometry, MeshTree, Parts, World, lights, origin, textures_needed};
+use glimt::world::{Geometry, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 
 use super::v;
 
@@ -26,6 +26,7 @@ pub struct Build {
     pub parts: Parts,
     pub view: View,
     texels: Vec<Arc<Texels>>,
+    sky: Option<Arc<Texels>>,
 }
 
 /// Nothing, seen from (0, 0, 0) along −z through a single narrow pixel.
@@ -57,8 +58,9 @@ pub fn scene() -> Build {
         mesh_files: Vec::new(),
         objects: Vec::new(),
         lights: Vec::new(),
+        environment: None,
     };
-    Build { scene, parts: Parts::default(), view: View::Beauty, texels: Vec::new() }
+    Build { scene, parts: Parts::default(), view: View::Beauty, texels: Vec::new(), sky: None }
 }
 
 /// An angle of view in which a pixel is a point.
@@ -179,6 +181,7 @@ impl Build {
             width: rows[0].len() as u32,
             height: rows.len() as u32,
             data: TexelData::Float(rows.concat()),
+            unusable: 0,
         }));
         self.scene.textures.push(Texture {
             name: format!("{number}"),
@@ -191,16 +194,33 @@ impl Build {
         number
     }
 
+    /// The same light from everywhere.
+    pub fn environment(self, radiance: f32) -> Self {
+        let color = Vec3::splat(radiance);
+        self.with(|scene| scene.environment = Some(Environment { color, file: None, rotate: 0.0 }))
+    }
+
+    /// Light by an equirectangular map of so many columns, rows from the top.
+    pub fn sky(mut self, width: u32, texels: Vec<Vec3>, rotate: f64) -> Self {
+        let height = texels.len() as u32 / width;
+        self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
+        let file = Some(Located { value: PathBuf::from("sky.exr"), span: 0..0 });
+        self.with(|scene| scene.environment = Some(Environment { color: Vec3::ONE, file, rotate }))
+    }
+
     pub fn world(&self) -> World {
         let mut parts = self.parts.clone();
         for needed in textures_needed(&self.scene, &[]) {
-            let texels = &self.texels[needed.declared.expect("declared in the scene")];
+            let texels = match needed.declared {
+                Some(number) => &self.texels[number],
+                None => self.sky.as_ref().expect("a map of the environment"),
+            };
             parts.textures.insert(needed.source, Arc::clone(texels));
         }
         let origin = origin(&self.scene.camera, None);
         let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("nobody cancels"));
-        let lights = lights(&self.scene, &geometry);
+        let lights = lights(&self.scene, &geometry, self.sky.as_ref().and_then(sky));
         World::new(&self.scene, &parts, geometry, lights)
     }
 

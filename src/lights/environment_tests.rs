@@ -1,0 +1,209 @@
+use std::f64::consts::{PI, TAU};
+
+use super::*;
+use crate::materials::texels::{TexelData, Texels};
+use crate::math::DVec3;
+use crate::sampling::{Decision, PixelSampler};
+
+/// A map by a function of column and row.
+fn map(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels> {
+    let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
+    let data = TexelData::Float(places.map(|(column, row)| color(column, row)).collect());
+    Arc::new(Texels { width, height, data, unusable: 0 })
+}
+
+fn light(texels: &Arc<Texels>, degrees: f64) -> Environment {
+    Environment::map(Arc::new(SkyMap::new(Arc::clone(texels)).expect("light")), Vec3::ONE, degrees)
+}
+
+/// Something irregular with black parts and a bright spot.
+fn patchy(width: u32, height: u32) -> Arc<Texels> {
+    map(width, height, |x, y| {
+        let random = (x.wrapping_mul(7919).wrapping_add(y.wrapping_mul(104_729)) >> 3) % 97;
+        match random {
+            0..40 => Vec3::ZERO,
+            96 => Vec3::new(300.0, 200.0, 100.0),
+            _ => Vec3::new(random as f32, 1.0, 97.0 - random as f32) / 97.0,
+        }
+    })
+}
+
+fn random(i: u32) -> [f32; 2] {
+    PixelSampler::new(5, i >> 16, 3, i & 0xffff).pair(1, Decision::Light(0)).to_array()
+}
+
+/// The contract in double precision: a direction's colour.
+fn reference(texels: &Texels, direction: DVec3, degrees: f64) -> DVec3 {
+    // Turned back by the angle about +y.
+    let (sin, cos) = (-degrees).to_radians().sin_cos();
+    let d =
+        DVec3::new(direction.x * cos + direction.z * sin, direction.y, direction.z * cos - direction.x * sin);
+    let (u, v) = (0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI);
+    let (x, y) = (u * f64::from(texels.width) - 0.5, v * f64::from(texels.height) - 0.5);
+    let at = |i: f64, j: f64| {
+        let column = (i as i64).rem_euclid(i64::from(texels.width)) as u32;
+        let row = (j as i64).clamp(0, i64::from(texels.height) - 1) as u32;
+        texels.get(column, row).as_dvec3()
+    };
+    let (i, j) = (x.floor(), y.floor());
+    let upper = at(i, j).lerp(at(i + 1.0, j), x - i);
+    upper.lerp(at(i, j + 1.0).lerp(at(i + 1.0, j + 1.0), x - i), y - j)
+}
+
+fn directions(count: u32) -> impl Iterator<Item = Vec3> {
+    let of = |u: [f32; 2]| warp::cone([u[0] * 2.0, u[1]], 1.0);
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+    (0..count).map(move |i| of(random(i))).chain(axes)
+}
+
+#[test]
+fn directions_see_what_the_contract_says() {
+    for (width, height) in [(1, 1), (2, 1), (1, 3), (7, 5), (64, 32)] {
+        let texels =
+            map(width, height, |x, y| Vec3::new((x % 5) as f32, (y % 3) as f32, ((x + y) % 2) as f32));
+        for degrees in [0.0, 90.0, -30.0, 400.0] {
+            let environment = Environment::Map {
+                sky: Arc::new(
+                    SkyMap::new(map(width, height, |x, y| texels.get(x, y) + Vec3::ONE)).expect("light"),
+                ),
+                factor: Vec3::new(1.0, 2.0, 3.0),
+                turn: (degrees / 360.0_f64).rem_euclid(1.0) as f32,
+            };
+            // At the poles every azimuth is right.
+            for direction in directions(4000).filter(|direction| direction.y.abs() < 1.0) {
+                let expected =
+                    (reference(&texels, direction.as_dvec3(), degrees) + 1.0) * DVec3::new(1.0, 2.0, 3.0);
+                let found = environment.arriving(direction).0.as_dvec3();
+                assert!(
+                    (found - expected).length() < 2e-4 * f64::from(width.max(8)),
+                    "{direction}: {found} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_have_the_density_that_their_directions_have() {
+    for texels in [patchy(64, 32), patchy(1, 1), patchy(5, 3), patchy(1000, 500)] {
+        let Some(sky) = SkyMap::new(texels) else { continue };
+        let environment = Environment::map(Arc::new(sky), Vec3::new(1.0, 0.5, 2.0), 77.0);
+        let mut found = 0;
+        for i in 0..20_000 {
+            let Some(sample) = environment.sample(Vec3::Y, random(i)) else { continue };
+            let (radiance, density) = environment.arriving(sample.direction);
+            assert_eq!(sample.weight, radiance * (1.0 / density));
+            assert!((sample.direction.length() - 1.0).abs() < 1e-6);
+            found += 1;
+        }
+        assert!(found > 19_000, "{found}");
+    }
+}
+
+#[test]
+fn where_there_is_light_there_are_samples_and_densities_make_a_whole() {
+    for texels in [patchy(64, 32), map(32, 16, |x, y| Vec3::splat(f32::from(u8::from(x == 9 && y == 0))))] {
+        let environment = light(&texels, 30.0);
+        // No direction is on the border of two columns, where rounding decides.
+        let (columns, rows) = (256, 4096);
+        let mut whole = 0.0;
+        for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
+            let phi = (f64::from(i) + 0.5) / f64::from(columns) * TAU;
+            let (sin, cos) = ((f64::from(j) + 0.5) / f64::from(rows) * PI).sin_cos();
+            let direction = DVec3::new(sin * phi.sin(), cos, -sin * phi.cos()).as_vec3();
+            let (radiance, density) = environment.arriving(direction);
+            assert!(density > 0.0 || radiance == Vec3::ZERO, "{direction}: {radiance}");
+            whole += f64::from(density) * sin * PI / f64::from(rows) * TAU / f64::from(columns);
+        }
+        assert!((whole - 1.0).abs() < 5e-3, "{whole}");
+    }
+}
+
+/// χ² of samples over cells of (turn, height), each with what the densities say; cells of less than 5 are put together.
+#[test]
+fn samples_come_as_often_as_their_densities_say() {
+    let (width, height) = (24_usize, 12_usize);
+    for degrees in [0.0, 135.0] {
+        let environment = light(&patchy(width as u32, height as u32), degrees);
+        let (columns, rows) = (3 * width, 64);
+        let count = 1_000_000;
+        let mut counts = vec![0.0; columns * rows];
+        for i in 0..count {
+            // Independent numbers: those of one pixel are too even.
+            let number = |salt: u32| {
+                let bits = (i * 2 + salt).wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
+                let bits = (bits ^ bits >> 15).wrapping_mul(0x2c1b_3c6d);
+                let bits = (bits ^ bits >> 12).wrapping_mul(0x297a_2d39);
+                ((bits ^ bits >> 15) >> 8) as f32 / (1 << 24) as f32
+            };
+            let Environment::Map { sky, turn, .. } = &environment else { panic!("a map") };
+            let direction = sky.sample([number(0), number(1)], *turn).as_dvec3();
+            let across = (0.5 + direction.x.atan2(-direction.z) / TAU).clamp(0.0, 1.0 - 1e-12);
+            let up = (0.5 - direction.y * 0.5).clamp(0.0, 1.0 - 1e-12);
+            counts[(up * rows as f64) as usize * columns + (across * columns as f64) as usize] += 1.0;
+        }
+        let expected = |cell: usize| {
+            let steps = 24;
+            let mut sum = 0.0;
+            for (i, j) in (0..steps).flat_map(|j| (0..steps).map(move |i| (i, j))) {
+                let at = |k: usize, of: usize| k as f64 + (of as f64 + 0.5) / steps as f64;
+                let phi = (at(cell % columns, i) / columns as f64 - 0.5) * TAU;
+                let y = 1.0 - 2.0 * at(cell / columns, j) / rows as f64;
+                let sin = (1.0 - y * y).sqrt();
+                let direction = DVec3::new(sin * phi.sin(), y, -sin * phi.cos()).as_vec3();
+                sum += f64::from(environment.arriving(direction).1);
+            }
+            sum / (steps * steps) as f64 * 2.0 * TAU / (columns * rows) as f64 * f64::from(count)
+        };
+        let (mut statistic, mut freedom, mut pooled) = (0.0, 0.0, (0.0, 0.0));
+        for (cell, count) in counts.iter().enumerate() {
+            pooled = (pooled.0 + count, pooled.1 + expected(cell));
+            if pooled.1 >= 5.0 {
+                statistic += (pooled.0 - pooled.1) * (pooled.0 - pooled.1) / pooled.1;
+                freedom += 1.0;
+                pooled = (0.0, 0.0);
+            }
+        }
+        // Wilson and Hilferty's normal for χ²; the midpoint sums above are off by a little at borders of cells.
+        let normal =
+            ((statistic / freedom).cbrt() - (1.0 - 2.0 / (9.0 * freedom))) / (2.0 / (9.0 * freedom)).sqrt();
+        assert!(freedom > 500.0 && normal.abs() < 5.0, "{degrees}: {normal} by {freedom}");
+    }
+}
+
+#[test]
+fn black_maps_give_no_light() {
+    assert_eq!(SkyMap::new(map(8, 4, |_, _| Vec3::ZERO)), None);
+}
+
+#[test]
+fn a_constant_radiance_is_sampled_where_the_surface_sees_it() {
+    let environment = Environment::Constant(Vec3::new(1.0, 2.0, 3.0));
+    let normal = Vec3::new(0.6, -0.8, 0.0);
+    let mut irradiance = Vec3::ZERO;
+    for i in 0..4096 {
+        let sample = environment.sample(normal, random(i)).expect("light");
+        let cosine = sample.direction.dot(normal);
+        assert!(cosine > -1e-6);
+        let (radiance, density) = environment.arriving(sample.direction);
+        assert_eq!(sample.weight, radiance * (1.0 / density));
+        irradiance += sample.weight * cosine / 4096.0;
+    }
+    assert!((irradiance.x - PI as f32).abs() < 2e-3, "{irradiance}");
+}
+
+#[test]
+fn maps_of_any_size_are_made_and_sampled() {
+    for (width, height) in [(1, 1), (65_536, 1), (1, 4096), (4096, 2048)] {
+        let texels = map(width, height, |x, y| Vec3::splat(if (x + y) % 1000 == 0 { 1e6 } else { 1e-3 }));
+        let environment = light(&texels, 0.0);
+        for i in 0..1000 {
+            let sample = environment.sample(Vec3::Y, random(i)).expect("light");
+            assert!(
+                sample.weight.is_finite() && sample.weight.x > 0.0,
+                "{width} {height}: {}",
+                sample.weight
+            );
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! A distribution over the cells of a grid.
+
+/// Chooses a cell in proportion to weights: first its row, then its column. No cell that weighs anything gets less than a small
+/// share of what is usual around it, so that `f32` numbers can reach it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    columns: usize,
+    /// Probabilities of all rows before each, and 1.
+    rows: Vec<f32>,
+    /// Of the columns in each row, `columns + 1` a row.
+    in_row: Vec<f32>,
+}
+
+/// A point of a grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InGrid {
+    /// The cell's column.
+    pub column: usize,
+    /// The cell's row.
+    pub row: usize,
+    /// Where in the cell, along the row and across it, in [0, 1).
+    pub rest: [f32; 2],
+}
+
+/// The least share of the mean that something with a weight gets.
+const LEAST: f64 = 1.0 / 64.0;
+
+impl Grid {
+    /// From rows of as many weights ≥ 0 each; none where there are none, or they sum to nothing.
+    pub fn new(columns: usize, rows: impl Iterator<Item = Vec<f64>>) -> Option<Self> {
+        let (mut in_row, mut totals) = (Vec::new(), Vec::new());
+        for weights in rows {
+            totals.push(add_sums(&weights, &mut in_row));
+        }
+        let mut rows = Vec::new();
+        let total = add_sums(&totals, &mut rows);
+        (total > 0.0 && total.is_finite()).then_some(Self { columns, rows, in_row })
+    }
+
+    /// The point that two numbers in [0, 1) lead to: the first along the row, the second to the row.
+    #[inline(always)]
+    pub fn sample(&self, u: [f32; 2]) -> InGrid {
+        let (row, across) = find(&self.rows, u[1]);
+        let (column, along) = find(self.columns_of(row), u[0]);
+        InGrid { column, row, rest: [along, across] }
+    }
+
+    /// Probability of a row.
+    #[inline(always)]
+    pub fn row_probability(&self, row: usize) -> f32 {
+        self.rows[row + 1] - self.rows[row]
+    }
+
+    /// Probability of a column in a row.
+    #[inline(always)]
+    pub fn column_probability(&self, row: usize, column: usize) -> f32 {
+        let sums = self.columns_of(row);
+        sums[column + 1] - sums[column]
+    }
+
+    #[inline(always)]
+    fn columns_of(&self, row: usize) -> &[f32] {
+        let start = row * (self.columns + 1);
+        &self.in_row[start..=start + self.columns]
+    }
+}
+
+/// Add shares of the whole before each weight, and all of it, to a list; gives the sum of the weights.
+fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
+    let total: f64 = weights.iter().sum();
+    let least = total / weights.len().max(1) as f64 * LEAST;
+    let weight = |weight: f64| if weight > 0.0 { weight.max(least) } else { 0.0 };
+    let raised: f64 = weights.iter().map(|&one| weight(one)).sum();
+    let mut sum = 0.0;
+    sums.push(0.0);
+    for &one in weights {
+        sum += weight(one);
+        sums.push(if raised > 0.0 { (sum / raised) as f32 } else { 0.0 });
+    }
+    total
+}
+
+/// The share that `u` in [0, 1) falls on, and where in it, in [0, 1). Without branches: its way is another for each `u`.
+#[inline(always)]
+fn find(sums: &[f32], u: f32) -> (usize, f32) {
+    let (mut first, mut count) = (0, sums.len() - 1);
+    while count > 1 {
+        let half = count / 2;
+        first = if sums[first + half] <= u { first + half } else { first };
+        count -= half;
+    }
+    let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);
+    const LAST: f32 = 1.0_f32.next_down();
+    (first, if rest < LAST { rest } else { LAST })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_come_as_often_as_their_weights_and_empty_ones_never() {
+        let weights = [[0.0, 1.0, 0.0, 3.0], [0.0; 4], [4.0, 0.0, 8.0, 0.0]];
+        let grid = Grid::new(4, weights.iter().map(|row| row.to_vec())).expect("some weight");
+        let mut counts = [[0; 4]; 3];
+        let mut rests = [0.0; 2];
+        let side = 256;
+        for (i, j) in (0..side).flat_map(|j| (0..side).map(move |i| (i, j))) {
+            let at = |k: i32| (k as f32 + 0.5) / side as f32;
+            let InGrid { column, row, rest } = grid.sample([at(i), at(j)]);
+            counts[row][column] += 1;
+            rests = [rests[0] + rest[0], rests[1] + rest[1]];
+        }
+        let all = f64::from(side * side);
+        for (row, column) in (0..3).flat_map(|row| (0..4).map(move |column| (row, column))) {
+            let share = f64::from(counts[row][column]) / all;
+            assert!((share - weights[row][column] / 16.0).abs() < 1e-2, "{row} {column}: {share}");
+            let known = grid.row_probability(row) * grid.column_probability(row, column);
+            assert!((f64::from(known) - weights[row][column] / 16.0).abs() < 1e-7, "{row} {column}: {known}");
+            assert_eq!(counts[row][column] == 0, weights[row][column] == 0.0);
+        }
+        assert!(rests.iter().all(|rest| (f64::from(*rest) / all - 0.5).abs() < 1e-2), "{rests:?}");
+        let last = grid.sample([1.0_f32.next_down(); 2]);
+        assert_eq!((last.column, last.row), (2, 2));
+        assert_eq!((grid.sample([0.0; 2]).column, grid.sample([0.0; 2]).row), (1, 0));
+    }
+
+    #[test]
+    fn what_is_dark_beside_something_bright_is_within_reach() {
+        let mut row = vec![1e-3; 4096];
+        row[77] = 1e12;
+        let grid = Grid::new(4096, [row].into_iter()).expect("some weight");
+        for column in [0, 76, 78, 4095] {
+            let probability = grid.column_probability(0, column);
+            assert!(probability > 1e-6, "{column}: {probability}");
+        }
+        assert!(grid.column_probability(0, 77) > 0.98);
+    }
+
+    #[test]
+    fn nothing_is_no_distribution() {
+        assert_eq!(Grid::new(2, [vec![0.0, 0.0]].into_iter()), None);
+        assert_eq!(Grid::new(2, std::iter::empty()), None);
+    }
+}

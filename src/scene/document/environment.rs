@@ -1,0 +1,42 @@
+//! `[environment]`.
+
+use super::super::description::{Environment, Scene};
+use super::context::Issue;
+use super::limits::Limits;
+use super::table::Table;
+use super::textures::PICTURES;
+use crate::math::Vec3;
+
+/// Gives nothing where it is wrong, and in that nothing where there is none.
+pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
+    let key = root.optional("environment");
+    let Some(table) = root.table("environment") else {
+        return (!key.is_given()).then_some(None);
+    };
+    let (color, file) = (table.optional("color"), table.optional("file"));
+    let map = if file.is_given() { file.file(&PICTURES, &[]).map(Some) } else { Some(None) };
+    let default = if file.is_given() { Vec3::ONE } else { Vec3::ZERO };
+    let radiance = if color.is_given() { color.color() } else { Some(default) };
+    let rotate = table.optional("rotate");
+    let degrees = if rotate.is_given() { rotate.number(Limits::Any) } else { Some(0.0) };
+    table.finish();
+    if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_given())) {
+        let issue =
+            Issue::warning(span, "`color` is black, and so is the environment").label("a factor of `file`");
+        table.context.report(issue.help("leave it out to see the map as it is"));
+    }
+    if let Some(span) = rotate.span().filter(|_| !file.is_given()) {
+        let issue = Issue::warning(span, "`rotate` does nothing without a `file`");
+        table.context.report(issue.help("the environment is the same in every direction"));
+    }
+    Some(Some(Environment { color: radiance?, file: map?, rotate: degrees? }))
+}
+
+/// Warns about a background that is not seen.
+pub(super) fn warn_about_background(root: &Table<'_>, scene: &Scene) {
+    let Some(span) = root.optional("environment").key_span() else { return };
+    if scene.environment.is_some() && scene.render.background != Vec3::ZERO {
+        let issue = Issue::warning(span, "[environment] takes the place of `background`, which is not seen");
+        root.context.report(issue.help("leave out one of them; an environment also gives light"));
+    }
+}
