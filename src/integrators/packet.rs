@@ -2,7 +2,7 @@
 //! the light.
 
 use super::camera::CameraRow;
-use super::light::{LitRow, bsdf_parts};
+use super::lit_row::{LitRow, bsdf_parts};
 use super::queues::PathRay;
 use super::shot::Shot;
 use super::view::Measure;

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use super::camera::CameraRow;
 use super::crossing::CrossingMemory;
-use super::light::LitQueue;
+use super::lit_queue::LitQueue;
 use super::medium::Medium;
 use crate::geometry::Ray;
 use crate::math::Vec3;

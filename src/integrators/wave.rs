@@ -7,7 +7,7 @@ use std::ops::Range;
 use super::RayCounters;
 use super::camera::CAMERA_ROWS;
 use super::crossing::{Crossing, CrossingMemory};
-use super::light::LitQueue;
+use super::lit_queue::LitQueue;
 use super::medium::{Medium, absorption};
 use super::onward::Onward;
 use super::packet::Rays;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::stages::meshes::Meshes;
+use super::stages::parse::Parsed;
 use super::watch::content::FileRead;
 use crate::output::FileIdentity;
 use crate::scene::Loaded;
@@ -27,7 +28,8 @@ pub(super) struct Inputs(Vec<Input>);
 
 impl Inputs {
     /// The scene file and what it names, used or not.
-    pub(super) fn of_scene(loaded: &Arc<Loaded>) -> Self {
+    pub(super) fn of_scene(parsed: &Parsed) -> Self {
+        let loaded = &parsed.loaded;
         let scene = &loaded.scene;
         let path = loaded.path.clone();
         let mut inputs = Self(vec![Input { path, role: "the scene file".to_owned(), place: None }]);
@@ -49,6 +51,10 @@ impl Inputs {
         }
         for mesh in &scene.mesh_files {
             add(&mesh.value, &mesh.span, "a mesh file of the scene".to_owned());
+        }
+        for path in &parsed.named {
+            let role = "a file that the scene names, though not in this call".to_owned();
+            inputs.0.push(Input { path: path.clone(), role, place: None });
         }
         inputs
     }

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::engine::{Engine, Means, Meanwhile, Orders};
-use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request};
+use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
 use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
@@ -103,6 +103,8 @@ struct Mailbox {
     write: bool,
     /// The order to write came too early: it is for the request that waits.
     is_write_postponed: bool,
+    /// The order to write came when the request that waits was there: it is meant.
+    is_write_of_waiting: bool,
     /// Another size of the previews.
     preview: Option<Option<PreviewSize>>,
     /// Whether the newest request is held.
@@ -128,7 +130,10 @@ impl Remote {
         let mut mailbox = self.lock();
         match command {
             Command::Render(request) => self.replace(&mut mailbox, request),
-            Command::Write => mailbox.write = true,
+            Command::Write => {
+                mailbox.write = true;
+                mailbox.is_write_of_waiting = mailbox.request.is_some();
+            }
             Command::Preview(size) => mailbox.preview = Some(size),
             Command::Cancel => {
                 mailbox.token.cancel();
@@ -172,10 +177,12 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Leave an order to write to the request that waits, if one does.
+    /// Leave an order to write to the request that waits, if one does: not to one that came after the order and is for looking at
+    /// alone.
     fn postpone_write(&self) -> bool {
         let mut mailbox = self.lock();
-        let postponed = mailbox.request.is_some();
+        let is_meant = mailbox.is_write_of_waiting;
+        let postponed = mailbox.request.as_ref().is_some_and(|one| is_meant || one.write != Writing::No);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -194,6 +201,7 @@ impl Remote {
             mailbox.is_write_postponed = false;
             if let Some(request) = mailbox.request.take() {
                 mailbox.token = CancelToken::new();
+                mailbox.is_write_of_waiting = false;
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone());
             }
@@ -314,6 +322,22 @@ mod tests {
         assert!(matches!(remote.next(), Task::Write));
         assert!(!remote.postpone_write(), "there is no request left that it could wait for");
         assert!(matches!(remote.next(), Task::Quit));
+    }
+
+    #[test]
+    fn a_picture_for_looking_at_is_not_what_was_asked_for_before_it() {
+        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        remote.send(render(1));
+        let _ = token(&remote);
+        remote.send(Command::Write);
+        let Command::Render(view) = render(2) else { panic!("a request") };
+        remote.send(Command::Render(Box::new(Request { write: Writing::No, ..*view })));
+        assert!(matches!(remote.next(), Task::Write));
+        assert!(!remote.postpone_write(), "the first picture is lost, and the person is told");
+        // Asked for when the view waits, it is the view that is meant.
+        remote.send(Command::Write);
+        assert!(matches!(remote.next(), Task::Write));
+        assert!(remote.postpone_write());
     }
 
     #[test]

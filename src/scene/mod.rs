@@ -43,6 +43,8 @@ pub struct Loaded {
     pub path: PathBuf,
     /// What is probably not meant, in the order of the file.
     pub warnings: Vec<Diagnostic>,
+    /// Files that the scene file names, where the call sets anything: other ones may be read in their place.
+    pub named: Vec<PathBuf>,
 }
 
 impl Loaded {
@@ -80,7 +82,8 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let Outcome { scene, diagnostics } = document::lower(&source, path);
     match scene {
         Some(scene) => {
-            Ok(Loaded { scene: Arc::new(scene), source, path: path.to_owned(), warnings: diagnostics })
+            let named = if sets.is_empty() { Vec::new() } else { document::named_files(source.text(), path) };
+            Ok(Loaded { scene: Arc::new(scene), source, path: path.to_owned(), warnings: diagnostics, named })
         }
         None => Err(diagnostics),
     }

@@ -123,8 +123,12 @@ fn quoted(text: &str) -> String {
 fn malformed(set: &str) -> Diagnostic {
     let place =
         Place { source: set.into(), span: 0..set.len(), label: "this is not TABLE.KEY=VALUE".to_owned() };
-    let help =
-        "such as render.samples=3, materials.wall.diffuse=0.5, sphere.2.radius=.3 or sphere.ball.radius=.3";
+    let key = set.split('=').next().unwrap_or_default();
+    let help = if key.contains(|c: char| c.is_whitespace() || !c.is_ascii()) {
+        "a name of more than letters, digits, - and _ stands in quotes, as in sphere.\"back wall\".radius=.3"
+    } else {
+        "such as render.samples=3, materials.wall.diffuse=0.5, sphere.2.radius=.3 or sphere.ball.radius=.3"
+    };
     Diagnostic {
         severity: Severity::Error,
         message: "this does not say what to set".to_owned(),

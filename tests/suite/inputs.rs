@@ -322,3 +322,30 @@ fn the_map_of_an_environment_is_no_output() {
         assert!(desk.expect(call, 2).contains("sky.ppm"), "{call}");
     }
 }
+
+#[test]
+fn files_that_the_call_replaces_stay_inputs_of_the_scene() {
+    let desk = studio();
+    desk.write("other.ppm", PHOTOGRAPH);
+    desk.write("deep/two.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    desk.write("other.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 1\nf 40 4 3\n");
+    for (set, output) in [
+        ("textures.skin.file=other.ppm", "skin.ppm"),
+        ("textures.skin={file=\"other.ppm\"}", "skin.ppm"),
+        ("mesh.1.file=deep/two.obj --set mesh.1.material=ball", "deep/wood.ppm"),
+        ("textures.skin.file=other.ppm", "other.ppm"),
+    ] {
+        refused(&desk, &format!("scene.toml {ENDLESS} --set {set} -o {output}"), &[output]);
+    }
+    for (set, report) in [
+        ("camera.orbiter=other.txt", "camera.txt"),
+        ("mesh.1.file=deep/two.obj --set mesh.1.material=ball", "deep/one.obj"),
+    ] {
+        refused(&desk, &format!("scene.toml {ENDLESS} --set {set} --report {report}"), &[report, "--report"]);
+    }
+    // By default, over a texture that glimt has made.
+    desk.expect("scene.toml --once --samples 1 -o made.png", 0);
+    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
+    desk.write("made.toml", text.replace("unused.ppm", "made.png"));
+    refused(&desk, "made.toml --once --set textures.unused.file=other.ppm", &["made.png"]);
+}

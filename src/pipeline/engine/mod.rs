@@ -225,7 +225,7 @@ impl Engine {
         }
         let settings = Box::new(plan.effective.clone());
         table.sink.send(Event::Settings { generation: request.generation, settings });
-        let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed.loaded));
+        let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
         // The picture at hand, which may yet be written, is of the scene before.
         self.inputs.add(before);
@@ -398,7 +398,7 @@ impl Engine {
 
 /// All files that the scene names, and what else was read.
 fn inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
-    let mut inputs = Inputs::of_scene(&parsed.loaded);
+    let mut inputs = Inputs::of_scene(parsed);
     inputs.add_meshes(&parsed.loaded, meshes);
     inputs.add_read(&findings.files);
     inputs

@@ -1,6 +1,6 @@
 //! The scene file, and the orbiter file that holds its camera.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
@@ -8,6 +8,7 @@ use super::super::protocol::Failure;
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::{Findings, Staged, Stop};
 use crate::assets::OrbiterCamera;
+use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::control::CancelToken;
 use crate::scene;
@@ -19,6 +20,8 @@ use crate::scene::fingerprint::Fingerprint;
 pub(in crate::pipeline) struct Parsed {
     pub(in crate::pipeline) loaded: Arc<scene::Loaded>,
     pub(in crate::pipeline) orbiter: Option<OrbiterCamera>,
+    /// Files that the scene file names, and those that these name, where the call sets anything.
+    pub(in crate::pipeline) named: Vec<PathBuf>,
     orbiter_content: Option<Content>,
 }
 
@@ -52,12 +55,30 @@ pub(in crate::pipeline) fn parse(
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(Staged::reused(parsed, "the file did not change"));
     }
-    let parsed = Arc::new(Parsed { loaded, orbiter, orbiter_content });
+    let named = named(&loaded);
+    let parsed = Arc::new(Parsed { loaded, orbiter, named, orbiter_content });
     // A camera that could not be read is tried again by the next request.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
         memo.set(key, parsed.clone());
     }
     Ok(Staged::done(parsed, ""))
+}
+
+/// What the scene file is made of without the call's changes, with the files and pictures of meshes that are not read for these.
+fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
+    let mut named = loaded.named.clone();
+    let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
+    for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
+        // What cannot be read names nothing that could be known.
+        if let Ok(mesh) = load_mesh(path, &|_, _| {}, &CancelToken::new()) {
+            named.extend(mesh.companions.into_iter().chain(mesh.pictures));
+        }
+    }
+    named
+}
+
+fn has_material_files(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj"))
 }
 
 type Orbiter = (Option<OrbiterCamera>, Option<Content>);

@@ -18,7 +18,7 @@ mod table;
 mod textures;
 mod value;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::description::Scene;
 use super::source::Source;
@@ -49,6 +49,34 @@ pub(super) fn lower(source: &Source, path: &Path) -> Outcome {
     let scene = scene(&Table::root(&context, document.root()));
     let has_errors = context.has_errors();
     Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines) }
+}
+
+/// The files that a text names, whatever else it says.
+pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
+    fn gather(table: toml::Entries<'_>, names: &mut Vec<String>) {
+        for toml::KeyValue { key, value, .. } in table.iter() {
+            match value.item() {
+                toml::Item::String(name) if matches!(key, "file" | "orbiter") => names.push(name.to_owned()),
+                toml::Item::Table(inner) => gather(inner, names),
+                toml::Item::Array(array) => {
+                    for element in array.iter() {
+                        if let toml::Item::Table(inner) = element.item() {
+                            gather(inner, names);
+                        }
+                    }
+                }
+                toml::Item::String(_)
+                | toml::Item::Integer { .. }
+                | toml::Item::Float(_)
+                | toml::Item::Boolean(_)
+                | toml::Item::Datetime => {}
+            }
+        }
+    }
+    let mut names = Vec::new();
+    gather(toml::parse(text).0.root(), &mut names);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    names.into_iter().map(|name| folder.join(name)).collect()
 }
 
 /// The whole file. Names are gathered before what refers to them.

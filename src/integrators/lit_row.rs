@@ -1,0 +1,292 @@
+//! Vertices that wait to be lit, sixteen side by side.
+
+use super::shot::Shot;
+use super::vertices::{Lift, LitVertex};
+use super::view::{Measure, Parts};
+use crate::geometry::rows::lanes;
+use crate::materials::Lobes;
+use crate::materials::lobes::gloss;
+use crate::materials::phong::PhongBsdf;
+use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
+use crate::sampling::SamplerRow;
+use crate::scene::description::Shadows;
+
+/// Vertices to be lit.
+#[derive(Clone)]
+pub struct LitRow {
+    /// A bit for each lane with a vertex.
+    pub used: u32,
+    /// Where lights are seen from and shadow rays start.
+    pub from: Lanes3,
+    /// Normals behind which nothing is seen, of the lanes whose bits are set.
+    pub(super) horizon: Lanes3,
+    pub(super) is_bounded: u32,
+    /// Points from which lights are seen all around where nothing is on the way there, of the lanes whose bits are set, and the
+    /// ends of the ways.
+    pub(super) lifted: Lanes3,
+    pub(super) lift_end: Lanes,
+    pub(super) may_lift: u32,
+    /// Normals that the cosines are of.
+    pub normal: Lanes3,
+    /// Those before a normal map bent them, and the cosine between; [`UNBENT`] where none did.
+    pub(super) smooth_normal: Lanes3,
+    pub(super) bend: Lanes,
+    /// The direction to the eye, mirrored.
+    pub mirrored_eye: Lanes3,
+    /// The diffuse part of f in sr⁻¹, and the glossy one at its peak.
+    pub diffuse: Lanes3,
+    /// [`LitRow::diffuse`].
+    pub specular: Lanes3,
+    /// Of the glossy lobe.
+    pub shininess: Lanes,
+    /// The largest parts of kd and ks, whatever is shown of them.
+    pub albedos: [Lanes; 2],
+    /// Of the paths.
+    pub throughput: Lanes3,
+    /// Of the paths.
+    pub slot: [u32; LANES],
+    /// Of the paths.
+    pub path: [u32; LANES],
+    /// Places of the paths in the round's queue.
+    pub place: [u32; LANES],
+    /// [`History::carried`](super::queues::History::carried) of the paths.
+    pub carried: Lanes,
+    /// Places of the glass that they are in.
+    pub medium: [u32; LANES],
+    /// Whether any vertex has a glossy lobe.
+    pub is_glossy: bool,
+    /// Whether any vertex has a bent normal.
+    pub(super) is_bent: bool,
+}
+
+/// In place of the cosine between two normals that are one.
+const UNBENT: f32 = -2.0;
+
+impl LitRow {
+    /// The least α of lobes that are worth rays of their own.
+    const SHARP: f32 = 100.0;
+
+    /// A bit for each vertex whose highlights of lamps samples of the lamps alone would find too seldom.
+    pub(super) fn sharp(&self, shot: &Shot<'_>, measure: Measure) -> u32 {
+        let shows = match measure {
+            Measure::Radiance(Parts { specular, .. }) => specular,
+            Measure::ArrivingShare => false,
+        };
+        let is_soft = shot.settings.render.shadows == Shadows::Soft;
+        if !(self.is_glossy && shows && is_soft && shot.world.lights.can_be_found()) {
+            return 0;
+        }
+        let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= Self::SHARP;
+        lanes(self.used).filter(is_sharp).fold(0, |sharp, i| sharp | 1 << i)
+    }
+
+    /// The random numbers of the vertices.
+    #[inline(always)]
+    pub fn sampler(&self, shot: &Shot<'_>) -> SamplerRow<LANES> {
+        let (block, slots) = (shot.block, &self.slot);
+        let mut is_run = true;
+        for i in 0..LANES {
+            is_run &= slots[i] == slots[0] + i as u32;
+        }
+        let (xs, ys, samples) = if is_run {
+            block.places(slots[0])
+        } else {
+            let [mut xs, mut ys, mut samples] = [[0; LANES]; 3];
+            for i in (0..LANES).filter(|i| self.used & 1 << i != 0) {
+                (xs[i], ys[i], samples[i]) = block.place(slots[i]);
+            }
+            (xs, ys, samples)
+        };
+        SamplerRow::new(shot.settings.render.seed, &xs, &ys, &samples)
+    }
+
+    /// No vertex.
+    pub const EMPTY: Self = Self {
+        used: 0,
+        from: [[0.0; LANES]; 3],
+        horizon: [[0.0; LANES]; 3],
+        is_bounded: 0,
+        lifted: [[0.0; LANES]; 3],
+        lift_end: [0.0; LANES],
+        may_lift: 0,
+        normal: [[0.0; LANES]; 3],
+        smooth_normal: [[0.0; LANES]; 3],
+        bend: [UNBENT; LANES],
+        mirrored_eye: [[0.0; LANES]; 3],
+        diffuse: [[0.0; LANES]; 3],
+        specular: [[0.0; LANES]; 3],
+        shininess: [0.0; LANES],
+        albedos: [[0.0; LANES]; 2],
+        throughput: [[0.0; LANES]; 3],
+        slot: [0; LANES],
+        path: [0; LANES],
+        place: [0; LANES],
+        carried: [0.0; LANES],
+        medium: [0; LANES],
+        is_glossy: false,
+        is_bent: false,
+    };
+
+    /// For other vertices, with normals as they are.
+    #[inline(always)]
+    pub fn reset(&mut self) {
+        (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
+        (self.is_glossy, self.is_bent) = (false, false);
+        self.bend = [UNBENT; LANES];
+    }
+
+    /// Take a vertex of another row.
+    pub(super) fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        for (own, other) in [
+            (&mut self.from, &other.from),
+            (&mut self.horizon, &other.horizon),
+            (&mut self.lifted, &other.lifted),
+            (&mut self.normal, &other.normal),
+            (&mut self.smooth_normal, &other.smooth_normal),
+            (&mut self.mirrored_eye, &other.mirrored_eye),
+            (&mut self.diffuse, &other.diffuse),
+            (&mut self.specular, &other.specular),
+            (&mut self.throughput, &other.throughput),
+        ] {
+            set_lane(own, i, lane(other, from));
+        }
+        (self.bend[i], self.shininess[i]) = (other.bend[from], other.shininess[from]);
+        for (own, other) in self.albedos.iter_mut().zip(&other.albedos) {
+            own[i] = other[from];
+        }
+        (self.carried[i], self.medium[i]) = (other.carried[from], other.medium[from]);
+        (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
+        self.is_glossy |= other.is_glossy;
+        self.is_bent |= other.is_bent;
+        self.is_bounded |= (other.is_bounded >> from & 1) << i;
+        self.lift_end[i] = other.lift_end[from];
+        self.may_lift |= (other.may_lift >> from & 1) << i;
+        self.used |= 1 << i;
+    }
+
+    pub(super) fn put(
+        &mut self,
+        i: usize,
+        shot: &Shot<'_>,
+        lit: &LitVertex<'_>,
+        measure: Measure,
+        medium: u32,
+    ) {
+        let LitVertex { path, place, vertex, shading, bsdf } = lit;
+        let outlook = vertex.outlook(shot);
+        set_lane(&mut self.from, i, outlook.point);
+        set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
+        self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;
+        if let Some(Lift { to, end }) = outlook.lift {
+            set_lane(&mut self.lifted, i, to);
+            self.lift_end[i] = end;
+            self.may_lift |= 1 << i;
+        }
+        set_lane(&mut self.normal, i, shading.normal);
+        set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
+        self.bend[i] = shading.bend.unwrap_or(UNBENT);
+        set_lane(&mut self.mirrored_eye, i, shading.mirrored(vertex.to_eye));
+        let [diffuse, specular] = bsdf_parts(bsdf, measure);
+        set_lane(&mut self.diffuse, i, diffuse);
+        set_lane(&mut self.specular, i, specular);
+        self.shininess[i] = bsdf.shininess;
+        self.albedos[0][i] = bsdf.diffuse.max_element();
+        self.albedos[1][i] = bsdf.specular.max_element();
+        (self.carried[i], self.medium[i]) = (path.history.carried, medium);
+        set_lane(&mut self.throughput, i, path.throughput);
+        (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
+        self.is_glossy |= bsdf.specular != Vec3::ZERO;
+        self.is_bent |= shading.bend.is_some();
+        self.used |= 1 << i;
+    }
+
+    /// The lobes of a vertex.
+    #[inline(always)]
+    pub fn lobes(&self, i: usize) -> Lobes {
+        Lobes {
+            normal: lane(&self.normal, i),
+            mirrored_eye: lane(&self.mirrored_eye, i),
+            diffuse: self.albedos[0][i],
+            specular: self.albedos[1][i],
+            shininess: self.shininess[i],
+        }
+    }
+
+    /// What the vertices make of light from some directions.
+    #[inline(always)]
+    pub fn response(&self, directions: &Lanes3) -> Response {
+        let mut cosines = [0.0; LANES];
+        for i in 0..LANES {
+            cosines[i] = lane(&self.normal, i).dot(lane(directions, i));
+        }
+        if self.is_bent {
+            for i in 0..LANES {
+                let smooth = lane(&self.smooth_normal, i).dot(lane(directions, i));
+                cosines[i] *= terminator(cosines[i], smooth, self.bend[i]);
+            }
+        }
+        let (mut f, mut glosses) = (self.diffuse, [0.0; LANES]);
+        if self.is_glossy {
+            for i in 0..LANES {
+                let left = gloss(lane(&self.mirrored_eye, i), lane(directions, i), self.shininess[i]);
+                set_lane(&mut f, i, lane(&self.diffuse, i) + lane(&self.specular, i) * left);
+                glosses[i] = left;
+            }
+        }
+        Response { f, cosines, glosses }
+    }
+
+    /// Whether any vertex is in glass.
+    pub(super) fn is_inside(&self) -> bool {
+        lanes(self.used).any(|i| self.medium[i] != 0)
+    }
+
+    /// A bit for each vertex that certainly sees nothing in a direction.
+    #[inline(always)]
+    pub fn hidden(&self, directions: &Lanes3) -> u32 {
+        let mut hidden = [0; LANES];
+        if self.is_bounded != 0 {
+            for i in 0..LANES {
+                let cosine = lane(&self.horizon, i).dot(lane(directions, i));
+                hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
+            }
+        }
+        bits(hidden) & self.is_bounded
+    }
+}
+
+/// What vertices make of light from directions.
+pub struct Response {
+    /// The BSDF in sr⁻¹, as far as it is shown.
+    pub f: Lanes3,
+    /// Cosines, times what is left of them at the terminator; not above 0 where nothing arrives.
+    pub cosines: Lanes,
+    /// [`gloss`].
+    pub glosses: Lanes,
+}
+
+/// A bit for each lane.
+pub(super) const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
+
+/// The diffuse part of f in sr⁻¹, and the glossy one at its peak, as far as they are shown.
+#[inline(always)]
+pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
+    let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
+    match measure {
+        Measure::Radiance(Parts { diffuse, specular, .. }) => {
+            [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
+        }
+        Measure::ArrivingShare => [Vec3::ONE, Vec3::ZERO],
+    }
+}
+
+/// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing
+/// bends them (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+#[inline(always)]
+fn terminator(cosine: f32, smooth: f32, bend: f32) -> f32 {
+    let g = smooth / (cosine * bend);
+    let g = if g < 1.0 { g } else { 1.0 };
+    let soft = if bend > 0.0 { -g * g * g + g * g + g } else { 1.0 };
+    if (smooth > 0.0) | (bend == UNBENT) { soft } else { 0.0 }
+}
