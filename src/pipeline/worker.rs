@@ -11,7 +11,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::engine::{Engine, Means, Meanwhile, Orders};
-use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
+use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request};
+use super::settings::View;
 use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
@@ -105,6 +106,8 @@ struct Mailbox {
     is_write_postponed: bool,
     /// The order to write came when the request that waits was there: it is meant.
     is_write_of_waiting: bool,
+    /// What the request under way shows.
+    view: Option<View>,
     /// Another size of the previews.
     preview: Option<Option<PreviewSize>>,
     /// Whether the newest request is held.
@@ -177,12 +180,13 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Leave an order to write to the request that waits, if one does: not to one that came after the order and is for looking at
-    /// alone.
+    /// Leave an order to write to the request that waits, if one does: not to one that came after the order and shows something
+    /// else.
     fn postpone_write(&self) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
-        let postponed = mailbox.request.as_ref().is_some_and(|one| is_meant || one.write != Writing::No);
+        let postponed =
+            mailbox.request.as_ref().is_some_and(|one| is_meant || one.overrides.view == mailbox.view);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -202,6 +206,7 @@ impl Remote {
             if let Some(request) = mailbox.request.take() {
                 mailbox.token = CancelToken::new();
                 mailbox.is_write_of_waiting = false;
+                mailbox.view = request.overrides.view;
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone());
             }
@@ -273,6 +278,7 @@ fn reason(payload: &(dyn Any + Send)) -> &str {
 mod tests {
     use super::*;
     use crate::pipeline::protocol::Writing;
+    use crate::pipeline::settings::Overrides;
 
     fn render(generation: u64) -> Command {
         Command::Render(Box::new(Request {
@@ -331,7 +337,8 @@ mod tests {
         let _ = token(&remote);
         remote.send(Command::Write);
         let Command::Render(view) = render(2) else { panic!("a request") };
-        remote.send(Command::Render(Box::new(Request { write: Writing::No, ..*view })));
+        let overrides = Overrides { view: Some(View::Normal), ..view.overrides.clone() };
+        remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
         assert!(matches!(remote.next(), Task::Write));
         assert!(!remote.postpone_write(), "the first picture is lost, and the person is told");
         // Asked for when the view waits, it is the view that is meant.
