@@ -3,15 +3,7 @@
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
-
-/// Random numbers in [−1, 1).
-pub fn random(seed: u64) -> impl FnMut() -> f32 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
-    }
-}
+use crate::math::random::signed as random;
 
 /// Meshes that break trees: noise, grids with coplanar and doubled faces, slivers, one, none, all alike, NaN.
 pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {

@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::pathological::{bits, brute, meshes, random, rays};
+use super::pathological::{bits, brute, meshes, rays};
 use super::{KdTree, WideBvh};
 use crate::control::CancelToken;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
+use crate::math::random::signed as random;
 
 type Mesh = Vec<[Vec3; 3]>;
 

@@ -92,10 +92,9 @@ impl Film {
         }
         let pixels = self.crop().area() as f64;
         let error = (variance(&steps, least)? / pixels).sqrt();
-        match error {
-            0.0 => Some(0.0),
-            _ => Some(error / (means / pixels)).filter(|relative| relative.is_finite()),
-        }
+        // Of a black picture too.
+        let relative = if error == 0.0 { 0.0 } else { error / (means / pixels) };
+        Some(relative).filter(|relative| relative.is_finite())
     }
 }
 
@@ -104,6 +103,7 @@ mod tests {
     use super::*;
     use crate::film::{Rect, TILE_SIZE, TileSamples};
     use crate::math::Vec3;
+    use crate::math::random::unit;
 
     /// A film of one row, each pixel with its grey samples.
     fn film(pixels: &[&[f32]]) -> Film {
@@ -133,11 +133,7 @@ mod tests {
     #[test]
     fn independent_samples_have_the_error_that_their_variance_says() {
         // 400 pixels of samples of variance 1/12 by a linear congruential generator.
-        let mut state = 5_u64;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1_u64 << 24) as f32
-        };
+        let mut next = unit(5);
         for count in [2, 16, 100, 1024] {
             let pixels: Vec<Vec<f32>> = (0..400).map(|_| (0..count).map(|_| next()).collect()).collect();
             let pixels: Vec<&[f32]> = pixels.iter().map(Vec::as_slice).collect();

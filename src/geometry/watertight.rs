@@ -175,6 +175,7 @@ fn nearest_of_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::signed;
 
     #[test]
     fn axis_aligned_and_skew_rays_agree_with_the_plane() {
@@ -190,11 +191,7 @@ mod tests {
 
     #[test]
     fn a_sheet_with_a_needle_in_it_has_no_hole() {
-        let mut state = 3_u64;
-        let mut random = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
-        };
+        let mut random = signed(3);
         for (width, distance) in
             [(3e-4_f32, 200.0_f32), (1e-4, 200.0), (1e-4, 50.0), (1e-6, 3.0), (2e-7, 1e3)]
         {

@@ -1,6 +1,6 @@
 //! Samples of one light for a row of points.
 
-use super::emitter::Emitter;
+use super::emitter::{Arrival, Emitter};
 use super::{End, Light, LightSample, Source};
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
@@ -68,6 +68,29 @@ impl LightRow {
         }
     }
 
+    /// Of directions, targets and weights; all lanes at once.
+    #[inline(always)]
+    fn of(source: Source, sample: impl Fn(usize) -> (Vec3, Vec3, Vec3)) -> Self {
+        let mut row = Self::dark(source);
+        for i in 0..LANES {
+            let (direction, target, weight) = sample(i);
+            set_lane(&mut row.directions, i, direction);
+            set_lane(&mut row.targets, i, target);
+            set_lane(&mut row.weights, i, weight);
+        }
+        row
+    }
+
+    /// Of directions and weights of light from beyond everything.
+    #[inline(always)]
+    fn beyond(sample: impl Fn(usize) -> (Vec3, Vec3)) -> Self {
+        let row = Self::of(Source::Nothing, |i| {
+            let (direction, weight) = sample(i);
+            (direction, Vec3::ZERO, weight)
+        });
+        Self { beyond: u32::MAX, ..row }
+    }
+
     fn put(&mut self, i: usize, sample: &LightSample) {
         set_lane(&mut self.directions, i, sample.direction);
         set_lane(&mut self.weights, i, sample.weight);
@@ -94,92 +117,51 @@ impl Light {
     /// [`Light::sample`] for the points whose bits are set, each by numbers of its own.
     #[inline(always)]
     pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
+        let numbers = |i: usize| [u[0][i], u[1][i]];
         let light = match self {
             Self::Point(light) => {
-                let mut row = LightRow::dark(Source::Nothing);
-                for i in 0..LANES {
+                let target = light.position.as_vec3();
+                return LightRow::of(Source::Nothing, |i| {
                     let (direction, weight) = light.arriving(lane(points, i));
-                    set_lane(&mut row.directions, i, direction);
-                    set_lane(&mut row.weights, i, weight);
-                    set_lane(&mut row.targets, i, light.position.as_vec3());
-                }
-                return row;
+                    (direction, target, weight)
+                });
             }
             Self::Spot(light) => {
-                let mut row = LightRow::dark(Source::Nothing);
-                for i in 0..LANES {
+                let target = light.point.position.as_vec3();
+                return LightRow::of(Source::Nothing, |i| {
                     let (direction, weight) = light.arriving(lane(points, i));
-                    set_lane(&mut row.directions, i, direction);
-                    set_lane(&mut row.weights, i, weight);
-                    set_lane(&mut row.targets, i, light.point.position.as_vec3());
-                }
-                return row;
+                    (direction, target, weight)
+                });
             }
-            Self::Directional(light) => {
-                let mut row = LightRow::dark(Source::Nothing);
-                for i in 0..LANES {
-                    let (direction, weight) = light.arriving([u[0][i], u[1][i]]);
-                    set_lane(&mut row.directions, i, direction);
-                    set_lane(&mut row.weights, i, weight);
-                }
-                return LightRow { beyond: u32::MAX, ..row };
-            }
+            Self::Directional(light) => return LightRow::beyond(|i| light.arriving(numbers(i))),
             Self::Environment(light) => {
-                let mut row = LightRow::dark(Source::Nothing);
-                for i in 0..LANES {
-                    let (direction, weight) = light.arriving_at(lane(normals, i), [u[0][i], u[1][i]]);
-                    set_lane(&mut row.directions, i, direction);
-                    set_lane(&mut row.weights, i, weight);
-                }
-                return LightRow { beyond: u32::MAX, ..row };
+                return LightRow::beyond(|i| light.arriving_at(lane(normals, i), numbers(i)));
             }
             Self::Area(light) => light,
         };
-        let mut row = LightRow::dark(Source::Object(light.object));
+        let shining = |sample: Arrival| (sample.direction, sample.target, light.radiance * sample.factor);
+        let source = Source::Object(light.object);
         match &light.shape {
             Emitter::Quad(quad) => {
-                for i in 0..LANES {
-                    let sample = quad.sample(lane(points, i), [u[0][i], u[1][i]]);
-                    set_lane(&mut row.directions, i, sample.direction);
-                    set_lane(&mut row.targets, i, sample.target);
-                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
-                }
+                LightRow::of(source, |i| shining(quad.sample(lane(points, i), numbers(i))))
             }
             Emitter::Sphere(sphere) => {
-                for i in 0..LANES {
-                    let sample = sphere.sample(lane(points, i), [u[0][i], u[1][i]]);
-                    set_lane(&mut row.directions, i, sample.direction);
-                    set_lane(&mut row.targets, i, sample.target);
-                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
-                }
+                LightRow::of(source, |i| shining(sphere.sample(lane(points, i), numbers(i))))
             }
             Emitter::Disk(disk) => {
-                for i in 0..LANES {
-                    let sample = disk.sample(lane(points, i), [u[0][i], u[1][i]]);
-                    set_lane(&mut row.directions, i, sample.direction);
-                    set_lane(&mut row.targets, i, sample.target);
-                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
-                }
+                LightRow::of(source, |i| shining(disk.sample(lane(points, i), numbers(i))))
             }
             Emitter::Box(cuboid) => {
-                for i in 0..LANES {
-                    let sample = cuboid.sample(lane(points, i), [u[0][i], u[1][i]]);
-                    set_lane(&mut row.directions, i, sample.direction);
-                    set_lane(&mut row.targets, i, sample.target);
-                    set_lane(&mut row.weights, i, light.radiance * sample.factor);
-                }
+                LightRow::of(source, |i| shining(cuboid.sample(lane(points, i), numbers(i))))
             }
             Emitter::Triangle(_)
             | Emitter::Cylinder(_)
             | Emitter::Cone(_)
             | Emitter::Torus(_)
             | Emitter::Mesh(_) => {
-                return LightRow::one_by_one(points, used, |i, point| {
-                    light.sample(point, [u[0][i], u[1][i]])
-                });
+                LightRow::one_by_one(points, used, |i, point| light.sample(point, numbers(i)))
             }
         }
-        row
     }
 }
 

@@ -7,6 +7,8 @@ pub mod frame;
 pub mod lanes;
 pub mod limits;
 pub mod origin;
+#[cfg(test)]
+pub mod random;
 pub mod transform;
 
 pub use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3, Vec4};

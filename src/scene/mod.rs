@@ -101,4 +101,6 @@ pub fn starter() -> &'static str {
 }
 
 #[cfg(test)]
+mod set_tests;
+#[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@ use super::*;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 
-const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+pub const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
 fn outcome(text: &str) -> Outcome {
     parse(text.into(), Path::new("scene.toml"))
@@ -421,89 +421,5 @@ fn shapes_may_have_names() {
     assert_eq!(
         messages("[materials.a]\n[[quad]]\nmaterial='a'\nname=2"),
         ["`name` must be the name of this shape"]
-    );
-}
-
-/// A scene of this text and a camera, with values of the call.
-fn with_sets(text: &str, sets: &[&str]) -> Result<Scene, Vec<Diagnostic>> {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    let source = Source::with_sets(format!("{text}\n{CAMERA}").into(), &sets)?;
-    let Outcome { scene, diagnostics } = document::lower(&source, Path::new("scene.toml"));
-    scene.ok_or(diagnostics)
-}
-
-const BALLS: &str = "[render]\nsamples = 4
-[materials.wall]\ndiffuse = [0.1, 0.2, 0.3]
-[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='wall'
-[[sphere]]\ncenter=[1,0,0]\nradius=2\nmaterial='wall'\nname='ball'
-[[sphere]]\ncenter=[2,0,0]\nradius=3\nmaterial='wall'\nname='big ball'";
-
-#[test]
-fn what_the_call_sets_is_as_if_the_file_said_it() {
-    let cases: [(&[&str], &str, &str); 11] = [
-        (&["render.samples=3"], "samples = 4", "samples = 3"),
-        (&["render.width=7"], "samples = 4", "samples = 4\nwidth = 7"),
-        (&["render.samples=3", "render.samples=9"], "samples = 4", "samples = 9"),
-        (&["camera.position=[1, 2, 3]"], "[0, 1, 4]", "[1, 2, 3]"),
-        (&["materials.wall.diffuse=0.5"], "[0.1, 0.2, 0.3]", "0.5"),
-        (&["materials.wall.diffuse=tomato"], "[0.1, 0.2, 0.3]", "'tomato'"),
-        (&["materials.wall.diffuse=#ff0000"], "[0.1, 0.2, 0.3]", "'#ff0000'"),
-        (&["sphere.2.radius=.25"], "radius=2", "radius=0.25"),
-        (&["sphere.ball.radius=0.25"], "radius=2", "radius=0.25"),
-        (&["sphere.'big ball'.radius=0.25"], "radius=3", "radius=0.25"),
-        (&["photons.count=77"], "[render]", "[photons]\ncount = 77\n[render]"),
-    ];
-    for (sets, old, new) in cases {
-        let text = format!("{BALLS}\n{CAMERA}").replace(old, new);
-        let by_file = parse(text.into(), Path::new("scene.toml")).scene.expect("a scene");
-        let by_call = with_sets(BALLS, sets).expect("a scene");
-        assert_eq!((&by_call.render, &by_call.camera), (&by_file.render, &by_file.camera), "{sets:?}");
-        assert_eq!(by_call.photons, by_file.photons, "{sets:?}");
-        let shapes = |scene: &Scene| scene.objects.iter().map(|one| one.shape.clone()).collect::<Vec<_>>();
-        assert_eq!(shapes(&by_call), shapes(&by_file), "{sets:?}");
-        let kinds = |scene: &Scene| scene.materials.iter().map(|one| one.kind.clone()).collect::<Vec<_>>();
-        assert_eq!(kinds(&by_call), kinds(&by_file), "{sets:?}");
-    }
-}
-
-#[test]
-fn mistakes_in_what_the_call_sets_are_answered_like_those_of_the_file() {
-    let two = "[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='wall'\nname='ball'";
-    for (set, message, written) in [
-        ("render.samples=0", "`samples` must be a whole number between 1 and 4294967295", "0"),
-        ("render.samples=lots", "`samples` must be a whole number", "\"lots\""),
-        ("render.sampels=3", "unknown key `sampels` in [render]", "sampels"),
-        ("rendr.samples=3", "unknown table `rendr`", "rendr"),
-        ("materials.wal.diffuse=1", "the scene has no table [materials.wal]", "wal"),
-        ("materials.wal={}", "the scene has no table [materials.wal]", "wal"),
-        ("textures.a.file=b.png", "the scene has no table [textures.a]", "a"),
-        ("sphere.5.radius=1", "there is no [[sphere]] number or name `5`", "5"),
-        ("sphere.0.radius=1", "there is no [[sphere]] number or name `0`", "0"),
-        ("sphere.radius=1", "there is no [[sphere]] number or name `radius`", "radius"),
-        ("sphere.ball.radius=1", "2 [[sphere]] have the name `ball`", "ball"),
-        ("cone.1.radius=1", "the scene has no [[cone]]", "1"),
-        ("light.1.intensity=1", "the scene has no [[light]]", "1"),
-        ("camera.position.1=3", "`camera.position` is an array of values, which is set as a whole", "1"),
-        ("camera.position=3", "`position` must be three numbers, [x, y, z]", "3"),
-        ("sphere.1=3", "[[sphere]] must be a table", "3"),
-        ("samples=3", "this does not say what to set", "samples=3"),
-    ] {
-        let errors = with_sets(&format!("{BALLS}\n{two}"), &[set]).expect_err("an error");
-        let [error] = errors.as_slice() else { panic!("{set}: {errors:?}") };
-        let place = error.place.as_ref().expect("a place");
-        assert_eq!((&*error.message, &place.source[place.span.clone()]), (message, written), "{set}");
-        assert_eq!(error.path, Path::new("--set"), "{set}");
-    }
-}
-
-#[test]
-fn an_open_end_of_the_file_does_not_reach_what_the_call_sets() {
-    let source =
-        Source::with_sets("[render]\nsamples = [1,".into(), &["render.width=3".to_owned()]).expect("a text");
-    let outcome = document::lower(&source, Path::new("scene.toml"));
-    assert!(
-        outcome.diagnostics.iter().all(|one| one.path == Path::new("scene.toml")),
-        "{:?}",
-        outcome.diagnostics
     );
 }

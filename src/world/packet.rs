@@ -151,20 +151,12 @@ mod tests {
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
     use crate::lights::Source;
+    use crate::math::random::signed as random;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
     use crate::world::{MeshInstance, Object};
-
-    /// Random numbers in [−1, 1).
-    fn random(seed: u64) -> impl FnMut() -> f32 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
-        }
-    }
 
     /// Spheres, boxes and quads in a grid, four instances of a fan of triangles, one of them where it was made, a floor.
     fn geometry(accel: Accel) -> Geometry {

@@ -197,15 +197,7 @@ mod tests {
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
     use crate::geometry::rows::{RayRows, lanes};
-
-    /// Random numbers in [−1, 1).
-    fn random(seed: u64) -> impl FnMut() -> f32 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
-        }
-    }
+    use crate::math::random::signed as random;
 
     /// Notes which primitives are tested, and for which rays.
     struct Seen(Vec<u32>);

@@ -142,6 +142,7 @@ mod tests {
     use super::*;
     use crate::control::CancelToken;
     use crate::math::Vec3;
+    use crate::math::random::signed;
 
     /// Boxes as shapes: the hit is where the ray enters.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
@@ -153,11 +154,7 @@ mod tests {
 
     #[test]
     fn the_same_hits_as_testing_every_box() {
-        let mut state = 1_u64;
-        let mut next = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32) / (1_u64 << 24) as f32 * 2.0 - 1.0
-        };
+        let mut next = signed(1);
         // A coarse grid of positions makes coplanar faces and exact ties.
         let boxes: Vec<_> = (0..500)
             .map(|_| {

@@ -255,8 +255,9 @@ fn for_each_group(rays: &[Ray], ends: &Ends, mut take: impl FnMut(&Ends, usize))
 mod tests {
     use super::*;
     use crate::accel::ends;
-    use crate::accel::pathological::{bits, brute, meshes, random, rays};
+    use crate::accel::pathological::{bits, brute, meshes, rays};
     use crate::geometry::watertight::ShearedRay;
+    use crate::math::random::signed as random;
 
     fn built(mesh: &[[Vec3; 3]]) -> WideBvh {
         built_with(Quality::Medium, mesh)

@@ -2,15 +2,7 @@
 
 use super::*;
 use crate::materials::phong::PhongBsdf;
-
-/// Numbers in [0, 1).
-fn random(seed: u64) -> impl FnMut() -> f32 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1_u64 << 24) as f32
-    }
-}
+use crate::math::random::unit as random;
 
 fn bsdf(diffuse: f32, specular: f32, shininess: f32) -> PhongBsdf {
     let [diffuse, specular] = [diffuse, specular].map(Vec3::splat);

@@ -71,7 +71,7 @@ impl Scratch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::pathological::random;
+    use crate::math::random::signed as random;
 
     #[test]
     fn each_side_has_what_reaches_into_it_in_order() {

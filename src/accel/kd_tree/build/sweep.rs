@@ -82,8 +82,8 @@ fn offer<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::pathological::random;
     use crate::math::Vec3;
+    use crate::math::random::signed as random;
 
     /// The cost of a plane by the definition; more than any where it does not go through the cell.
     fn cost(references: &[Reference], cell: &Bounds, plane: &Plane) -> f32 {

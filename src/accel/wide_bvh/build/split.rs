@@ -319,8 +319,8 @@ fn partition_by_plane<const AXIS: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::pathological::random;
     use crate::math::Vec3;
+    use crate::math::random::signed as random;
 
     fn references(count: u32) -> Vec<Reference> {
         let mut next = random(5);

@@ -84,8 +84,8 @@ fn greatest<V: Lanes>(corners: &Corners<V>, axis: usize) -> V {
 #[allow(unsafe_code)]
 mod tests {
     use super::*;
-    use crate::accel::pathological::random;
     use crate::accel::wide_bvh::simd::lanes::F4;
+    use crate::math::random::signed as random;
 
     /// Triangles as thin, and as near to the start, as the filter is told to let pass, and a little more.
     #[test]

@@ -78,7 +78,9 @@ impl<const BIG_ENDIAN: bool> Numbers for Binary<'_, BIG_ENDIAN> {
         match scalar {
             Scalar::F32 => Ok(f64::from(f32::from_le_bytes(self.take()?))),
             Scalar::F64 => Ok(f64::from_le_bytes(self.take()?)),
-            _ => Ok(self.integer(scalar)? as f64),
+            Scalar::I8 | Scalar::U8 | Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
+                Ok(self.integer(scalar)? as f64)
+            }
         }
     }
 

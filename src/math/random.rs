@@ -1,0 +1,16 @@
+//! Numbers as good as random, for tests.
+
+/// A linear congruential generator (Knuth's MMIX), by its upper 24 bits: numbers in [0, 1).
+pub fn unit(seed: u64) -> impl FnMut() -> f32 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1_u64 << 24) as f32
+    }
+}
+
+/// The same in [−1, 1).
+pub fn signed(seed: u64) -> impl FnMut() -> f32 {
+    let mut unit = unit(seed);
+    move || unit() * 2.0 - 1.0
+}
