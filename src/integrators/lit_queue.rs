@@ -1,6 +1,7 @@
 //! The rows of vertices that wait to be lit, and what arrives by them.
 
-use super::light::{LightRays, Lighting, Others};
+use super::beside::{LobeRays, Others};
+use super::light::{LightRays, Lighting};
 use super::lit_row::{ALL, LitRow};
 use super::medium::Medium;
 use super::onward::{Onward, Scattering};
@@ -134,15 +135,29 @@ impl LitQueue {
                 shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
             }
             let row = &*row;
-            let others =
-                if onward.is_some() { Others::Paths } else { Others::Lobes(row.sharp(shot, measure)) };
             let media = row.is_inside().then_some(&*self.media);
-            let work = Lighting { shot, row, used: row.used, measure, others, media };
-            let arrived = shot.world.geometry.instructions().run(work);
+            let others = match onward {
+                Some(_) => Others::Paths,
+                None => Others::lobes(row.sharp(shot, measure)),
+            };
+            let instructions = shot.world.geometry.instructions();
+            let used = row.used;
+            let mut arrived = match others {
+                Others::Nothing => {
+                    instructions.run(Lighting::<false> { shot, row, used, measure, others, media })
+                }
+                Others::Paths | Others::Lobes(_) => {
+                    instructions.run(Lighting::<true> { shot, row, used, measure, others, media })
+                }
+            };
+            if let Others::Lobes(sharp) = others {
+                arrived = instructions.run(LobeRays { shot, row, sharp, media, arrived });
+            }
             rays.shadow += arrived.rays.shadow;
             rays.scattered += arrived.rays.scattered;
             for i in lanes(row.used) {
-                self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
+                let light = lane(&arrived.light, i) * lane(&row.throughput, i);
+                self.arrived[row.place[i] as usize] = light;
             }
             if let Some(onward) = onward.filter(|onward| onward.leads_on) {
                 Scattering { shot, row, onward }.scatter(&self.media, next);

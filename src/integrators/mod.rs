@@ -3,9 +3,10 @@
 //!
 //! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues`, their way to hits
 //! (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what touches it (`crossing`), the ways on at mirrors
-//! and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the `light` there, and the `sink` that takes what the view shows. `wave` follows the rays round by round, for both
+//! and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the `light` there, the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows the rays round by round, for both
 //! methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are of first hits.
 
+mod beside;
 mod camera;
 mod counters;
 mod crossing;

@@ -1,7 +1,7 @@
 //! Where paths go on from diffuse and glossy surfaces, sixteen at a time; which of them end by roulette; and what a path counts
 //! that meets a lamp which light samples find too.
 
-use super::light::weight;
+use super::beside::weight;
 use super::lit_row::{LitRow, Response};
 use super::medium::Medium;
 use super::queues::{History, PathRay};

@@ -1,0 +1,177 @@
+//! Rays that find the light of lamps beside samples of the lamps, and what is left of those samples then (multiple importance
+//! sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
+
+use super::light::Arrived;
+use super::lit_row::{LitRow, Response};
+use super::medium::{Medium, absorption};
+use super::shot::Shot;
+use crate::geometry::rows::{RayRows, lanes};
+use crate::lights::{Light, LightRow};
+use crate::materials::Lobes;
+use crate::materials::lobes::gloss;
+use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes3, lane, set_lane};
+use crate::sampling::Decision;
+use crate::world::{Hit, Loops};
+
+/// What finds light beside samples of the lamps.
+#[derive(Clone, Copy)]
+pub(super) enum Others {
+    /// Nothing.
+    Nothing,
+    /// The rays of paths that go on from the vertices.
+    Paths,
+    /// Rays in the glossy lobes of the vertices whose bits are set.
+    Lobes(u32),
+}
+
+impl Others {
+    /// Rays in the glossy lobes of the vertices whose bits are set, if there are any.
+    pub(super) fn lobes(sharp: u32) -> Self {
+        if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
+    }
+
+    /// What they leave of `values`, what each of `count` samples of a light brings to the vertices of a row.
+    #[inline(always)]
+    pub(super) fn left(
+        self,
+        row: &LitRow,
+        light: &Light,
+        samples: &LightRow,
+        mut values: Lanes3,
+        count: u32,
+    ) -> Lanes3 {
+        // So many of their rays come on each sample.
+        let others = match self {
+            Self::Nothing => return values,
+            Self::Paths => 1.0 / count as f32,
+            Self::Lobes(_) => 1.0,
+        };
+        let of_light = light.inverse_densities(samples);
+        let mut glosses = [0.0; LANES];
+        if row.is_glossy {
+            for i in 0..LANES {
+                let mirrored = lane(&row.mirrored_eye, i);
+                glosses[i] = gloss(mirrored, lane(&samples.directions, i), row.shininess[i]);
+            }
+        }
+        for i in 0..LANES {
+            let density = self.lobes_of(row, i).density(lane(&samples.directions, i), glosses[i]);
+            let weight = weight(density * of_light[i] * others);
+            let weight = if self.start_from(i) { weight } else { 1.0 };
+            let left = match self {
+                Self::Nothing | Self::Paths => Vec3::splat(weight),
+                Self::Lobes(_) => left_of_gloss(row, i, glosses[i], weight),
+            };
+            let value = lane(&values, i) * left;
+            set_lane(&mut values, i, value);
+        }
+        values
+    }
+
+    /// The lobes in which rays are sent out from a vertex.
+    #[inline(always)]
+    fn lobes_of(self, row: &LitRow, i: usize) -> Lobes {
+        match self {
+            Self::Nothing | Self::Paths => row.lobes(i),
+            Self::Lobes(_) => glossy_lobe(row, i),
+        }
+    }
+
+    /// Whether rays are sent out from a vertex.
+    #[inline(always)]
+    fn start_from(self, i: usize) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::Paths => true,
+            Self::Lobes(sharp) => sharp & 1 << i != 0,
+        }
+    }
+}
+
+/// The glossy lobe of a vertex alone.
+#[inline(always)]
+fn glossy_lobe(row: &LitRow, i: usize) -> Lobes {
+    Lobes { diffuse: 0.0, specular: 1.0, ..row.lobes(i) }
+}
+
+/// What is left of the light that a vertex reflects where the glossy part of it counts so much: rays in a lobe bring no other,
+/// so that the parts of a picture add up to it.
+#[inline(always)]
+fn left_of_gloss(row: &LitRow, i: usize, gloss: f32, weight: f32) -> Vec3 {
+    let (diffuse, glossy) = (lane(&row.diffuse, i), lane(&row.specular, i) * gloss);
+    let part = |diffuse: f32, glossy: f32| {
+        let all = diffuse + glossy;
+        if all > 0.0 { (diffuse + glossy * weight) / all } else { 0.0 }
+    };
+    Vec3::new(part(diffuse.x, glossy.x), part(diffuse.y, glossy.y), part(diffuse.z, glossy.z))
+}
+
+/// Rays in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp: a narrow lobe finds in a wide lamp
+/// what samples of the lamp hardly ever meet.
+pub(super) struct LobeRays<'a> {
+    pub(super) shot: &'a Shot<'a>,
+    pub(super) row: &'a LitRow,
+    pub(super) sharp: u32,
+    /// Those that the vertices are in; none where all are in air.
+    pub(super) media: Option<&'a [Medium]>,
+    /// What they are added to.
+    pub(super) arrived: Arrived,
+}
+
+impl Loops for LobeRays<'_> {
+    type Done = Arrived;
+
+    #[inline(always)]
+    fn run(self) -> Arrived {
+        let Self { shot, row, sharp, media, mut arrived } = self;
+        let count = shot.settings.render.shadow_samples;
+        let sampler = row.sampler(shot);
+        let transmittance = |i: usize, distance: f32| {
+            media.map_or(Vec3::ONE, |media| absorption(shot.world, media[row.medium[i] as usize], distance))
+        };
+        for repetition in 0..count {
+            let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
+            let mut directions = [[0.0; LANES]; 3];
+            for i in 0..LANES {
+                set_lane(&mut directions, i, glossy_lobe(row, i).sample(1.0, [u[0][i], u[1][i]]));
+            }
+            let Response { cosines, glosses, .. } = row.response(&directions);
+            let mut sent = sharp & !row.hidden(&directions);
+            let mut ends = [-1.0; LANES];
+            for i in 0..LANES {
+                let bit = 1 << i;
+                sent &= if cosines[i] > 0.0 { !0 } else { !bit };
+                ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
+            }
+            let rays = RayRows::of(row.from, directions);
+            let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends);
+            arrived.rays.scattered += u64::from(sent.count_ones());
+            for i in lanes(sent) {
+                let density = glossy_lobe(row, i).density(lane(&directions, i), glosses[i]);
+                let radiance = match hits.get(i) {
+                    Some(shape) => {
+                        let hit = Hit { shape, object: objects[i] };
+                        let radiance = shot.lamp_radiance(&rays.ray(i), &hit, density);
+                        radiance * transmittance(i, hit.shape.t)
+                    }
+                    None => {
+                        let radiance = shot.radiance_beyond(lane(&directions, i), density);
+                        radiance * transmittance(i, f32::MAX)
+                    }
+                };
+                let f = lane(&row.specular, i) * glosses[i];
+                let value = f * radiance * (cosines[i] / (density * count as f32));
+                let sum = lane(&arrived.light, i) + value;
+                set_lane(&mut arrived.light, i, sum);
+            }
+        }
+        arrived
+    }
+}
+
+/// What a sample counts where another way to find the same light has a density so many times as high (the power heuristic).
+#[inline(always)]
+pub fn weight(ratio: f32) -> f32 {
+    1.0 / (1.0 + ratio * ratio)
+}
