@@ -56,6 +56,32 @@ fn numbers(source: Source) -> (u32, u32) {
     }
 }
 
+/// The row of directions, targets and weights that are told of each place; all lanes at once. A function that is given a closure
+/// would not always be compiled as part of its caller, for the caller's instructions.
+macro_rules! row_of {
+    ($source:expr, $i:ident => $sample:expr) => {{
+        let mut row = LightRow::dark($source);
+        for $i in 0..LANES {
+            let (direction, target, weight) = $sample;
+            set_lane(&mut row.directions, $i, direction);
+            set_lane(&mut row.targets, $i, target);
+            set_lane(&mut row.weights, $i, weight);
+        }
+        row
+    }};
+}
+
+/// The same of directions and weights of light from beyond everything.
+macro_rules! row_beyond {
+    ($i:ident => $sample:expr) => {{
+        let row = row_of!(Source::Nothing, $i => {
+            let (direction, weight) = $sample;
+            (direction, Vec3::ZERO, weight)
+        });
+        LightRow { beyond: u32::MAX, ..row }
+    }};
+}
+
 impl LightRow {
     #[inline(always)]
     fn dark(source: Source) -> Self {
@@ -66,29 +92,6 @@ impl LightRow {
             sources: SourceRow::of(source),
             beyond: 0,
         }
-    }
-
-    /// Of directions, targets and weights; all lanes at once.
-    #[inline(always)]
-    fn of(source: Source, sample: impl Fn(usize) -> (Vec3, Vec3, Vec3)) -> Self {
-        let mut row = Self::dark(source);
-        for i in 0..LANES {
-            let (direction, target, weight) = sample(i);
-            set_lane(&mut row.directions, i, direction);
-            set_lane(&mut row.targets, i, target);
-            set_lane(&mut row.weights, i, weight);
-        }
-        row
-    }
-
-    /// Of directions and weights of light from beyond everything.
-    #[inline(always)]
-    fn beyond(sample: impl Fn(usize) -> (Vec3, Vec3)) -> Self {
-        let row = Self::of(Source::Nothing, |i| {
-            let (direction, weight) = sample(i);
-            (direction, Vec3::ZERO, weight)
-        });
-        Self { beyond: u32::MAX, ..row }
     }
 
     fn put(&mut self, i: usize, sample: &LightSample) {
@@ -117,49 +120,47 @@ impl Light {
     /// [`Light::sample`] for the points whose bits are set, each by numbers of its own.
     #[inline(always)]
     pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
-        let numbers = |i: usize| [u[0][i], u[1][i]];
         let light = match self {
             Self::Point(light) => {
                 let target = light.position.as_vec3();
-                return LightRow::of(Source::Nothing, |i| {
+                return row_of!(Source::Nothing, i => {
                     let (direction, weight) = light.arriving(lane(points, i));
                     (direction, target, weight)
                 });
             }
             Self::Spot(light) => {
                 let target = light.point.position.as_vec3();
-                return LightRow::of(Source::Nothing, |i| {
+                return row_of!(Source::Nothing, i => {
                     let (direction, weight) = light.arriving(lane(points, i));
                     (direction, target, weight)
                 });
             }
-            Self::Directional(light) => return LightRow::beyond(|i| light.arriving(numbers(i))),
+            Self::Directional(light) => return row_beyond!(i => light.arriving([u[0][i], u[1][i]])),
             Self::Environment(light) => {
-                return LightRow::beyond(|i| light.arriving_at(lane(normals, i), numbers(i)));
+                return row_beyond!(i => light.arriving_at(lane(normals, i), [u[0][i], u[1][i]]));
             }
             Self::Area(light) => light,
         };
-        let shining = |sample: Arrival| (sample.direction, sample.target, light.radiance * sample.factor);
         let source = Source::Object(light.object);
+        macro_rules! row_by {
+            ($emitter:expr) => {
+                row_of!(source, i => {
+                    let sample: Arrival = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    (sample.direction, sample.target, light.radiance * sample.factor)
+                })
+            };
+        }
         match &light.shape {
-            Emitter::Quad(quad) => {
-                LightRow::of(source, |i| shining(quad.sample(lane(points, i), numbers(i))))
-            }
-            Emitter::Sphere(sphere) => {
-                LightRow::of(source, |i| shining(sphere.sample(lane(points, i), numbers(i))))
-            }
-            Emitter::Disk(disk) => {
-                LightRow::of(source, |i| shining(disk.sample(lane(points, i), numbers(i))))
-            }
-            Emitter::Box(cuboid) => {
-                LightRow::of(source, |i| shining(cuboid.sample(lane(points, i), numbers(i))))
-            }
+            Emitter::Quad(quad) => row_by!(quad),
+            Emitter::Sphere(sphere) => row_by!(sphere),
+            Emitter::Disk(disk) => row_by!(disk),
+            Emitter::Box(cuboid) => row_by!(cuboid),
             Emitter::Triangle(_)
             | Emitter::Cylinder(_)
             | Emitter::Cone(_)
             | Emitter::Torus(_)
             | Emitter::Mesh(_) => {
-                LightRow::one_by_one(points, used, |i, point| light.sample(point, numbers(i)))
+                LightRow::one_by_one(points, used, |i, point| light.sample(point, [u[0][i], u[1][i]]))
             }
         }
     }
