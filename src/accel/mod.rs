@@ -14,7 +14,7 @@ mod tests;
 
 pub use bvh::{AnyTest, Bvh, ClosestTest};
 pub use kd_tree::KdTree;
-pub use wide_bvh::{Instructions, Loops, WideBvh};
+pub use wide_bvh::{Instructions, Loops, WideBvh, bits};
 
 pub use crate::geometry::rows::{Ends, PACKET};
 

@@ -135,7 +135,7 @@ impl LitQueue {
                 shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
             }
             let row = &*row;
-            let media = row.is_inside().then_some(&*self.media);
+            let media = (self.media.len() > 1 && row.is_inside()).then_some(&*self.media);
             let others = match onward {
                 Some(_) => Others::Paths,
                 None => Others::lobes(row.sharp(shot, measure)),
@@ -155,9 +155,19 @@ impl LitQueue {
             }
             rays.shadow += arrived.rays.shadow;
             rays.scattered += arrived.rays.scattered;
-            for i in lanes(row.used) {
-                let light = lane(&arrived.light, i) * lane(&row.throughput, i);
-                self.arrived[row.place[i] as usize] = light;
+            arrived.light = row.carried_on(&arrived.light);
+            match row.run() {
+                Some(first) => {
+                    let own = &mut self.arrived[first as usize..][..LANES];
+                    for (i, own) in own.iter_mut().enumerate() {
+                        *own = lane(&arrived.light, i);
+                    }
+                }
+                None => {
+                    for i in lanes(row.used) {
+                        self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
+                    }
+                }
             }
             if let Some(onward) = onward.filter(|onward| onward.leads_on) {
                 Scattering { shot, row, onward }.scatter(&self.media, next);

@@ -237,6 +237,28 @@ impl LitRow {
         Response { f, cosines, glosses }
     }
 
+    /// What the paths carry of light from the vertices.
+    #[inline(always)]
+    pub(super) fn carried_on(&self, light: &Lanes3) -> Lanes3 {
+        let mut carried = *light;
+        for axis in 0..3 {
+            for i in 0..LANES {
+                carried[axis][i] = light[axis][i] * self.throughput[axis][i];
+            }
+        }
+        carried
+    }
+
+    /// The first place where there is a vertex in every lane and their places follow one another.
+    #[inline(always)]
+    pub(super) fn run(&self) -> Option<u32> {
+        let mut is_run = self.used == ALL;
+        for i in 0..LANES {
+            is_run &= self.place[i] == self.place[0].wrapping_add(i as u32);
+        }
+        is_run.then_some(self.place[0])
+    }
+
     /// Whether any vertex is in glass.
     pub(super) fn is_inside(&self) -> bool {
         lanes(self.used).any(|i| self.medium[i] != 0)

@@ -2,6 +2,7 @@
 //! gets the bits that it would get alone.
 
 use super::Vec3;
+pub use crate::accel::bits;
 
 /// Numbers at a time.
 pub const LANES: usize = 16;
@@ -29,28 +30,3 @@ pub type Truths = [u32; LANES];
 
 /// What holds, in [`Truths`].
 pub const TRUE: u32 = u32::MAX;
-
-/// A bit for each lane where something holds. Compilers take sums of single bits apart into a test of one lane after the other,
-/// three times as many instructions; the hint has them finish the vector first.
-#[inline(always)]
-pub fn bits(holds: Truths) -> u32 {
-    let holds = std::hint::black_box(holds);
-    let mut bits = 0;
-    for i in 0..LANES {
-        bits |= holds[i] & 1 << i;
-    }
-    bits
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_bit_for_each_lane() {
-        for expected in [0, 1, 0x8000, 0xffff, 0x1234, 0xa5a5] {
-            let holds = std::array::from_fn(|i| if expected >> i & 1 == 1 { TRUE } else { 0 });
-            assert_eq!(bits(holds), expected);
-        }
-    }
-}

@@ -68,18 +68,30 @@ impl ClosestTest for Nearest<'_> {
         let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
         object.closest_rows(self.rows, met, &of_these(met, ends), &mut found);
-        for (lane, end) in ends.iter_mut().enumerate() {
-            let t = found.t[lane];
-            let is_nearer = (t < *end) | ((t == *end) & (id < self.object[lane]));
-            *end = if is_nearer { t } else { *end };
-            self.hits.t[lane] = if is_nearer { t } else { self.hits.t[lane] };
-            self.object[lane] = if is_nearer { id } else { self.object[lane] };
-            let (primitive, own) = (found.primitive[lane], self.hits.primitive[lane]);
-            self.hits.primitive[lane] = if is_nearer { primitive } else { own };
-            self.hits.u[lane] = if is_nearer { found.u[lane] } else { self.hits.u[lane] };
-            self.hits.v[lane] = if is_nearer { found.v[lane] } else { self.hits.v[lane] };
+        let mut is_nearer = [false; PACKET];
+        for lane in 0..PACKET {
+            let (t, end) = (found.t[lane], ends[lane]);
+            is_nearer[lane] = (t < end) | ((t == end) & (id < self.object[lane]));
         }
+        let hits = &mut self.hits;
+        *ends = chosen(&is_nearer, &found.t, ends);
+        hits.t = chosen(&is_nearer, &found.t, &hits.t);
+        hits.primitive = chosen(&is_nearer, &found.primitive, &hits.primitive);
+        hits.u = chosen(&is_nearer, &found.u, &hits.u);
+        hits.v = chosen(&is_nearer, &found.v, &hits.v);
+        self.object = chosen(&is_nearer, &[id; PACKET], &self.object);
     }
+}
+
+/// The first where something holds, the second elsewhere. One row after the other: a loop over several at once becomes a test of
+/// one lane after the other.
+#[inline(always)]
+fn chosen<T: Copy>(holds: &[bool; PACKET], yes: &[T; PACKET], no: &[T; PACKET]) -> [T; PACKET] {
+    let mut own = *no;
+    for lane in 0..PACKET {
+        own[lane] = if holds[lane] { yes[lane] } else { no[lane] };
+    }
+    own
 }
 
 /// Looks for what is in the way of shadow rays.

@@ -150,10 +150,10 @@ fn around(row: &Row, ends: &Ends, one: usize) -> [f32; 2] {
     [least(&traced), greatest(&traced)]
 }
 
-/// By halves, which become vector instructions.
+/// The best of sixteen numbers, by halves, which become vector instructions.
 macro_rules! folded {
     ($row:expr, $better:tt) => {{
-        let mut row = *$row;
+        let mut row = $row;
         for i in 0..8 {
             row[i] = if row[i + 8] $better row[i] { row[i + 8] } else { row[i] };
         }
@@ -166,15 +166,16 @@ macro_rules! folded {
         if row[1] $better row[0] { row[1] } else { row[0] }
     }};
 }
+pub(super) use folded;
 
 #[inline(always)]
 fn least(row: &Row) -> f32 {
-    folded!(row, <)
+    folded!(*row, <)
 }
 
 #[inline(always)]
 fn greatest(row: &Row) -> f32 {
-    folded!(row, >)
+    folded!(*row, >)
 }
 
 impl Bvh {

@@ -5,7 +5,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::crown::Beam;
+use super::crown::{Beam, folded};
 use super::{Bvh, Child, DEEP_STACK};
 use crate::accel::{Ends, PACKET};
 use crate::geometry::Aabb;
@@ -42,8 +42,10 @@ impl<'a> SlabPacket<'a> {
     #[inline(always)]
     fn new(rays: &'a RayRows) -> Self {
         let mut inverse = rays.direction;
-        for x in inverse.as_flattened_mut() {
-            *x = 1.0 / *x;
+        for row in &mut inverse {
+            for lane in 0..PACKET {
+                row[lane] = 1.0 / row[lane];
+            }
         }
         Self { origin: &rays.origin, inverse }
     }
@@ -75,13 +77,12 @@ impl Stretches {
     /// no care for NaN.
     #[inline(always)]
     fn first(&self) -> f32 {
-        let mut first = f32::INFINITY.to_bits();
+        let mut entries = [0; PACKET];
         for lane in 0..PACKET {
             let (near, far) = (self.near[lane], self.far[lane]);
-            let near = if near <= far { near.to_bits() } else { f32::INFINITY.to_bits() };
-            first = if near < first { near } else { first };
+            entries[lane] = if near <= far { near.to_bits() } else { f32::INFINITY.to_bits() };
         }
-        f32::from_bits(first)
+        f32::from_bits(folded!(entries, <))
     }
 }
 
@@ -108,12 +109,11 @@ fn traced(ends: &Ends) -> u32 {
 /// The end of the ray that goes on longest; below 0 where no ray is traced. Bits are ordered as in [`Stretches::first`].
 #[inline(always)]
 fn greatest(ends: &Ends) -> f32 {
-    let mut greatest = i32::MIN;
-    for end in ends {
-        let end = end.to_bits() as i32;
-        greatest = if end > greatest { end } else { greatest };
+    let mut all = [0; PACKET];
+    for lane in 0..PACKET {
+        all[lane] = ends[lane].to_bits() as i32;
     }
-    f32::from_bits(greatest as u32)
+    f32::from_bits(folded!(all, >) as u32)
 }
 
 /// What waits to be visited by a packet: where it is entered at the earliest, the rays that may meet it, and itself.

@@ -4,6 +4,8 @@
 
 #[allow(unsafe_code)]
 pub mod binning;
+#[allow(unsafe_code)]
+mod bits;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod lanes;
@@ -29,6 +31,7 @@ mod triangle;
 
 use std::sync::LazyLock;
 
+pub use bits::bits;
 pub use loops::Loops;
 
 use super::WideBvh;
