@@ -73,18 +73,28 @@ impl Shot<'_> {
         settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
             negative |= u32::from(sample.is_negative) << lane;
         });
-        let lens = if settings.dof && camera.aperture > 0.0 {
-            lens_row(sampler.pairs(&paths, Decision::Lens, 0, 1))
-        } else {
-            [[0.0; PACKET]; 2]
-        };
-        let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
+        let mut places = [[0.0; PACKET]; 2];
         for lane in 0..PACKET {
             let corner = DVec2::new(f64::from(xs[lane]), f64::from(ys[lane])) + DVec2::splat(0.5);
             let place = corner + DVec2::new(f64::from(in_pixel[0][lane]), f64::from(in_pixel[1][lane]));
-            let ray = camera.ray(settings.from_middle(place), Vec2::new(lens[0][lane], lens[1][lane]));
-            set_lane(&mut origin, lane, ray.origin);
-            set_lane(&mut direction, lane, ray.direction);
+            let place = settings.from_middle(place);
+            (places[0][lane], places[1][lane]) = (place.x, place.y);
+        }
+        let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
+        if settings.dof && camera.aperture > 0.0 {
+            let lens = lens_row(sampler.pairs(&paths, Decision::Lens, 0, 1));
+            for lane in 0..PACKET {
+                let place = DVec2::new(places[0][lane], places[1][lane]);
+                let ray = camera.ray(place, Vec2::new(lens[0][lane], lens[1][lane]));
+                set_lane(&mut origin, lane, ray.origin);
+                set_lane(&mut direction, lane, ray.direction);
+            }
+        } else {
+            for lane in 0..PACKET {
+                let ray = camera.middle_ray(DVec2::new(places[0][lane], places[1][lane]));
+                set_lane(&mut origin, lane, ray.origin);
+                set_lane(&mut direction, lane, ray.direction);
+            }
         }
         CameraRow { rays: RayRows::of(origin, direction), negative }
     }

@@ -90,12 +90,24 @@ impl Camera {
     /// point of the unit lens disk; its direction has unit length.
     #[inline(always)]
     pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
-        let place = place * self.tan_half_fov;
-        let direction = self.forward + self.right * place.x + self.up * place.y;
+        let direction = self.direction(place);
         let lens = lens.as_dvec2() * self.aperture;
         let offset = self.right * lens.x + self.up * lens.y;
         let aimed = direction - offset / self.focus;
         Ray::new((self.position + offset).as_vec3(), aimed.normalize().as_vec3())
+    }
+
+    /// [`Camera::ray`] through the middle of the lens.
+    #[inline(always)]
+    pub fn middle_ray(&self, place: DVec2) -> Ray {
+        Ray::new(self.position.as_vec3(), self.direction(place).normalize().as_vec3())
+    }
+
+    /// From the middle of the lens to a place, as far as the view axis goes in 1.
+    #[inline(always)]
+    fn direction(&self, place: DVec2) -> DVec3 {
+        let place = place * self.tan_half_fov;
+        self.forward + self.right * place.x + self.up * place.y
     }
 
     /// Distance of a point along the view axis.

@@ -5,7 +5,7 @@ use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::lights::SourceRow;
-use crate::math::lanes::{TRUE, bits};
+use crate::math::lanes::{TRUE, Truths, bits};
 
 impl Geometry {
     /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
@@ -68,10 +68,11 @@ impl ClosestTest for Nearest<'_> {
         let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
         object.closest_rows(self.rows, met, &of_these(met, ends), &mut found);
-        let mut is_nearer = [false; PACKET];
+        let mut is_nearer = [0; PACKET];
         for lane in 0..PACKET {
             let (t, end) = (found.t[lane], ends[lane]);
-            is_nearer[lane] = (t < end) | ((t == end) & (id < self.object[lane]));
+            let nearer = (t < end) | ((t == end) & (id < self.object[lane]));
+            is_nearer[lane] = if nearer { TRUE } else { 0 };
         }
         let hits = &mut self.hits;
         *ends = chosen(&is_nearer, &found.t, ends);
@@ -86,10 +87,10 @@ impl ClosestTest for Nearest<'_> {
 /// The first where something holds, the second elsewhere. One row after the other: a loop over several at once becomes a test of
 /// one lane after the other.
 #[inline(always)]
-fn chosen<T: Copy>(holds: &[bool; PACKET], yes: &[T; PACKET], no: &[T; PACKET]) -> [T; PACKET] {
+fn chosen<T: Copy>(holds: &Truths, yes: &[T; PACKET], no: &[T; PACKET]) -> [T; PACKET] {
     let mut own = *no;
     for lane in 0..PACKET {
-        own[lane] = if holds[lane] { yes[lane] } else { no[lane] };
+        own[lane] = if holds[lane] != 0 { yes[lane] } else { no[lane] };
     }
     own
 }
