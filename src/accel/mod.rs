@@ -12,7 +12,7 @@ mod pathological;
 #[cfg(test)]
 mod tests;
 
-pub use bvh::{AnyTest, Bvh, ClosestTest};
+pub use bvh::{AnyTest, Bvh, ClosestTest, traced};
 pub use kd_tree::KdTree;
 pub use wide_bvh::{Instructions, Loops, WideBvh, bits};
 

@@ -145,7 +145,7 @@ impl Loops for LobeRays<'_> {
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
             let rays = RayRows::of(row.from, directions);
-            let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends);
+            let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends, sent);
             arrived.rays.scattered += u64::from(sent.count_ones());
             for i in lanes(sent) {
                 let density = glossy_lobe(row, i).density(lane(&directions, i), glosses[i]);

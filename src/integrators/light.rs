@@ -147,8 +147,9 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             waiting.active |= active;
             add_where(active, values, &mut waiting.light);
         } else {
-            let (rays, ends) = self.shadow_rays(samples, active & !self.row.hidden(&samples.directions));
-            self.add_seen(&rays, &ends, &samples.sources, values, sums);
+            let traced = active & !self.row.hidden(&samples.directions);
+            let (rays, ends) = self.shadow_rays(samples, traced);
+            self.add_seen(&rays, &ends, traced, &samples.sources, values, sums);
         }
     }
 
@@ -174,18 +175,21 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
         let rays = RayRows::of(self.row.from, direction);
-        self.add_seen(&rays, &ends, &SourceRow::of(source), &waiting.light, sums);
+        self.add_seen(&rays, &ends, traced, &SourceRow::of(source), &waiting.light, sums);
     }
 
-    /// Add what arrives on rays; those that are not traced end below 0.
+    /// Add what arrives on the rays of `traced`; the others end below 0.
     #[inline(always)]
-    fn add_seen(&self, rays: &RayRows, ends: &Ends, sources: &SourceRow, values: &Lanes3, sums: &mut Sums) {
-        let mut traced = [0; LANES];
-        for i in 0..LANES {
-            traced[i] = if ends[i] >= 0.0 { TRUE } else { 0 };
-        }
-        let traced = bits(traced);
-        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
+    fn add_seen(
+        &self,
+        rays: &RayRows,
+        ends: &Ends,
+        traced: u32,
+        sources: &SourceRow,
+        values: &Lanes3,
+        sums: &mut Sums,
+    ) {
+        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, traced, sources);
         sums.rays.shadow += u64::from(traced.count_ones());
         add_where(traced & !occluded, values, &mut sums.light);
     }

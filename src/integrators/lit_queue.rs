@@ -10,6 +10,7 @@ use super::shot::Shot;
 use super::sink::Sink;
 use super::vertices::LitVertex;
 use super::view::Measure;
+use crate::accel::traced;
 use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::lights::{Source, SourceRow};
@@ -201,7 +202,7 @@ impl Loops for Lifting<'_> {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
         let rays = RayRows::of(row.from, direction);
-        let blocked = geometry.occluded_rows(&rays, &ends, &SourceRow::of(Source::Nothing));
+        let blocked = geometry.occluded_rows(&rays, &ends, traced(&ends), &SourceRow::of(Source::Nothing));
         let lifted = row.may_lift & !blocked;
         row.is_bounded &= !lifted;
         for axis in 0..3 {

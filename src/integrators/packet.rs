@@ -86,11 +86,12 @@ impl Loops for Meeting<'_> {
         let Self { shot, rays, first, measure, row } = self;
         let world = shot.world;
         row.reset();
-        let of_paths;
+        let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
         let rows = match rays {
             Rays::Camera(row, _, count) => {
                 ends[..count].fill(f32::INFINITY);
+                traced = ((1_u64 << count) - 1) as u32;
                 &row.rays
             }
             Rays::Paths(paths) => {
@@ -100,11 +101,12 @@ impl Loops for Meeting<'_> {
                     set_lane(&mut direction, lane, path.ray.direction);
                     ends[lane] = path.ray.t_max;
                 }
+                traced = crate::accel::traced(&ends);
                 of_paths = RayRows::of(origin, direction);
                 &of_paths
             }
         };
-        let (hits, object) = world.geometry.closest_rows(rows, &mut ends);
+        let (hits, object) = world.geometry.closest_rows(rows, &mut ends, traced);
         let mut surface = SurfaceRow::EMPTY;
         let any = hits.any();
         let (mut left, mut plain, mut shining) = (any, 0, 0);

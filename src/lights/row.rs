@@ -27,6 +27,8 @@ pub struct SourceRow {
     pub object: [u32; LANES],
     /// The primitive; [`SourceRow::NONE`] for all of the object.
     pub part: [u32; LANES],
+    /// Whether there is any object.
+    pub is_any: bool,
 }
 
 impl SourceRow {
@@ -37,13 +39,14 @@ impl SourceRow {
     #[inline(always)]
     pub fn of(source: Source) -> Self {
         let (object, part) = numbers(source);
-        Self { object: [object; LANES], part: [part; LANES] }
+        Self { object: [object; LANES], part: [part; LANES], is_any: object != Self::NONE }
     }
 
     /// Of one of them.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, source: Source) {
         (self.object[lane], self.part[lane]) = numbers(source);
+        self.is_any |= self.object[lane] != Self::NONE;
     }
 }
 

@@ -1,7 +1,7 @@
 //! Up to sixteen rays at once through a scene: what they hit is what each hits alone.
 
 use super::{Geometry, Hit};
-use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
+use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET, traced};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::lights::SourceRow;
@@ -14,20 +14,21 @@ impl Geometry {
         self.instructions().run(Closest { geometry: self, rays, hits });
     }
 
-    /// [`Geometry::closest_packet`] inside of such loops: hits, and of which objects they are.
+    /// [`Geometry::closest_packet`] inside of such loops: hits, and of which objects they are. `traced` are the bits of the rays that
+    /// have an end.
     #[inline(always)]
-    pub fn closest_rows(&self, rows: &RayRows, ends: &mut Ends) -> (HitRows, [u32; PACKET]) {
+    pub fn closest_rows(&self, rows: &RayRows, ends: &mut Ends, traced: u32) -> (HitRows, [u32; PACKET]) {
         let mut nearest = Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET] };
-        self.tree().closest_packet(rows, ends, self.unbounded(), &mut nearest);
+        self.tree().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest);
         (nearest.hits, nearest.object)
     }
 
-    /// [`Geometry::occluded`] of the segments of a packet, each with the light that it goes to: a bit for each that is. To be
-    /// called inside of loops for each instruction set.
+    /// [`Geometry::occluded`] of the segments of a packet, each with the light that it goes to: a bit for each that is. `traced` are
+    /// the bits of those that have an end. To be called inside of loops for each instruction set.
     #[inline(always)]
-    pub fn occluded_rows(&self, rows: &RayRows, ends: &Ends, sources: &SourceRow) -> u32 {
+    pub fn occluded_rows(&self, rows: &RayRows, ends: &Ends, traced: u32, sources: &SourceRow) -> u32 {
         let mut blockers = Blockers { geometry: self, rows, sources, in_part: in_part(sources) };
-        self.tree().any_packet(rows, ends, self.unbounded(), &mut blockers)
+        self.tree().any_packet(rows, ends, traced, self.unbounded(), &mut blockers)
     }
 }
 
@@ -44,7 +45,8 @@ impl Loops for Closest<'_> {
     #[inline(always)]
     fn run(self) {
         let (rows, mut ends) = RayRows::new(self.rays);
-        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends);
+        let traced = traced(&ends);
+        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced);
         for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET) {
             *hit = hits.get(lane).map(|shape| Hit { shape, object: object[lane] });
         }
@@ -122,6 +124,9 @@ impl AnyTest for Blockers<'_> {
 /// A bit for each ray whose light is a part of an object.
 #[inline(always)]
 fn in_part(sources: &SourceRow) -> u32 {
+    if !sources.is_any {
+        return 0;
+    }
     let mut in_part = [0; PACKET];
     for lane in 0..PACKET {
         in_part[lane] = if sources.part[lane] == SourceRow::NONE { 0 } else { TRUE };
@@ -132,6 +137,9 @@ fn in_part(sources: &SourceRow) -> u32 {
 /// A bit for each ray whose light is an object or a part of it.
 #[inline(always)]
 fn own_bits(sources: &SourceRow, id: u32) -> u32 {
+    if !sources.is_any {
+        return 0;
+    }
     let mut own = [0; PACKET];
     for lane in 0..PACKET {
         own[lane] = if sources.object[lane] == id { TRUE } else { 0 };
@@ -227,7 +235,7 @@ mod tests {
         #[inline(always)]
         fn run(self) -> u32 {
             let (rows, ends) = RayRows::new(self.rays);
-            self.geometry.occluded_rows(&rows, &ends, self.sources)
+            self.geometry.occluded_rows(&rows, &ends, traced(&ends), self.sources)
         }
     }
 

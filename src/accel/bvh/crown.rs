@@ -192,6 +192,7 @@ impl Bvh {
 
 #[cfg(test)]
 mod tests {
+    use super::super::packet::traced;
     use super::*;
     use crate::accel::{AnyTest, ClosestTest};
     use crate::control::CancelToken;
@@ -250,8 +251,9 @@ mod tests {
                     ends[lane] = -1.0;
                 }
                 let (mut closest, mut any) = (Seen(vec![0; count]), Seen(vec![0; count]));
-                tree.closest_packet(&rows, &mut ends, &[], &mut closest);
-                tree.any_packet(&rows, &ends, &[], &mut any);
+                let traced = traced(&ends);
+                tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest);
+                tree.any_packet(&rows, &ends, traced, &[], &mut any);
                 for (id, bounds) in boxes.iter().enumerate() {
                     for lane in lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);

@@ -96,9 +96,9 @@ fn met(stretches: &Stretches) -> u32 {
     bits(met)
 }
 
-/// A bit for each ray that is traced.
+/// A bit for each ray that has an end.
 #[inline(always)]
-fn traced(ends: &Ends) -> u32 {
+pub fn traced(ends: &Ends) -> u32 {
     let mut traced = [0; PACKET];
     for lane in 0..PACKET {
         traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };
@@ -162,23 +162,26 @@ impl Bvh {
     }
 
     /// Visit the leaves that any of at most [`PACKET`] rays may meet, near ones first; before them primitives that are not in
-    /// the tree.
+    /// the tree. `traced` are the bits of the rays that have an end.
     #[inline(always)]
     pub fn closest_packet(
         &self,
         rays: &RayRows,
         ends: &mut Ends,
+        traced: u32,
         outside: &[u32],
         closest: &mut impl ClosestTest,
     ) {
         let slabs = SlabPacket::new(rays);
-        let traced = traced(ends);
         let (mut leaf, mut in_leaf) = (outside, traced);
         let mut near = Near::sorted(self.crown_met(&slabs, ends, traced));
         let mut stack = Waiting::new();
         loop {
             for &id in leaf {
                 closest.test(id, in_leaf, ends);
+            }
+            if stack.is_empty() && near.count == 0 {
+                return;
             }
             let end = greatest(ends) * SLAB_PAD;
             loop {
@@ -219,11 +222,18 @@ impl Bvh {
         }
     }
 
-    /// A bit for each of at most [`PACKET`] rays that hits anything in the tree, or of what is not in it.
+    /// A bit for each of at most [`PACKET`] rays that hits anything in the tree, or of what is not in it. `traced` are the bits of the
+    /// rays that have an end.
     #[inline(always)]
-    pub fn any_packet(&self, rays: &RayRows, ends: &Ends, outside: &[u32], any: &mut impl AnyTest) -> u32 {
+    pub fn any_packet(
+        &self,
+        rays: &RayRows,
+        ends: &Ends,
+        traced: u32,
+        outside: &[u32],
+        any: &mut impl AnyTest,
+    ) -> u32 {
         let slabs = SlabPacket::new(rays);
-        let traced = traced(ends);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
         let (mut subtrees, _) = self.crown_met(&slabs, ends, traced);
