@@ -85,7 +85,7 @@ impl Sampled {
 }
 
 /// Rays of a vertex towards the lights that it picked, for each sample that is asked for.
-const TRACED: usize = 16;
+const TRACED: usize = 8;
 
 impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
     type Done = Arrived;

@@ -150,7 +150,7 @@ fn picks_come_as_often_as_their_probabilities_say() {
             }
         }
         for way in 0..2 {
-            let (mut chi, mut cells, mut few) = (0.0, 0.0, (0.0, 0.0));
+            let (mut chi, mut cells, mut few) = (0.0_f64, 0.0_f64, (0.0, 0.0));
             let mut add = |found: f64, expected: f64| {
                 if expected > 0.0 {
                     (chi, cells) = (chi + (found - expected).powi(2) / expected, cells + 1.0);
