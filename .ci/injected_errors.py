@@ -26,6 +26,7 @@ pub fn injected(fault: &str) -> bool {
 }
 """
 GLOBAL = "closed_forms::global::"
+MANY = "closed_forms::many_lights::"
 
 # Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
 FAULTS = [
@@ -64,6 +65,17 @@ FAULTS = [
      "1.0", "materials::phong::tests::the_lobe_of_known_value"),
     ("a rectangle's density off by 1 %", "lights/rectangle.rs", "Some(spherical) => ⟦1.0 / spherical.solid_angle⟧,",
      "1.01 / spherical.solid_angle", "lights::tests::the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds"),
+    ("a picked light's probability off by a tenth", "lights/tree/mod.rs", "if total > 0.0 { ⟦((self.0[child] - before) / total) as f32⟧ }",
+     "1.1 * ((self.0[child] - before) / total) as f32", "lights::tree::tests::picks_have_their_probabilities_which_sum_to_one"),
+    ("lights below the horizon are picked", "lights/tree/node.rs", "let towards = ⟦normal.dot(offset) * inverse + sin⟧;",
+     "1.0", "lights::tree::tests::lights_that_send_nothing_are_not_picked"),
+    ("bounds of lights taken for points", "lights/tree/node.rs", "else { beyond }) + ⟦sin⟧;",
+     "0.0", "lights::tree::tests::what_can_arrive_can_be_picked"),
+    ("paths weighed as if all lights were sampled", "integrators/onward.rs",
+     "light.pdf(ray.origin, normal, &met) * ⟦lights.samples_at(ray.origin, normal).of(number)⟧", "1.0",
+     MANY + "a_lamp_that_is_cut_into_a_thousand_lights_as_before"),
+    ("chosen rays count for themselves alone", "integrators/picking.rs", "let times = ⟦(place - first) as f32 * step / one.importance[i]⟧;",
+     "2.0", MANY + "picks_among_lights_of_every_kind_bring_what_all_of_them_do"),
 ]
 
 
@@ -98,7 +110,7 @@ def executables(profile):
 
 
 def passes(programs, test, fault=""):
-    program = programs["test" if test.startswith(GLOBAL) else "lib"]
+    program = programs["test" if test.startswith("closed_forms::") else "lib"]
     env = {**os.environ, "GLIMT_FAULT": fault}
     run = subprocess.run([program, "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
     if "1 passed" not in run.stdout and "1 failed" not in run.stdout:

@@ -6,11 +6,11 @@ use super::lit_row::{LitRow, Response};
 use super::medium::{Medium, absorption};
 use super::shot::Shot;
 use crate::geometry::rows::{RayRows, lanes};
-use crate::lights::{Light, LightRow};
+use crate::lights::LightRow;
 use crate::materials::Lobes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes3, lane, set_lane};
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::{Hit, Loops};
 
@@ -31,23 +31,29 @@ impl Others {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
 
-    /// What they leave of `values`, what each of `count` samples of a light brings to the vertices of a row.
+    /// How many of their rays come on each of so many samples of a light.
+    #[inline(always)]
+    pub(super) fn to_each(self, count: u32) -> f32 {
+        match self {
+            Self::Nothing => 0.0,
+            Self::Paths => 1.0 / count as f32,
+            Self::Lobes(_) => 1.0,
+        }
+    }
+
+    /// What they leave of `values`, what samples of lights bring to the vertices of a row, by one over the densities of these;
+    /// `others` of their rays come on each.
     #[inline(always)]
     pub(super) fn left(
         self,
         row: &LitRow,
-        light: &Light,
         samples: &LightRow,
         mut values: Lanes3,
-        count: u32,
+        (of_light, others): (&Lanes, f32),
     ) -> Lanes3 {
-        // So many of their rays come on each sample.
-        let others = match self {
-            Self::Nothing => return values,
-            Self::Paths => 1.0 / count as f32,
-            Self::Lobes(_) => 1.0,
-        };
-        let of_light = light.inverse_densities(samples);
+        if let Self::Nothing = self {
+            return values;
+        }
         let mut glosses = [0.0; LANES];
         if row.is_glossy {
             for i in 0..LANES {
@@ -152,11 +158,11 @@ impl Loops for LobeRays<'_> {
                 let radiance = match hits.get(i) {
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };
-                        let radiance = shot.lamp_radiance(&rays.ray(i), &hit, density);
+                        let radiance = shot.lamp_radiance(&rays.ray(i), lane(&row.normal, i), &hit, density);
                         radiance * transmittance(i, hit.shape.t)
                     }
                     None => {
-                        let radiance = shot.radiance_beyond(lane(&directions, i), density);
+                        let radiance = shot.radiance_beyond(&rays.ray(i), lane(&row.normal, i), density);
                         radiance * transmittance(i, f32::MAX)
                     }
                 };

@@ -45,12 +45,29 @@ pub(super) struct Arrived {
 }
 
 /// Sums over the lights.
-struct Sums {
+pub(super) struct Sums {
     /// Of what arrives.
-    light: Lanes3,
+    pub(super) light: Lanes3,
     /// Of what could.
-    total: Lanes,
-    rays: LightRays,
+    pub(super) total: Lanes,
+    pub(super) rays: LightRays,
+}
+
+impl Sums {
+    pub(super) const NOTHING: Self =
+        Self { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: LightRays { shadow: 0, scattered: 0 } };
+
+    /// What they come to.
+    #[inline(always)]
+    pub(super) fn arrived(mut self, measure: Measure) -> Arrived {
+        if measure == Measure::ArrivingShare {
+            for i in 0..LANES {
+                let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
+                set_lane(&mut self.light, i, Vec3::splat(share));
+            }
+        }
+        Arrived { light: self.light, rays: self.rays }
+    }
 }
 
 /// What a light could send, before one ray tells whether it does.
@@ -66,7 +83,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
     fn run(self) -> Arrived {
         let render = &self.shot.settings.render;
         let mut sampler = None;
-        let mut sums = Sums { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: LightRays::default() };
+        let mut sums = Sums::NOTHING;
         for (number, light) in self.shot.world.lights.iter() {
             // Where one ray decides for all of a light, what it could send waits for that.
             let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
@@ -91,7 +108,9 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32);
                     if WEIGHED {
-                        values = self.others.left(self.row, light, &samples, values, count);
+                        let of_light = light.inverse_densities(&samples);
+                        let others = self.others.to_each(count);
+                        values = self.others.left(self.row, &samples, values, (&of_light, others));
                     }
                     self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting));
                 }
@@ -100,13 +119,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                 self.add_waiting(light.middle(), &waiting, &mut sums);
             }
         }
-        if self.measure == Measure::ArrivingShare {
-            for i in 0..LANES {
-                let share = if sums.total[i] > 0.0 { sums.light[0][i] / sums.total[i] } else { 0.0 };
-                set_lane(&mut sums.light, i, Vec3::splat(share));
-            }
-        }
-        Arrived { light: sums.light, rays: sums.rays }
+        sums.arrived(self.measure)
     }
 }
 
@@ -180,7 +193,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
 
     /// Add what arrives on the rays of `traced`; the others end below 0.
     #[inline(always)]
-    fn add_seen(
+    pub(super) fn add_seen(
         &self,
         rays: &RayRows,
         ends: &Ends,
@@ -196,7 +209,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
 
     /// What each sample brings if nothing is in its way, and a bit for each that brings anything.
     #[inline(always)]
-    fn values(&self, samples: &LightRow, share: f32) -> (Lanes3, u32) {
+    pub(super) fn values(&self, samples: &LightRow, share: f32) -> (Lanes3, u32) {
         let Response { f, cosines, .. } = self.row.response(&samples.directions);
         let mut arriving = samples.weights;
         if self.measure == Measure::ArrivingShare {
@@ -220,7 +233,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
 
     /// The rays on which the light of the samples in `active` arrives; the others have no end.
     #[inline(always)]
-    fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
+    pub(super) fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; LANES]);
         for i in 0..LANES {
             let ray = Ray::segment(lane(&self.row.from, i), lane(&samples.targets, i));
@@ -237,7 +250,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
 
 /// Add the values of the lanes whose bits are set.
 #[inline(always)]
-fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
+pub(super) fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
     for axis in 0..3 {
         for i in 0..LANES {
             let is_added = bits & 1 << i != 0;

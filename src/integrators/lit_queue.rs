@@ -5,6 +5,7 @@ use super::light::{LightRays, Lighting};
 use super::lit_row::{ALL, LitRow};
 use super::medium::Medium;
 use super::onward::{Onward, Scattering};
+use super::picking::Picking;
 use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
@@ -143,12 +144,14 @@ impl LitQueue {
             };
             let instructions = shot.world.geometry.instructions();
             let used = row.used;
-            let mut arrived = match others {
-                Others::Nothing => {
-                    instructions.run(Lighting::<false> { shot, row, used, measure, others, media })
-                }
-                Others::Paths | Others::Lobes(_) => {
-                    instructions.run(Lighting::<true> { shot, row, used, measure, others, media })
+            let plain = Lighting::<false> { shot, row, used, measure, others, media };
+            let weighed = Lighting::<true> { shot, row, used, measure, others, media };
+            let mut arrived = match (others, shot.world.lights.tree()) {
+                (Others::Nothing, None) => instructions.run(plain),
+                (Others::Nothing, Some(tree)) => instructions.run(Picking { lighting: plain, tree }),
+                (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
+                (Others::Paths | Others::Lobes(_), Some(tree)) => {
+                    instructions.run(Picking { lighting: weighed, tree })
                 }
             };
             if let Others::Lobes(sharp) = others {

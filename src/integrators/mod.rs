@@ -16,6 +16,7 @@ mod lit_row;
 mod medium;
 mod onward;
 mod packet;
+mod picking;
 mod queues;
 mod settings;
 mod shot;

@@ -93,7 +93,12 @@ impl Scattering<'_> {
                 slot: row.slot[i],
                 path: row.path[i],
                 medium: media[row.medium[i] as usize],
-                history: History { density: ways.densities[i], carried: ways.carried[i], is_seen: false },
+                history: History {
+                    density: ways.densities[i],
+                    normal: lane(&row.normal, i),
+                    carried: ways.carried[i],
+                    is_seen: false,
+                },
             };
             path.path = path.next_path(SCATTERED);
             path
@@ -161,31 +166,49 @@ impl Shot<'_> {
         }
         let normal = self.world.geometry.surface(&path.ray, hit).normal;
         let samples = self.settings.render.shadow_samples as f32;
-        weight(self.sample_density(&path.ray, hit, normal) * samples / density)
+        weight(self.sample_density(&path.ray, path.history.normal, (hit, normal)) * samples / density)
     }
 
     /// What a path brings of the radiance that comes from beyond the scene; light samples bring the rest.
     pub fn light_beyond(&self, path: &PathRay) -> Vec3 {
         let (lights, density) = (&self.world.lights, path.history.density);
         let samples = self.settings.render.shadow_samples as f32;
-        let share = |of_light: f32| if density > 0.0 { weight(of_light * samples / density) } else { 1.0 };
-        lights.beyond_by_density(path.ray.direction, share)
+        if !(density > 0.0) {
+            return lights.beyond_by_density(path.ray.direction, |_, _| 1.0);
+        }
+        self.shared_beyond(&path.ray, path.history.normal, |of_light| weight(of_light * samples / density))
     }
 
     /// [`Shot::lamp_radiance`] of a ray that leaves the scene.
-    pub fn radiance_beyond(&self, direction: Vec3, density: f32) -> Vec3 {
-        self.world.lights.beyond_by_density(direction, |of_light| weight(of_light / density))
+    pub fn radiance_beyond(&self, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
+        self.shared_beyond(ray, normal, |of_light| weight(of_light / density))
     }
 
-    /// Density in sr⁻¹ of light samples that come from a hit; 0 where none do.
-    fn sample_density(&self, ray: &Ray, hit: &Hit, normal: Vec3) -> f32 {
-        let met = Met { direction: ray.direction, distance: hit.shape.t, normal };
-        let light = self.world.lights.of_hit(hit.object, hit.shape.primitive);
-        light.map_or(0.0, |(_, light)| light.pdf(ray.origin, &met))
+    /// What a ray sees that leaves the scene from a surface with this normal; of each light the share that is given by the
+    /// density of its samples.
+    fn shared_beyond(&self, ray: &Ray, normal: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
+        let lights = &self.world.lights;
+        if !lights.are_beyond() {
+            return Vec3::ZERO;
+        }
+        let samples = lights.samples_at(ray.origin, normal);
+        lights.beyond_by_density(ray.direction, |number, density| share(density * samples.of(number)))
     }
 
-    /// What a ray from a lobe brings of the radiance that it meets; light samples, as many as there are such rays, bring the rest.
-    pub fn lamp_radiance(&self, ray: &Ray, hit: &Hit, density: f32) -> Vec3 {
+    /// Density in sr⁻¹ of light samples that come from a hit, which has a normal, for each that a surface with a normal asks
+    /// for; 0 where none do.
+    fn sample_density(&self, ray: &Ray, normal: Vec3, (hit, of_light): (&Hit, Vec3)) -> f32 {
+        let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
+        let met = Met { direction, distance, normal: of_light, primitive };
+        let lights = &self.world.lights;
+        lights.of_hit(hit.object, primitive).map_or(0.0, |(number, light)| {
+            light.pdf(ray.origin, normal, &met) * lights.samples_at(ray.origin, normal).of(number)
+        })
+    }
+
+    /// What a ray from a lobe of a surface with a normal brings of the radiance that it meets; light samples, as many as there are
+    /// such rays, bring the rest.
+    pub fn lamp_radiance(&self, ray: &Ray, from_normal: Vec3, hit: &Hit, density: f32) -> Vec3 {
         let world = self.world;
         let emission = world.materials[world.material_index(hit)].emission;
         if emission == Vec3::ZERO {
@@ -195,7 +218,7 @@ impl Shot<'_> {
         if !(normal.dot(ray.direction) < 0.0) {
             return Vec3::ZERO;
         }
-        emission * weight(self.sample_density(ray, hit, normal) / density)
+        emission * weight(self.sample_density(ray, from_normal, (hit, normal)) / density)
     }
 
     /// The same of a lamp that touches glass which the path meets with it: whether light samples find it there is decided by

@@ -33,6 +33,8 @@ pub struct History {
     /// Density in sr⁻¹ with which the direction was drawn from the lobes of the last vertex; 0 where that is the camera, a mirror
     /// or glass, or where the path passed through glass since: no light sample finds what it meets then.
     pub density: f32,
+    /// The normal that light samples of the last vertex went by, where there is a density.
+    pub normal: Vec3,
     /// The path's throughput as roulette sees it: its largest part, of all lobes, whatever the view shows.
     pub carried: f32,
     /// Whether there are but the camera, mirrors and glass before.
@@ -41,7 +43,7 @@ pub struct History {
 
 impl History {
     /// Of rays of the camera.
-    pub const CAMERA: Self = Self { density: 0.0, carried: 1.0, is_seen: true };
+    pub const CAMERA: Self = Self { density: 0.0, normal: Vec3::ZERO, carried: 1.0, is_seen: true };
 
     /// After a δ lobe with this part of the radiance.
     pub fn mirrored(self, part: f32) -> Self {

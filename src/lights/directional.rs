@@ -2,6 +2,7 @@
 
 use std::f32::consts::PI;
 
+use super::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use super::{End, LightSample, Source};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -56,6 +57,18 @@ impl DirectionalLight {
         }
         let direction = Frame::from_normal(self.to_light).to_world(warp::cone(u, self.one_minus_cos));
         (direction, self.radiance * self.inverse_density())
+    }
+
+    /// Which directions it comes from, and its irradiance.
+    pub fn bounds(&self) -> LightBounds {
+        LightBounds {
+            space: Space::Beyond,
+            center: self.to_light.as_dvec3(),
+            // The chord from the middle to the edge.
+            radius: (2.0 * f64::from(self.one_minus_cos)).sqrt(),
+            power: strength(self.irradiance),
+            cone: EmissionCone::ALL,
+        }
     }
 
     /// Radiance from a direction; none from a light without extent.

@@ -7,10 +7,12 @@ use super::rectangle::QuadEmitter;
 use super::round::{ConeSide, CylinderSide, RoundEmitter};
 use super::sphere::SphereEmitter;
 use super::torus::TorusEmitter;
+use super::tree::bounds::{EmissionCone, LightBounds, strength};
 use super::triangle::TriangleEmitter;
 use super::{End, LightSample, Met, Source};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
+use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec3};
 
 /// A shape that sends the same radiance everywhere from its front side.
@@ -24,6 +26,8 @@ pub struct AreaLight {
     pub object: u32,
     /// Which part of it.
     pub part: Part,
+    /// Where it is and what it sends.
+    pub bounds: LightBounds,
 }
 
 /// Which part of an object a light is.
@@ -74,12 +78,35 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Torus(torus) => Emitter::Torus(TorusEmitter::new(*torus)),
         Shape::Plane(_) => return None,
     };
-    Some(AreaLight { shape: emitter, radiance, object, part: Part::Whole })
+    let bounds = bounds(shape, radiance)?;
+    Some(AreaLight { shape: emitter, radiance, object, part: Part::Whole, bounds })
+}
+
+/// Where a shape is and what it sends; none where it has no end. What is flat sends by the cosine, all else a quarter of its area
+/// times its radiance, which is the mean over the directions of what is convex (Cauchy).
+fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
+    let normal = match shape {
+        Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
+        Shape::Triangle(Triangle { a, b, c }) => Some((b - a).cross(c - a)),
+        Shape::Disk(disk) => Some(disk.normal()),
+        Shape::Sphere(_)
+        | Shape::Plane(_)
+        | Shape::Box(_)
+        | Shape::Cylinder(_)
+        | Shape::Cone(_)
+        | Shape::Torus(_) => None,
+    };
+    let area: f64 = shape.areas().iter().sum();
+    let (shown, cone) = match normal.map(DVec3::normalize) {
+        Some(normal) => (area, EmissionCone::of_front(normal)),
+        None => (0.25 * area, EmissionCone::ALL),
+    };
+    Some(LightBounds::in_box(shape.bounds()?, strength(radiance) * shown, cone))
 }
 
 impl AreaLight {
     /// [`Light::sample`](super::Light::sample).
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: Arrival| {
             let Arrival { direction, target, factor } = sample;
             let (end, source) = (End::At(target), Source::Object(self.object));
@@ -94,12 +121,12 @@ impl AreaLight {
             Emitter::Cylinder(cylinder) => own(cylinder.sample(point, u)),
             Emitter::Cone(cone) => own(cone.sample(point, u)),
             Emitter::Torus(torus) => own(torus.sample(point, u)),
-            Emitter::Mesh(mesh) => mesh.sample(point, u, self.radiance, self.object),
+            Emitter::Mesh(mesh) => mesh.sample(point, normal, u, (self.radiance, self.object)),
         }
     }
 
     /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
         if !(met.normal.dot(met.direction) < 0.0) {
             return 0.0;
         }
@@ -112,7 +139,7 @@ impl AreaLight {
             Emitter::Cylinder(cylinder) => cylinder.pdf(from, met),
             Emitter::Cone(cone) => cone.pdf(from, met),
             Emitter::Torus(torus) => torus.pdf(from, met),
-            Emitter::Mesh(mesh) => met.pdf_by_area(mesh.area()),
+            Emitter::Mesh(mesh) => mesh.pdf(from, normal, met),
         }
     }
 

@@ -4,9 +4,10 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use super::sky::SkyMap;
+use super::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use super::{End, LightSample, Source};
-use crate::math::Vec3;
 use crate::math::frame::Frame;
+use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
 /// Light that every ray sees which leaves the scene.
@@ -32,6 +33,16 @@ impl Environment {
     /// A map, as bright as white times a factor, turned by an angle in degrees.
     pub fn map(sky: Arc<SkyMap>, factor: Vec3, degrees: f64) -> Self {
         Self::Map { sky, factor, turn: (degrees / 360.0).rem_euclid(1.0) as f32 }
+    }
+
+    /// All directions, and the irradiance of a surface by its mean radiance.
+    pub fn bounds(&self) -> LightBounds {
+        let mean = match self {
+            Self::Constant(radiance) => strength(*radiance),
+            Self::Map { sky, factor, .. } => sky.mean_luminance() * strength(*factor),
+        };
+        let power = std::f64::consts::PI * mean;
+        LightBounds { space: Space::Beyond, center: DVec3::ZERO, radius: 1.0, power, cone: EmissionCone::ALL }
     }
 
     /// Radiance from a unit direction, and the density in sr⁻¹ of [`Environment::sample`] on the side of the surface that the

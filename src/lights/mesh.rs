@@ -1,6 +1,9 @@
-//! Emissive triangles of a mesh, by area.
+//! Emissive triangles of a mesh: few by area, many by a tree over them.
 
-use super::{End, LightSample, Source};
+use super::tree::{LightBounds, LightTree, MOST_WITHOUT};
+use super::triangle::TriangleEmitter;
+use super::{End, LightSample, Met, Source};
+use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
@@ -13,12 +16,14 @@ pub struct MeshEmitter {
     by_area: Discrete,
     /// Centre of area.
     center: DVec3,
-    /// Sum of the normals times the areas.
-    vector_area: DVec3,
+    /// Where the triangles are and what they send, for a unit of radiance.
+    bounds: LightBounds,
+    /// Over the triangles, where they are many.
+    tree: Option<LightTree>,
 }
 
 impl MeshEmitter {
-    /// From corners with their primitive numbers; none where there is no area.
+    /// From corners with their primitive numbers, which increase; none where there is no area.
     pub fn new(triangles: Vec<([DVec3; 3], u32)>) -> Option<Self> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;
         let areas = triangles.iter().map(|(corners, _)| vector_area_of(corners).length());
@@ -27,8 +32,10 @@ impl MeshEmitter {
             (corners[0] + corners[1] + corners[2]) / 3.0 * vector_area_of(corners).length()
         });
         let center = center.sum::<DVec3>() / by_area.total();
-        let vector_area = triangles.iter().map(|(corners, _)| vector_area_of(corners)).sum();
-        Some(Self { triangles, by_area, center, vector_area })
+        let all: Vec<_> = triangles.iter().map(|(corners, _)| LightBounds::of_triangle(corners)).collect();
+        let bounds = LightBounds::around(all.iter().flatten())?;
+        let tree = if all.len() > MOST_WITHOUT { LightTree::new(&all) } else { None };
+        Some(Self { triangles, by_area, center, bounds, tree })
     }
 
     /// The numbers that its triangles have in their object.
@@ -36,13 +43,44 @@ impl MeshEmitter {
         self.triangles.iter().map(|(_, primitive)| *primitive)
     }
 
-    /// Of all triangles.
-    pub fn area(&self) -> f64 {
-        self.by_area.total()
+    /// Where the triangles are and what they send, for a unit of radiance.
+    pub fn bounds(&self) -> LightBounds {
+        self.bounds
     }
 
-    /// Uniform over the area of all.
-    pub fn sample(&self, point: Vec3, u: [f32; 2], radiance: Vec3, object: u32) -> Option<LightSample> {
+    /// The tree over its triangles.
+    pub fn tree(&self) -> Option<&LightTree> {
+        self.tree.as_ref()
+    }
+
+    /// For a point of a surface with this normal: uniform over the area of all triangles, or one of them by the tree, and its
+    /// solid angle.
+    #[inline(always)]
+    pub fn sample(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        u: [f32; 2],
+        (radiance, object): (Vec3, u32),
+    ) -> Option<LightSample> {
+        match &self.tree {
+            Some(tree) => {
+                let pick = tree.pick(point, normal, f64::from(u[0]))?;
+                let (corners, primitive) = &self.triangles[pick.light as usize];
+                let rest = (pick.rest as f32).min(1.0_f32.next_down());
+                let arrival = emitter(corners)?.sample(point, [rest, u[1]]);
+                (arrival.factor > 0.0).then(|| LightSample {
+                    end: End::At(arrival.target),
+                    direction: arrival.direction,
+                    weight: radiance * (arrival.factor / pick.probability),
+                    source: Source::Primitive(object, *primitive),
+                })
+            }
+            None => self.sample_by_area(point, u, radiance, object),
+        }
+    }
+
+    fn sample_by_area(&self, point: Vec3, u: [f32; 2], radiance: Vec3, object: u32) -> Option<LightSample> {
         let (index, rest) = self.by_area.sample(u[0]);
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(Vec2::new(rest, u[1])).as_dvec3();
@@ -59,8 +97,26 @@ impl MeshEmitter {
         })
     }
 
+    /// [`Light::pdf`](super::Light::pdf).
+    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
+        let Some(tree) = &self.tree else { return met.pdf_by_area(self.by_area.total()) };
+        let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
+        let own = index.ok().and_then(|index| Some((index, emitter(&self.triangles[index].0)?)));
+        own.map_or(0.0, |(index, own)| tree.probability(from, normal, index as u32) * own.pdf(from, met))
+    }
+
+    #[cfg(test)]
+    pub(super) fn normal_of(&self, primitive: u32) -> Option<DVec3> {
+        let ([a, b, c], _) = self.triangles.iter().find(|(_, other)| *other == primitive)?;
+        Some((*b - *a).cross(*c - *a).normalize())
+    }
+
     /// Centre of area.
     pub fn middle(&self) -> DVec3 {
         self.center
     }
+}
+
+fn emitter([a, b, c]: &[DVec3; 3]) -> Option<TriangleEmitter> {
+    TriangleEmitter::new(&Triangle { a: *a, b: *b, c: *c })
 }

@@ -3,6 +3,7 @@
 pub mod cuboid;
 pub mod directional;
 pub mod disk;
+mod each;
 pub mod emitter;
 pub mod environment;
 mod linear;
@@ -17,6 +18,7 @@ pub mod sky;
 pub mod sphere;
 pub mod spot;
 pub mod torus;
+pub mod tree;
 pub mod triangle;
 
 pub use directional::DirectionalLight;
@@ -24,9 +26,10 @@ pub use emitter::{AreaLight, Part, area_light};
 pub use environment::Environment;
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
-pub use set::Lights;
+pub use set::{Lights, Samples};
 pub use sky::SkyMap;
 pub use spot::SpotLight;
+pub use tree::{Cut, LightBounds, LightTree, Pick};
 
 use crate::math::Vec3;
 
@@ -97,6 +100,8 @@ pub struct Met {
     pub distance: f32,
     /// Unit normal of the light's front there.
     pub normal: Vec3,
+    /// The part of the object that was met.
+    pub primitive: u32,
 }
 
 impl Met {
@@ -108,12 +113,12 @@ impl Met {
 }
 
 impl Light {
-    /// Density in sr⁻¹ with which its samples for the point `from` come from what a ray from there met; 0 where none does, and
-    /// of lights that no ray meets.
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    /// Density in sr⁻¹ with which its samples for the point `from` of a surface with this normal come from what a ray from there
+    /// met; 0 where none does, and of lights that no ray meets.
+    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
         match self {
             Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => 0.0,
-            Self::Area(light) => light.pdf(from, met),
+            Self::Area(light) => light.pdf(from, normal, met),
         }
     }
 
@@ -125,8 +130,20 @@ impl Light {
             Self::Spot(light) => light.sample(point),
             Self::Directional(light) => light.sample(u),
             Self::Environment(light) => light.sample(normal, u),
-            Self::Area(light) => light.sample(point, u),
+            Self::Area(light) => light.sample(point, normal, u),
         }
+    }
+
+    /// Where it is and what it sends, for a [`LightTree`]; none of a light that has none.
+    pub fn bounds(&self) -> Option<LightBounds> {
+        match self {
+            Self::Point(light) => Some(light.bounds()),
+            Self::Spot(light) => Some(light.bounds()),
+            Self::Directional(light) => Some(light.bounds()),
+            Self::Environment(light) => Some(light.bounds()),
+            Self::Area(light) => Some(light.bounds),
+        }
+        .filter(|bounds| bounds.power > 0.0)
     }
 
     /// Whether there is but one way.

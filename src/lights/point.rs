@@ -1,5 +1,6 @@
 //! Point lights.
 
+use super::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use super::{End, LightSample, Source};
 use crate::choice;
 use crate::math::{DVec3, Vec3};
@@ -31,6 +32,16 @@ impl PointLight {
         let (direction, weight) = self.arriving(point);
         let end = End::At(self.position.as_vec3());
         (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: Source::Nothing })
+    }
+
+    /// Where it is and what it sends.
+    pub fn bounds(&self) -> LightBounds {
+        let space = match self.falloff {
+            Falloff::Square => Space::Weakening,
+            Falloff::None => Space::Steady,
+        };
+        let power = strength(self.intensity);
+        LightBounds { space, center: self.position, radius: 0.0, power, cone: EmissionCone::ALL }
     }
 
     /// Unit direction to the light, and irradiance at normal incidence; none at the light itself.

@@ -74,6 +74,8 @@ macro_rules! row_of {
     }};
 }
 
+pub(super) use row_of;
+
 /// The same of directions and weights of light from beyond everything.
 macro_rules! row_beyond {
     ($i:ident => $sample:expr) => {{
@@ -87,7 +89,7 @@ macro_rules! row_beyond {
 
 impl LightRow {
     #[inline(always)]
-    fn dark(source: Source) -> Self {
+    pub(super) fn dark(source: Source) -> Self {
         Self {
             directions: [[0.0; LANES]; 3],
             targets: [[0.0; LANES]; 3],
@@ -95,6 +97,16 @@ impl LightRow {
             sources: SourceRow::of(source),
             beyond: 0,
         }
+    }
+
+    /// Take a sample of another row.
+    #[inline(always)]
+    pub fn take(&mut self, i: usize, other: &Self) {
+        set_lane(&mut self.directions, i, lane(&other.directions, i));
+        set_lane(&mut self.targets, i, lane(&other.targets, i));
+        set_lane(&mut self.weights, i, lane(&other.weights, i));
+        (self.sources.object[i], self.sources.part[i]) = (other.sources.object[i], other.sources.part[i]);
+        self.beyond = self.beyond & !(1 << i) | other.beyond & 1 << i;
     }
 
     fn put(&mut self, i: usize, sample: &LightSample) {
@@ -108,7 +120,11 @@ impl LightRow {
     }
 
     /// From the samples of the points whose bits are set.
-    fn one_by_one(points: &Lanes3, used: u32, sample: impl Fn(usize, Vec3) -> Option<LightSample>) -> Self {
+    pub(super) fn one_by_one(
+        points: &Lanes3,
+        used: u32,
+        sample: impl Fn(usize, Vec3) -> Option<LightSample>,
+    ) -> Self {
         let mut row = Self::dark(Source::Nothing);
         for i in (0..LANES).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
@@ -162,9 +178,9 @@ impl Light {
             | Emitter::Cylinder(_)
             | Emitter::Cone(_)
             | Emitter::Torus(_)
-            | Emitter::Mesh(_) => {
-                LightRow::one_by_one(points, used, |i, point| light.sample(point, [u[0][i], u[1][i]]))
-            }
+            | Emitter::Mesh(_) => LightRow::one_by_one(points, used, |i, point| {
+                light.sample(point, lane(normals, i), [u[0][i], u[1][i]])
+            }),
         }
     }
 }

@@ -1,8 +1,9 @@
 //! All lights of a scene, and which of them a hit is on.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::emitter::{Emitter, Part};
+use super::tree::{Cut, LightTree, MOST_WITHOUT};
 use super::{AreaLight, DirectionalLight, Environment, Light};
 use crate::math::Vec3;
 
@@ -11,10 +12,22 @@ use crate::math::Vec3;
 pub struct Lights {
     all: Vec<Light>,
     by_object: HashMap<u32, OfObject>,
-    /// Those that rays see which leave the scene.
-    suns: Vec<DirectionalLight>,
+    /// Those that rays see which leave the scene, with their numbers.
+    suns: Vec<(u32, DirectionalLight)>,
     /// The same of light from all around.
-    environment: Option<Environment>,
+    environment: Option<(u32, Environment)>,
+    /// Over all of them, where they are many.
+    tree: Option<LightTree>,
+}
+
+/// How often a vertex samples lights, for each time that it is asked to.
+pub struct Samples<'a>(Option<Cut<'a>>);
+
+impl Samples<'_> {
+    /// How often it is expected to sample the light of this number.
+    pub fn of(&self, number: u32) -> f32 {
+        self.0.as_ref().map_or(1.0, |cut| Lights::PICKS as f32 * cut.probability(number))
+    }
 }
 
 /// The lights that an object is.
@@ -34,12 +47,42 @@ impl Lights {
             match light {
                 Light::Point(_) | Light::Spot(_) => {}
                 Light::Directional(sun) if sun.is_sharp() => {}
-                Light::Directional(sun) => lights.suns.push(*sun),
-                Light::Environment(light) => lights.environment = Some(light.clone()),
+                Light::Directional(sun) => lights.suns.push((number, *sun)),
+                Light::Environment(light) => lights.environment = Some((number, light.clone())),
                 Light::Area(light) => lights.note(number, light),
             }
         }
-        Self { all, ..lights }
+        let bounds = || all.iter().map(Light::bounds).collect::<Vec<_>>();
+        let tree = if count(&all) > MOST_WITHOUT { LightTree::new(&bounds()) } else { None };
+        Self { all, tree, ..lights }
+    }
+
+    /// Lights that a vertex picks, for each sample of a light that it is asked for, where not all of them are sampled.
+    pub const PICKS: u32 = MOST_WITHOUT as u32;
+
+    /// The tree that vertices pick lights from; none where they sample all of them.
+    pub fn tree(&self) -> Option<&LightTree> {
+        self.tree.as_ref()
+    }
+
+    /// How often a vertex samples lights, at a point of a surface with this normal.
+    pub fn samples_at(&self, point: Vec3, normal: Vec3) -> Samples<'_> {
+        Samples(self.tree().map(|tree| Cut::new(tree, point, normal)))
+    }
+
+    /// Bytes that trees over lights and over the triangles of lights hold.
+    pub fn memory_bytes(&self) -> usize {
+        let of_mesh = |light: &Light| match light {
+            Light::Area(AreaLight { shape: Emitter::Mesh(mesh), .. }) => {
+                mesh.tree().map_or(0, LightTree::memory_bytes)
+            }
+            Light::Point(_)
+            | Light::Spot(_)
+            | Light::Directional(_)
+            | Light::Environment(_)
+            | Light::Area(_) => 0,
+        };
+        self.tree().map_or(0, LightTree::memory_bytes) + self.all.iter().map(of_mesh).sum::<usize>()
     }
 
     fn note(&mut self, number: u32, light: &AreaLight) {
@@ -97,13 +140,20 @@ impl Lights {
         !self.suns.is_empty() || self.environment.is_some()
     }
 
-    /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by the density in
-    /// sr⁻¹ of its samples from there.
-    pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
-        let suns = self.suns.iter().map(|sun| (sun.radiance(direction), sun.pdf(direction)));
-        let environment = self.environment.iter().map(|environment| environment.arriving(direction));
-        let seen = suns.chain(environment).filter(|(radiance, _)| *radiance != Vec3::ZERO);
-        seen.map(|(radiance, density)| radiance * share(density)).sum()
+    /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by its number and
+    /// the density in sr⁻¹ of its samples from there.
+    pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
+        let suns =
+            self.suns.iter().map(|(number, sun)| (*number, (sun.radiance(direction), sun.pdf(direction))));
+        let environment = self.environment.iter().map(|(number, light)| (*number, light.arriving(direction)));
+        let seen = suns.chain(environment).filter(|(_, (radiance, _))| *radiance != Vec3::ZERO);
+        seen.map(|(number, (radiance, density))| radiance * share(number, density)).sum()
+    }
+
+    /// The light of a number.
+    #[inline(always)]
+    pub fn get(&self, number: u32) -> &Light {
+        &self.all[number as usize]
     }
 
     /// The light that a primitive of an object is, with its number.
@@ -114,4 +164,14 @@ impl Lights {
         };
         Some((number, &self.all[number as usize]))
     }
+}
+
+/// How many lights these are where all that one object is counts as one.
+fn count(lights: &[Light]) -> usize {
+    let object = |light: &Light| match light {
+        Light::Area(light) => Some(light.object),
+        Light::Point(_) | Light::Spot(_) | Light::Directional(_) | Light::Environment(_) => None,
+    };
+    let objects: HashSet<u32> = lights.iter().filter_map(object).collect();
+    objects.len() + lights.iter().filter(|light| object(light).is_none()).count()
 }

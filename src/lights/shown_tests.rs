@@ -31,7 +31,7 @@ impl Random {
 fn irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
     let mut random = Random(5);
     let mut one = || {
-        let sample = light.sample(from, [random.next(), random.next()]);
+        let sample = light.sample(from, Vec3::Y, [random.next(), random.next()]);
         sample.map_or(0.0, |sample| f64::from(sample.weight.x * sample.direction.y.max(0.0)))
     };
     (0..count).map(|_| one()).collect()
@@ -165,7 +165,7 @@ fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Direction
         for j in 0..SIDE * FINE {
             let place = [i, j].map(|k| (k as f32 + random.next()) / (SIDE * FINE) as f32);
             let met = met(shape, from, directions.direction(place));
-            let share = met.map_or(0.0, |(met, _)| f64::from(light.pdf(from, &met)) * square);
+            let share = met.map_or(0.0, |(met, _)| f64::from(light.pdf(from, Vec3::Y, &met)) * square);
             let (wanted, variance) = &mut bins[i / FINE * SIDE + j / FINE];
             *wanted += share;
             // At the border a part of the square counts, or none, for all of it.
@@ -285,7 +285,7 @@ impl Directions {
 fn histogram(light: &AreaLight, from: Vec3) -> Option<(Directions, Vec<usize>)> {
     let mut random = Random(11);
     let samples: Vec<Vec3> = (0..COUNT)
-        .filter_map(|_| light.sample(from, [random.next(), random.next()]))
+        .filter_map(|_| light.sample(from, Vec3::Y, [random.next(), random.next()]))
         .map(|sample| sample.direction)
         .collect();
     let middle = samples.iter().sum::<Vec3>().try_normalize()?;

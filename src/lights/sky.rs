@@ -20,6 +20,8 @@ pub struct SkyMap {
     heights: Vec<f64>,
     /// Density in sr⁻¹ of a row, were its columns alike.
     densities: Vec<f32>,
+    /// Over all directions.
+    mean_luminance: f64,
 }
 
 /// A place between four texels.
@@ -45,11 +47,13 @@ impl SkyMap {
             (0..texels.width).map(|x| f64::from(luminance(texels.get(x, row as u32)))).collect()
         };
         let mut upper = luminances(0);
+        let mut sum = 0.0;
         let weights = (0..=rows).map(|row| {
             let lower = luminances(row.min(rows - 1));
             let both: Vec<f64> = upper.iter().zip(&lower).map(|(upper, lower)| upper + lower).collect();
             upper = lower;
             let extent = heights[row] - heights[row + 1];
+            sum += both.iter().sum::<f64>() * extent;
             (0..columns).map(|column| (both[column] + both[(column + 1) % columns]) * extent).collect()
         });
         let cells = Grid::new(columns, weights)?;
@@ -58,7 +62,14 @@ impl SkyMap {
             (f64::from(cells.row_probability(row)) / extent) as f32
         };
         let densities = (0..=rows).map(density).collect();
-        Some(Self { texels, cells, heights, densities })
+        // Of both rows of texels around each of cells, and of heights from 1 to −1.
+        let mean_luminance = sum / (4.0 * columns as f64);
+        Some(Self { texels, cells, heights, densities, mean_luminance })
+    }
+
+    /// The mean of the luminance over all directions.
+    pub fn mean_luminance(&self) -> f64 {
+        self.mean_luminance
     }
 
     /// The colour in a unit direction, and the density in sr⁻¹ with which samples have it. `turn` are the turns of the map

@@ -2,6 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
+use super::tree::bounds::{EmissionCone, LightBounds};
 use super::{End, LightSample, PointLight, Source};
 use crate::math::Vec3;
 use crate::math::elementary::acos;
@@ -25,6 +26,12 @@ impl SpotLight {
         let (direction, weight) = self.arriving(point);
         let end = End::At(self.point.position.as_vec3());
         (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: Source::Nothing })
+    }
+
+    /// Where it is and what it sends.
+    pub fn bounds(&self) -> LightBounds {
+        let cone = EmissionCone::within(self.axis.as_dvec3(), f64::from(self.half_angle));
+        LightBounds { cone, ..self.point.bounds() }
     }
 
     /// [`PointLight::arriving`].

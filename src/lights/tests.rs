@@ -48,7 +48,8 @@ const POINT: PointLight =
 pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
-    Some((Met { direction, distance: hit.t, normal: shape.surface(&ray, &hit).normal }, hit))
+    let normal = shape.surface(&ray, &hit).normal;
+    Some((Met { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
 /// Samples of a light for a point: directions, where they end, and one over their densities.
@@ -110,7 +111,7 @@ fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
                     }
                     let (found, of_hit) = lights.of_hit(OBJECT, hit.primitive).expect("it is a light");
                     assert_eq!(found, number, "{shape:?}");
-                    let product = of_hit.pdf(from, &met) * factor;
+                    let product = of_hit.pdf(from, Vec3::Y, &met) * factor;
                     assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
                     compared += 1;
                 }
@@ -136,7 +137,8 @@ fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
                 let direction = cone.direction(i, n);
                 let Some((met, hit)) = met(&shape, from, direction) else { continue };
                 let Some((number, light)) = lights.of_hit(OBJECT, hit.primitive) else { continue };
-                sums[number as usize] += f64::from(light.pdf(from, &met) * cone.solid_angle()) / f64::from(n);
+                sums[number as usize] +=
+                    f64::from(light.pdf(from, Vec3::Y, &met) * cone.solid_angle()) / f64::from(n);
             }
             for (sum, (number, light)) in sums.iter().zip(lights.iter()).skip(1) {
                 let all = samples(light, number, from, 1024);
@@ -181,8 +183,11 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
     let corners = |z: f64| [DVec3::new(0.0, 0.0, z), DVec3::new(1.0, 0.0, z), DVec3::new(0.0, 1.0, z)];
     let light = |numbers: &[u32], radiance: f32| {
         let triangles = numbers.iter().map(|&number| (corners(f64::from(number)), number)).collect();
+        let mesh = MeshEmitter::new(triangles).expect("an area");
+        let bounds = mesh.bounds().times(Vec3::splat(radiance));
         Light::Area(AreaLight {
-            shape: Emitter::Mesh(MeshEmitter::new(triangles).expect("an area")),
+            bounds,
+            shape: Emitter::Mesh(mesh),
             radiance: Vec3::splat(radiance),
             object: 3,
             part: Part::Listed,
@@ -195,12 +200,12 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
         [Some(0), None, Some(2), None, Some(0), None]
     );
     assert_eq!(of_hit(4, 0), None);
-    let met = Met { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z };
+    let met = Met { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
     let (_, light) = lights.of_hit(3, 2).expect("a light");
     // d²/(A·cos) = 4/½.
-    assert!((light.pdf(Vec3::ZERO, &met) - 8.0).abs() < 1e-5);
-    assert_eq!(light.pdf(Vec3::ZERO, &Met { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
-    assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, &met), 0.0);
+    assert!((light.pdf(Vec3::ZERO, Vec3::Z, &met) - 8.0).abs() < 1e-5);
+    assert_eq!(light.pdf(Vec3::ZERO, Vec3::Z, &Met { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
+    assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &met), 0.0);
 }
 
 #[test]

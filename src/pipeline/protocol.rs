@@ -303,6 +303,8 @@ pub struct Report {
     pub image: ImageReport,
     /// The settings it was made with.
     pub settings: Effective,
+    /// The lights, and how surfaces look at them.
+    pub lights: LightsReport,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
     /// What was done.
@@ -342,6 +344,31 @@ pub struct SampleCounts {
     pub mean: f64,
     /// Most.
     pub max: u32,
+}
+
+/// The lights of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct LightsReport {
+    /// How many; a mesh counts for each of its emitting materials.
+    pub count: u64,
+    /// How many of them a surface samples where light falls on it.
+    pub sampled: LightsSampled,
+    /// Samples of lights that a surface takes where light falls on it, where it picks: 32 for each of `shadow_samples`; else 0.
+    pub picks: u64,
+    /// Nodes of the tree that it picks from.
+    pub tree_nodes: u64,
+    /// Bytes held by trees over lights, and over the triangles of lights.
+    pub memory_bytes: u64,
+}
+
+/// How many lights a surface samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LightsSampled {
+    /// All of them.
+    All,
+    /// Some that it picks, by what they are expected to bring.
+    Picked,
 }
 
 /// What a request did, counted.

@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::Inputs;
 use super::plan::Plan;
-use super::protocol::{Counters, ImageReport, Report, SampleCounts, StageReport};
+use super::protocol::{
+    Counters, ImageReport, LightsReport, LightsSampled, Report, SampleCounts, StageReport,
+};
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
 use super::targets::guarded;
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
+use crate::lights::{LightTree, Lights};
 use crate::output::{OutputError, write::atomic_until};
 use crate::world::World;
 
@@ -31,6 +34,7 @@ pub(super) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds:
         scene: finished.scene.to_string_lossy().into_owned(),
         image: image(finished),
         settings: finished.plan.effective.clone(),
+        lights: lights(finished),
         stages,
         counters: counters(finished),
         seconds,
@@ -64,6 +68,22 @@ fn image(finished: &Finished<'_>) -> ImageReport {
         samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
         error: finished.canvas.film.relative_error(),
         complete: finished.canvas.is_complete(plan.settings.render.samples),
+    }
+}
+
+fn lights(finished: &Finished<'_>) -> LightsReport {
+    let lights = &finished.world.lights;
+    let samples = u64::from(finished.plan.settings.render.shadow_samples);
+    let (sampled, picks) = match lights.tree() {
+        Some(_) => (LightsSampled::Picked, samples * u64::from(Lights::PICKS)),
+        None => (LightsSampled::All, 0),
+    };
+    LightsReport {
+        count: lights.len() as u64,
+        sampled,
+        picks,
+        tree_nodes: lights.tree().map_or(0, LightTree::node_count) as u64,
+        memory_bytes: lights.memory_bytes() as u64,
     }
 }
 

@@ -13,6 +13,12 @@ pub enum Decision {
     Lens,
     /// Where on the light of this number.
     Light(u32),
+    /// Which light, where not all are sampled.
+    Pick,
+    /// Where on that.
+    Picked,
+    /// To which of the picked lights rays are sent.
+    Trace,
     /// Which of two ways to go on.
     Choice,
     /// Which lobe to go on in.
@@ -35,6 +41,9 @@ impl Decision {
             Self::Lobe => u32::MAX - 3,
             Self::Direction => u32::MAX - 4,
             Self::Roulette => u32::MAX - 5,
+            Self::Pick => u32::MAX - 6,
+            Self::Picked => u32::MAX - 7,
+            Self::Trace => u32::MAX - 8,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }
@@ -219,6 +228,25 @@ mod tests {
                 direction ^= direction >> 1;
             }
             assert_eq!(pascal(index).reverse_bits(), sum, "{index}");
+        }
+    }
+
+    #[test]
+    fn each_group_of_repetitions_has_one_in_each_part() {
+        // Any 32 of a decision's repetitions from a multiple of 32 on, however many groups a sample has.
+        for (sample, of) in [(0, 32), (5, 96), (77, 160), (1 << 27, 64)] {
+            let row = SamplerRow::new(3, &[7; 16], &[9; 16], &[sample; 16]);
+            let paths = std::array::from_fn(|i| i as u32);
+            for group in 0..of / 32 {
+                let mut found = [0_u32; 16];
+                for repetition in 0..32 {
+                    let [u, _] = row.pairs(&paths, Decision::Pick, group * 32 + repetition, of);
+                    for i in 0..16 {
+                        found[i] |= 1 << (u[i] * 32.0) as u32;
+                    }
+                }
+                assert_eq!(found, [u32::MAX; 16], "sample {sample}, group {group} of {of}");
+            }
         }
     }
 

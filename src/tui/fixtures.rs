@@ -175,6 +175,13 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         scene: "scenes/cornell.toml".to_owned(),
         image,
         settings: settings(),
+        lights: protocol::LightsReport {
+            count: 1,
+            sampled: protocol::LightsSampled::All,
+            picks: 0,
+            tree_nodes: 0,
+            memory_bytes: 0,
+        },
         stages: Stage::ALL.iter().map(|name| stage(*name, Status::Done, 0.25, "")).collect(),
         counters: Counters::default(),
         seconds: 1.93,

@@ -83,8 +83,9 @@ fn mesh_lights(object: u32, mesh: &MeshInstance, emission: Option<Vec3>) -> Vec<
     };
     let light = |(own, radiance): (Option<u32>, Vec3)| {
         let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
-        let shape = Emitter::Mesh(MeshEmitter::new(triangles)?);
-        Some(AreaLight { shape, radiance, object, part: Part::Listed })
+        let mesh = MeshEmitter::new(triangles)?;
+        let bounds = mesh.bounds().times(radiance);
+        Some(AreaLight { shape: Emitter::Mesh(mesh), radiance, object, part: Part::Listed, bounds })
     };
     emissions.into_iter().filter(|(_, radiance)| *radiance != Vec3::ZERO).filter_map(light).collect()
 }

@@ -24,6 +24,7 @@ fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
         "shapes",
         "spheres",
         "sun",
+        "lamps",
         "environment",
         "textures",
     ] {

@@ -31,8 +31,20 @@ pub(in crate::pipeline) fn lights(
     match lights.len() {
         0 => Staged::skipped(lights, "the scene has no light"),
         1 => Staged::done(lights, "1 light"),
-        count => Staged::done(lights, format!("{count} lights")),
+        count => {
+            let tree = lights.tree().map_or_else(String::new, |_| picked(&lights));
+            Staged::done(lights, format!("{count} lights{tree}"))
+        }
     }
+}
+
+/// What is said of lights that are too many to look at all of them.
+fn picked(lights: &Lights) -> String {
+    format!(
+        ", of which {} are picked at a time; their tree has {} kB",
+        Lights::PICKS,
+        lights.memory_bytes().div_ceil(1000)
+    )
 }
 
 fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<SkyMap>> {

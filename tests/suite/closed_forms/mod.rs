@@ -9,6 +9,7 @@ mod film;
 mod glass;
 mod global;
 mod hard;
+mod many_lights;
 mod mirror;
 mod robust;
 mod round;

@@ -1,0 +1,199 @@
+//! Building light trees from the top: lights that are close together and send light into similar directions come under one node
+//! (Conty Estevez and Kulla, 2018, section 4.4, with bins).
+
+use super::bounds::{EmissionCone, LightBounds};
+use super::node::{Child, Node};
+use super::{LightTree, NOWHERE};
+use crate::math::DVec3;
+use crate::math::lanes::LANES;
+
+/// Bins along the longest axis.
+const BINS: usize = 16;
+
+impl LightTree {
+    /// Over these lights, known by their index; those without bounds have no light. None where no light has.
+    pub fn new(lights: &[Option<LightBounds>]) -> Option<Self> {
+        let mut leaves: Vec<Leaf> = (0..).zip(lights).filter_map(Leaf::new).collect();
+        // Lights of one space come together.
+        leaves.sort_by_key(|leaf| leaf.bounds.space);
+        let power = leaves.iter().map(|leaf| leaf.bounds.power).sum();
+        let mut places = vec![NOWHERE; lights.len()];
+        let mut builder = Builder { nodes: Vec::new(), power, leaves: leaves.len() as u32 };
+        if leaves.is_empty() {
+            return None;
+        }
+        builder.node(&mut leaves, 0);
+        for (place, leaf) in (0..).zip(&leaves) {
+            places[leaf.light as usize] = place;
+        }
+        Some(Self { nodes: builder.nodes, places })
+    }
+}
+
+/// A light of the tree.
+#[derive(Clone)]
+struct Leaf {
+    light: u32,
+    bounds: LightBounds,
+}
+
+impl Leaf {
+    fn new((light, bounds): (u32, &Option<LightBounds>)) -> Option<Self> {
+        let bounds = (*bounds)?;
+        (bounds.power > 0.0).then_some(Self { light, bounds })
+    }
+}
+
+struct Builder {
+    nodes: Vec<Node>,
+    /// Of all lights.
+    power: f64,
+    /// How many lights.
+    leaves: u32,
+}
+
+impl Builder {
+    /// Build the node over some leaves, before which there are so many; its number.
+    fn node(&mut self, leaves: &mut [Leaf], before: u32) -> u32 {
+        let number = self.nodes.len() as u32;
+        self.nodes.push(Node::empty(self.leaves));
+        let groups = groups(leaves);
+        let mut node = Node::empty(self.leaves);
+        let (mut rest, mut first) = (leaves, before);
+        for (i, count) in groups.into_iter().enumerate() {
+            let (own, others) = rest.split_at_mut(count);
+            rest = others;
+            let Some(bounds) = LightBounds::around(own.iter().map(|leaf| &leaf.bounds)) else { continue };
+            node.set(i, &bounds, self.power);
+            node.first[i] = first;
+            node.children[i] = match own {
+                [leaf] => Child::Light(leaf.light),
+                several => Child::Node(self.node(several, first)),
+            };
+            node.count = i as u32 + 1;
+            first += count as u32;
+        }
+        self.nodes[number as usize] = node;
+        number
+    }
+}
+
+/// Put leaves into groups, at most one for each child: the sizes of these.
+fn groups(leaves: &mut [Leaf]) -> Vec<usize> {
+    if leaves.len() <= LANES {
+        return vec![1; leaves.len()];
+    }
+    let mut groups: Vec<Group> = Vec::with_capacity(LANES);
+    let mut start = 0;
+    for own in leaves.chunk_by(|a, b| a.bounds.space == b.bounds.space) {
+        groups.push(Group::new(start, own));
+        start += own.len();
+    }
+    while groups.len() < LANES {
+        let dearest = (0..groups.len()).filter(|&i| groups[i].count > 1);
+        let Some(dearest) = dearest.max_by(|&a, &b| groups[a].cost.total_cmp(&groups[b].cost)) else { break };
+        let Group { start, count, .. } = groups[dearest];
+        let own = &mut leaves[start..start + count];
+        let middle = split(own);
+        let (left, right) = own.split_at(middle);
+        groups[dearest] = Group::new(start, left);
+        groups.insert(dearest + 1, Group::new(start + middle, right));
+    }
+    groups.into_iter().map(|group| group.count).collect()
+}
+
+/// A run of leaves.
+struct Group {
+    start: usize,
+    count: usize,
+    cost: f64,
+}
+
+impl Group {
+    fn new(start: usize, leaves: &[Leaf]) -> Self {
+        let mut sum = Sum::NOTHING;
+        leaves.iter().for_each(|leaf| sum.add(leaf));
+        Self { start, count: leaves.len(), cost: sum.cost() }
+    }
+}
+
+/// What is summed over leaves to say what a node over them costs.
+#[derive(Clone, Copy)]
+struct Sum {
+    count: usize,
+    power: f64,
+    min: DVec3,
+    max: DVec3,
+    /// Axes times powers.
+    axes: DVec3,
+}
+
+impl Sum {
+    const NOTHING: Self =
+        Self { count: 0, power: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, axes: DVec3::ZERO };
+
+    fn add(&mut self, leaf: &Leaf) {
+        let LightBounds { center, radius, power, cone, .. } = &leaf.bounds;
+        let EmissionCone { axis, cos, .. } = cone;
+        self.count += 1;
+        self.power += power;
+        (self.min, self.max) = (self.min.min(center - radius), self.max.max(center + radius));
+        // The mean of the directions of a cone is so long.
+        self.axes += axis * (power * 0.5 * (1.0 + cos));
+    }
+
+    fn and(mut self, other: &Self) -> Self {
+        self.count += other.count;
+        self.power += other.power;
+        (self.min, self.max) = (self.min.min(other.min), self.max.max(other.max));
+        self.axes += other.axes;
+        self
+    }
+
+    /// Power times area times solid angle (section 4.4, equation 1), the latter of a cone whose directions have this mean. In
+    /// place of the area the square of the diagonal, which is not 0 for lights in a row.
+    fn cost(&self) -> f64 {
+        if self.count == 0 {
+            return 0.0;
+        }
+        let mean = (self.axes.length() / self.power).min(1.0);
+        self.power * (self.max - self.min).length_squared() * (1.0 + 3.0 * (1.0 - mean))
+    }
+}
+
+/// Sort leaves into two parts, none of them empty: where the second begins.
+fn split(leaves: &mut [Leaf]) -> usize {
+    let middle = leaves.len() / 2;
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for leaf in &*leaves {
+        (min, max) = (min.min(leaf.bounds.center), max.max(leaf.bounds.center));
+    }
+    let extent = max - min;
+    let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
+    if !(extent[axis] > 0.0) {
+        return middle;
+    }
+    let bin_of = |leaf: &Leaf| {
+        let share = (leaf.bounds.center[axis] - min[axis]) / extent[axis];
+        ((share * BINS as f64) as usize).min(BINS - 1)
+    };
+    let mut bins = [Sum::NOTHING; BINS];
+    for leaf in &*leaves {
+        bins[bin_of(leaf)].add(leaf);
+    }
+    let mut right = [Sum::NOTHING; BINS];
+    for i in (1..BINS).rev() {
+        right[i - 1] = right[i].and(&bins[i]);
+    }
+    let (mut left, mut best) = (Sum::NOTHING, (f64::INFINITY, 0));
+    for i in 0..BINS - 1 {
+        left = left.and(&bins[i]);
+        let cost = left.cost() + right[i].cost();
+        if left.count > 0 && right[i].count > 0 && cost < best.0 {
+            best = (cost, i);
+        }
+    }
+    // A stable order: the tree is the same on all machines.
+    leaves.sort_by_key(|leaf| bin_of(leaf) > best.1);
+    leaves.partition_point(|leaf| bin_of(leaf) <= best.1)
+}

@@ -1,0 +1,188 @@
+//! A tree over many lights, from which each point picks those that are expected to bring it most (Conty Estevez and Kulla,
+//! *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018). Its nodes have sixteen children, whose importance
+//! is computed side by side.
+
+pub mod bounds;
+mod build;
+mod cut;
+mod node;
+
+pub use bounds::{EmissionCone, LightBounds};
+pub use cut::Cut;
+pub use node::{Child, Node};
+
+use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes};
+
+/// A tree over lights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightTree {
+    /// The first is the root.
+    nodes: Vec<Node>,
+    /// Place of each light in the order of the tree; [`NOWHERE`] of those that have no light.
+    places: Vec<u32>,
+}
+
+/// Lights, or triangles of a light, that are too few for a tree.
+pub const MOST_WITHOUT: usize = 32;
+
+/// In place of a place.
+const NOWHERE: u32 = u32::MAX;
+
+/// The number of the root.
+const ROOT: u32 = 0;
+
+/// A light that was picked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pick {
+    /// Its number.
+    pub light: u32,
+    /// With which probability.
+    pub probability: f32,
+    /// Where in its share of [0, 1) the number was that picked it, in [0, 1).
+    pub rest: f64,
+}
+
+impl LightTree {
+    /// Pick a light for a point of a surface with this normal, by a number in [0, 1); none where no light arrives.
+    #[inline(always)]
+    pub fn pick(&self, point: Vec3, normal: Vec3, u: f64) -> Option<Pick> {
+        let mut way = Way::NEW;
+        self.pick_under(ROOT, point, normal, Pick { light: 0, probability: 1.0, rest: u }, &mut way)
+    }
+
+    /// The probability with which [`LightTree::pick`] picks this light.
+    pub fn probability(&self, point: Vec3, normal: Vec3, light: u32) -> f32 {
+        match self.places[light as usize] {
+            NOWHERE => 0.0,
+            place => self.probability_under(ROOT, (point, normal), place, 1.0),
+        }
+    }
+
+    /// Pick a light under a node, which was picked itself; `way` is that of the pick before for the same point.
+    #[inline(always)]
+    fn pick_under(
+        &self,
+        mut node: u32,
+        point: Vec3,
+        normal: Vec3,
+        mut pick: Pick,
+        way: &mut Way,
+    ) -> Option<Pick> {
+        let mut level = 0;
+        loop {
+            let one = &self.nodes[node as usize];
+            if way.nodes[level] != node {
+                way.nodes[level] = node;
+                way.shares[level] = Shares::new(&one.expected(point, normal).importance);
+            }
+            let (child, share) = way.shares[level].find(&mut pick.rest)?;
+            pick.probability *= share;
+            match one.children[child] {
+                Child::Light(light) => return Some(Pick { light, ..pick }),
+                Child::Node(below) => node = below,
+            }
+            level = (level + 1).min(LEVELS - 1);
+        }
+    }
+
+    /// The probability of the light at a place of the tree's order, by that of a node above it.
+    fn probability_under(
+        &self,
+        mut node: u32,
+        (point, normal): (Vec3, Vec3),
+        place: u32,
+        mut probability: f32,
+    ) -> f32 {
+        loop {
+            let one = &self.nodes[node as usize];
+            let child = one.child_over(place);
+            probability *= Shares::new(&one.expected(point, normal).importance).share(child);
+            match one.children[child] {
+                Child::Node(below) if probability > 0.0 => node = below,
+                Child::Node(_) | Child::Light(_) => return probability,
+            }
+        }
+    }
+
+    /// How many nodes it has.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Bytes that it holds.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.places)
+    }
+}
+
+/// Levels of a way down a tree that are remembered.
+const LEVELS: usize = 3;
+
+/// The nodes on the way of a pick, with the importance of their children: the next pick for the point may go the same way.
+struct Way {
+    nodes: [u32; LEVELS],
+    shares: [Shares; LEVELS],
+}
+
+impl Way {
+    const NEW: Self = Self { nodes: [u32::MAX; LEVELS], shares: [Shares([0.0; LANES]); LEVELS] };
+}
+
+/// Sums of the importance of children up to each.
+#[derive(Clone, Copy)]
+struct Shares([f64; LANES]);
+
+impl Shares {
+    #[inline(always)]
+    fn new(importance: &Lanes) -> Self {
+        let (mut sums, mut sum) = ([0.0; LANES], 0.0);
+        for i in 0..LANES {
+            sum += f64::from(importance[i]);
+            sums[i] = sum;
+        }
+        Self(sums)
+    }
+
+    /// The probability of a child.
+    #[inline(always)]
+    fn share(&self, child: usize) -> f32 {
+        let (before, total) = (if child == 0 { 0.0 } else { self.0[child - 1] }, self.0[LANES - 1]);
+        if total > 0.0 { ((self.0[child] - before) / total) as f32 } else { 0.0 }
+    }
+
+    /// The child that a number in [0, 1) falls on, with its probability; the number becomes that in its share.
+    #[inline(always)]
+    fn find(&self, u: &mut f64) -> Option<(usize, f32)> {
+        let total = self.0[LANES - 1];
+        if !(total > 0.0) {
+            return None;
+        }
+        let target = target(*u, total);
+        let mut child = 0;
+        for i in 0..LANES {
+            child += usize::from(self.0[i] <= target);
+        }
+        let before = if child == 0 { 0.0 } else { self.0[child - 1] };
+        *u = rest(target - before, self.0[child] - before);
+        Some((child, self.share(child)))
+    }
+}
+
+/// A number in [0, 1) as a part of a sum, below it: rounding may not lead beyond the last share.
+#[inline(always)]
+fn target(u: f64, total: f64) -> f64 {
+    let (target, last) = (u * total, total.next_down());
+    if target < last { target } else { last }
+}
+
+/// What is left of a part of a share, in [0, 1).
+#[inline(always)]
+fn rest(part: f64, share: f64) -> f64 {
+    const LAST: f64 = 1.0_f64.next_down();
+    let rest = part / share;
+    if rest < LAST { rest } else { LAST }
+}
+
+#[cfg(test)]
+mod tests;

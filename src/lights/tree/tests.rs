@@ -1,0 +1,322 @@
+use proptest::prelude::*;
+
+use super::bounds::{Edge, Space};
+use super::*;
+use crate::geometry::Shape;
+use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cylinder::Cylinder;
+use crate::geometry::disk::Disk;
+use crate::geometry::parallelogram::Parallelogram;
+use crate::geometry::sphere::Sphere;
+use crate::geometry::triangle::Triangle;
+use crate::lights::emitter::{AreaLight, Emitter, Part, area_light};
+use crate::lights::mesh::MeshEmitter;
+use crate::lights::point::Falloff;
+use crate::lights::{DirectionalLight, Environment, Light, PointLight, SpotLight};
+use crate::math::{DVec3, random};
+
+/// A light of some kind, of some size, somewhere.
+fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
+    let mut vector =
+        |scale: f32| Vec3::from_array(std::array::from_fn(|_| (next() * 2.0 - 1.0) * scale)).as_dvec3();
+    let (place, direction, across) = (vector(4.0), vector(1.0), vector(1.0));
+    let (color, size) = (vector(1.0).as_vec3().abs(), 10_f64.powf(f64::from(next()) * 3.0 - 2.0));
+    let falloff = if next() < 0.5 { Falloff::Square } else { Falloff::None };
+    let point = PointLight { position: place, intensity: color, falloff };
+    let shape = match (next() * 10.0) as u32 {
+        0 => return Light::Point(point),
+        1 => {
+            let (half_angle, axis) = (next() * 3.1 + 0.01, direction.normalize().as_vec3());
+            return Light::Spot(SpotLight { point, axis, half_angle, blend: next() });
+        }
+        2 => {
+            let angle = f64::from(next() * 2.0 - 0.5).max(0.0);
+            return Light::Directional(DirectionalLight::new(direction.normalize().as_vec3(), color, angle));
+        }
+        3 => return Light::Environment(Environment::Constant(color)),
+        4 => Shape::Sphere(Sphere { center: place, radius: size }),
+        5 => Shape::Quad(Parallelogram::new(place, direction * size, across * size)),
+        6 => Shape::Triangle(Triangle { a: place, b: place + direction * size, c: place + across * size }),
+        7 => Shape::Disk(Disk::new(place, direction, size)),
+        8 => Shape::Box(Cuboid::new(place, across.abs() * size + 0.001, direction * 90.0)),
+        _ => Shape::Cylinder(Cylinder::new(place, place + direction * size, size * 0.3, true)),
+    };
+    Light::Area(area_light(&shape, color, object).expect("it has an end"))
+}
+
+fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
+    (0..count).map(|object| any_light(object, next)).collect()
+}
+
+fn tree_of(lights: &[Light]) -> LightTree {
+    LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>()).expect("some light")
+}
+
+/// A point of a surface and its normal.
+fn place(next: &mut impl FnMut() -> f32) -> (Vec3, Vec3) {
+    let mut vector = |scale: f32| Vec3::from_array(std::array::from_fn(|_| (next() * 2.0 - 1.0) * scale));
+    (vector(5.0), vector(1.0).normalize())
+}
+
+/// Evenly spread numbers.
+fn even<const N: usize>() -> [f64; N] {
+    std::array::from_fn(|k| (k as f64 + 0.5) / N as f64)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn picks_have_their_probabilities_which_sum_to_one(seed in any::<u64>(), count in 1_u32..600) {
+        let mut next = random::unit(seed);
+        let lights = lights_of(count, &mut next);
+        let tree = tree_of(&lights);
+        for _ in 0..4 {
+            let (point, normal) = place(&mut next);
+            let cut = Cut::new(&tree, point, normal);
+            let mut dark = [0.0; 2];
+            for (k, u) in even::<512>().into_iter().enumerate() {
+                let alone = tree.pick(point, normal, u);
+                if let Some(pick) = alone {
+                    prop_assert_eq!(pick.probability, tree.probability(point, normal, pick.light));
+                    prop_assert!(pick.probability > 0.0 && (0.0..1.0).contains(&pick.rest));
+                } else {
+                    dark[0] += 1.0 / 512.0;
+                }
+                if k == 0 {
+                    for pick in cut.pick(&even::<512>()) {
+                        if let Some(pick) = pick {
+                            prop_assert_eq!(pick.probability, cut.probability(pick.light));
+                            prop_assert!(pick.probability > 0.0 && (0.0..1.0).contains(&pick.rest));
+                        } else {
+                            dark[1] += 1.0 / 512.0;
+                        }
+                    }
+                }
+            }
+            // What is not picked goes to nodes whose bounds promise what none of their lights sends.
+            let alone: f32 = (0..count).map(|light| tree.probability(point, normal, light)).sum();
+            let cut: f32 = (0..count).map(|light| cut.probability(light)).sum();
+            prop_assert!((alone + dark[0] - 1.0).abs() < 0.02, "{} {}", alone, dark[0]);
+            prop_assert!((cut + dark[1] - 1.0).abs() < 0.02, "{} {}", cut, dark[1]);
+        }
+    }
+
+    #[test]
+    fn what_can_arrive_can_be_picked(seed in any::<u64>(), count in 1_u32..200) {
+        let mut next = random::unit(seed);
+        let lights = lights_of(count, &mut next);
+        let tree = tree_of(&lights);
+        for _ in 0..4 {
+            let (mut point, normal) = place(&mut next);
+            // Also close to one of them.
+            if let (true, Some((crate::lights::Middle::At(middle), _))) = (next() < 0.5, lights[0].middle()) {
+                point = middle + point * 0.01;
+            }
+            let cut = Cut::new(&tree, point, normal);
+            for (number, light) in (0..).zip(&lights) {
+                let arrives = (0..8).any(|_| {
+                    let sample = light.sample(point, normal, [next(), next()]);
+                    sample.is_some_and(|sample| sample.direction.dot(normal) > 0.0 && sample.weight.element_sum() > 0.0)
+                });
+                if arrives {
+                    prop_assert!(tree.probability(point, normal, number) > 0.0, "{:?} from {}, {}", light, point, normal);
+                    prop_assert!(cut.probability(number) > 0.0, "{:?} from {}, {}", light, point, normal);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn picks_come_as_often_as_their_probabilities_say() {
+    let mut next = random::unit(3);
+    let lights = lights_of(300, &mut next);
+    let tree = tree_of(&lights);
+    for round in 0..4 {
+        let (point, normal) = place(&mut next);
+        let cut = Cut::new(&tree, point, normal);
+        const N: usize = 100_000;
+        let mut counts = vec![[0.0_f64; 2]; lights.len()];
+        for _ in 0..N / 20 {
+            let mut u: [f64; 20] =
+                std::array::from_fn(|_| f64::from(next()) + f64::from(next()) / f64::from(1 << 24));
+            for pick in u.iter().filter_map(|&u| tree.pick(point, normal, u)) {
+                counts[pick.light as usize][0] += 1.0;
+            }
+            u.sort_by(f64::total_cmp);
+            for pick in cut.pick(&u).into_iter().flatten() {
+                counts[pick.light as usize][1] += 1.0;
+            }
+        }
+        for way in 0..2 {
+            let (mut chi, mut cells, mut few) = (0.0_f64, 0.0_f64, (0.0, 0.0));
+            let mut add = |found: f64, expected: f64| {
+                if expected > 0.0 {
+                    (chi, cells) = (chi + (found - expected).powi(2) / expected, cells + 1.0);
+                }
+            };
+            for (number, counts) in (0..).zip(&counts) {
+                let probability =
+                    if way == 0 { tree.probability(point, normal, number) } else { cut.probability(number) };
+                let expected = f64::from(probability) * N as f64;
+                if expected < 5.0 {
+                    few = (few.0 + counts[way], few.1 + expected);
+                } else {
+                    add(counts[way], expected);
+                }
+            }
+            if few.1 >= 5.0 {
+                add(few.0, few.1);
+            } else {
+                assert!(few.0 < 20.0, "{few:?}");
+            }
+            // Mean and variance of χ² are the cells less one, and twice that.
+            assert!(
+                cells > 10.0 && chi < cells + 4.5 * (2.0 * cells).sqrt(),
+                "{round} {way}: {chi} of {cells} cells"
+            );
+        }
+    }
+}
+
+#[test]
+fn lights_that_send_nothing_are_not_picked() {
+    // Over a floor: lamps under it, lamps that look away, spots that shine past the point.
+    let (point, normal) = (Vec3::ZERO, Vec3::Y);
+    let at = |x: f64, y: f64| DVec3::new(x, y, 0.5);
+    let point_at = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
+    let disk = |place, normal| {
+        let disk = Shape::Disk(Disk::new(place, normal, 0.05));
+        Light::Area(area_light(&disk, Vec3::ONE, 0).expect("it has an end"))
+    };
+    let spot =
+        |place, axis| Light::Spot(SpotLight { point: point_at(place), axis, half_angle: 0.3, blend: 0.2 });
+    let mut lights = Vec::new();
+    for i in 0..100 {
+        let x = f64::from(i) * 0.01 - 0.5;
+        lights.push(Light::Point(point_at(at(x, -1.0))));
+        lights.push(disk(at(x, 1.0), DVec3::Y));
+        lights.push(spot(at(x, 2.0), Vec3::Y));
+        lights.push(Light::Point(point_at(at(x, 1.5))));
+        lights.push(disk(at(x, 1.2), DVec3::NEG_Y));
+    }
+    let tree = tree_of(&lights);
+    let cut = Cut::new(&tree, point, normal);
+    let mut sum = 0.0;
+    for (number, _) in (0..).zip(&lights) {
+        let probability = cut.probability(number);
+        assert!((probability > 0.0) == (number % 5 > 2), "{number}: {probability}");
+        assert!(number % 5 > 2 || tree.probability(point, normal, number) == 0.0);
+        sum += probability;
+    }
+    // Hardly anything goes to nodes without light.
+    assert!(sum > 0.7, "{sum}");
+}
+
+#[test]
+fn what_is_nearer_and_stronger_is_picked_in_proportion() {
+    // Points straight above a floor: E = I/h².
+    let at = |height: f64, intensity: f32| {
+        let position = DVec3::new(0.0, height, 0.0);
+        Light::Point(PointLight { position, intensity: Vec3::splat(intensity), falloff: Falloff::Square })
+    };
+    let lights: Vec<Light> =
+        (0..200_u16).map(|i| at(1.0 + f64::from(i) * 0.05, f32::from(i % 3) + 1.0)).collect();
+    let tree = tree_of(&lights);
+    let cut = Cut::new(&tree, Vec3::ZERO, Vec3::Y);
+    let irradiance = |i: u32| (f64::from(i % 3) + 1.0) / (1.0 + f64::from(i) * 0.05).powi(2);
+    let total: f64 = (0..200).map(irradiance).sum();
+    for i in 0..200 {
+        let ratio = f64::from(cut.probability(i)) / (irradiance(i) / total);
+        assert!((0.8..1.25).contains(&ratio), "{i}: {ratio}");
+    }
+}
+
+#[test]
+fn bounds_around_lights_hold_all_of_them() {
+    let mut next = random::unit(11);
+    for _ in 0..200 {
+        let bounds: Vec<LightBounds> = lights_of(20, &mut next).iter().filter_map(Light::bounds).collect();
+        for space in [Space::Weakening, Space::Steady, Space::Beyond] {
+            let own: Vec<_> = bounds.iter().filter(|one| one.space == space).copied().collect();
+            let Some(all) = LightBounds::around(own.iter()) else { continue };
+            for one in &own {
+                let reach = (one.center - all.center).length() + one.radius;
+                assert!(reach <= all.radius * (1.0 + 1e-12), "{one:?} {all:?}");
+                // Any direction of the cone is in the cone around all.
+                let turned = one.cone.axis.dot(all.cone.axis).clamp(-1.0, 1.0).acos() + one.cone.cos.acos();
+                assert!(turned.min(std::f64::consts::PI).cos() >= all.cone.cos - 1e-9, "{one:?} {all:?}");
+                assert!(all.cone.edge >= one.cone.edge);
+            }
+        }
+    }
+    assert_eq!(LightBounds::around([].iter()), None);
+    assert!(Edge::Cosine > Edge::Sharp);
+}
+
+#[test]
+fn lights_in_one_place_and_lights_far_apart_have_a_tree() {
+    let point = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
+    let same: Vec<Light> = (0..5000).map(|_| Light::Point(point(DVec3::ONE))).collect();
+    // Each twice as far as the one before.
+    let apart: Vec<Light> =
+        (0..120).map(|i| Light::Point(point(DVec3::splat(1e-18 * 2_f64.powi(i))))).collect();
+    for lights in [same, apart] {
+        let tree = tree_of(&lights);
+        let sum: f32 = (0..lights.len() as u32).map(|i| tree.probability(Vec3::NEG_ONE, Vec3::ONE, i)).sum();
+        assert!((sum - 1.0).abs() < 1e-3, "{sum}");
+    }
+    assert_eq!(LightTree::new(&[None, None]), None);
+}
+
+/// A wide and a near mesh of uneven triangles.
+fn uneven_mesh(count: u32) -> MeshEmitter {
+    let mut next = random::signed(8);
+    let mut corner = |scale: f64| DVec3::new(f64::from(next()), f64::from(next()), f64::from(next())) * scale;
+    let triangles = (0..count).map(|i| {
+        let (place, size) = (corner(2.0), 0.02 * 1.5_f64.powi((i % 12) as i32));
+        ([place, place + corner(size), place + corner(size)], 2 * i)
+    });
+    MeshEmitter::new(triangles.collect()).expect("an area")
+}
+
+#[test]
+fn the_density_of_a_mesh_is_that_of_its_samples() {
+    for count in [20, 500] {
+        let mesh = uneven_mesh(count);
+        assert_eq!(mesh.tree().is_some(), count > 32);
+        let bounds = mesh.bounds();
+        let light = AreaLight {
+            shape: Emitter::Mesh(mesh),
+            radiance: Vec3::ONE,
+            object: 4,
+            part: Part::Listed,
+            bounds,
+        };
+        let (mut next, mut compared) = (random::unit(5), 0);
+        for _ in 0..2000 {
+            let (point, normal) = place(&mut next);
+            let Some(sample) = light.sample(point, normal, [next(), next()]) else { continue };
+            let crate::lights::End::At(target) = sample.end else { panic!("a mesh is somewhere") };
+            let crate::lights::Source::Primitive(4, primitive) = sample.source else {
+                panic!("a triangle of it")
+            };
+            let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };
+            let front = mesh.normal_of(primitive).expect("one of its triangles").as_vec3();
+            let met = crate::lights::Met {
+                direction: sample.direction,
+                distance: (target - point).length(),
+                normal: front,
+                primitive,
+            };
+            if front.dot(sample.direction) > -0.01 {
+                continue;
+            }
+            let product = light.pdf(point, normal, &met) * sample.weight.x;
+            assert!((product - 1.0).abs() < 5e-3, "{count}: {product}");
+            compared += 1;
+        }
+        assert!(compared > 500, "{count}: {compared}");
+    }
+}

@@ -1,0 +1,182 @@
+//! Many lights: what vertices pick of them adds up to what all of them send.
+
+use glimt::film::Rect;
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::integrators::View;
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{DirectionalLight, Falloff, Light, PointLight, Shadows, Shape, SpotLight};
+
+use super::global::by_paths;
+use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
+use super::{Random, mean_and_error, v};
+
+/// Lights that send nothing, so many that vertices pick from all.
+fn with_dark_lights(build: Build) -> Build {
+    (0..33).fold(build, |build, i| build.point_light(v(f64::from(i), 3.0, 0.0), 0.0, Falloff::Square))
+}
+
+/// The means of all pixels agree within 5 standard errors over seeds, which are at most this part of them.
+#[track_caller]
+fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), most_error: f64) {
+    let means = |build: &Build| -> Vec<f64> {
+        let world = build.world();
+        let (width, height) = (build.scene.render.width, build.scene.render.height);
+        let rect = Rect { x: 0, y: 0, width, height };
+        let mean = |seed| {
+            let picture = tile(&world, &build.settings(seed), rect, samples);
+            picture.iter().map(|c| c.element_sum() / 3.0).sum::<f64>() / picture.len() as f64
+        };
+        (0..seeds).map(mean).collect()
+    };
+    let ((a, of_a), (b, of_b)) = (mean_and_error(&means(a)), mean_and_error(&means(b)));
+    let error = of_a.hypot(of_b);
+    assert!(error < most_error * b, "{what}: ± {error} of {b} says nothing");
+    assert!((a - b).abs() < 5.0 * error + 1e-5 * b, "{what}: {a} ± {of_a} is not {b} ± {of_b}");
+}
+
+/// A floor with things on it, seen by a few pixels.
+fn room(floor: glimt::scene::description::Material) -> Build {
+    scene()
+        .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
+        .cuboid(v(-0.8, 0.5, 0.0), v(0.8, 1.0, 0.8), v(0.0, 20.0, 0.0), matte(0.6))
+        .sphere(v(0.7, 0.4, 0.3), 0.4, phong(0.3, 0.5, 40.0, 0.0))
+        .pictured(v(0.0, 2.5, 5.0), v(0.0, 0.3, 0.0), 40.0, 12, 12)
+}
+
+/// One light of each kind and more, at most 32.
+fn every_kind(build: Build) -> Build {
+    let at = v(1.5, 1.5, 1.0);
+    let shaped = build
+        .quad(v(-1.5, 2.0, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.2, 1.0), emitter(2.0))
+        .sphere(v(1.5, 1.2, -0.6), 0.2, emitter(6.0))
+        .cuboid(v(-2.0, 1.0, 0.8), v(0.3, 0.5, 0.3), v(0.0, 30.0, 10.0), emitter(3.0))
+        .triangle([v(0.0, 2.6, 0.0), v(0.2, 2.6, 0.6), v(0.7, 2.5, 0.0)], emitter(8.0))
+        .shape(Shape::Disk { center: at, normal: v(-1.0, -1.0, -0.6), radius: 0.3 }, emitter(4.0))
+        .mesh(lat_long_sphere(6, 8, 0.3, v(0.3, 1.6, -1.2)), AS_IT_IS, emitter(3.0))
+        .mesh(lat_long_sphere(3, 4, 0.2, v(-0.4, 1.8, 1.2)), AS_IT_IS, emitter(3.0))
+        .environment(0.1)
+        .point_light(v(0.5, 2.2, 1.5), 1.0, Falloff::Square)
+        .point_light(v(-1.5, 2.2, 1.5), 0.2, Falloff::None);
+    shaped.with(|scene| {
+        let point = |position, intensity: f32| PointLight {
+            position,
+            intensity: Vec3::splat(intensity),
+            falloff: Falloff::Square,
+        };
+        let spot =
+            SpotLight { point: point(v(2.0, 3.0, 0.0), 9.0), look_at: DVec3::ZERO, angle: 40.0, blend: 0.3 };
+        let sun = |angle, irradiance: f32| DirectionalLight {
+            direction: v(-0.5, -1.0, -0.3),
+            irradiance: Vec3::splat(irradiance),
+            angle,
+        };
+        scene.lights.extend([
+            Light::Spot(spot),
+            Light::Directional(sun(0.0, 0.3)),
+            Light::Directional(sun(20.0, 0.3)),
+        ]);
+    })
+}
+
+#[test]
+fn picks_among_lights_of_every_kind_bring_what_all_of_them_do() {
+    let build = every_kind(room(phong(0.4, 0.3, 200.0, 0.0)));
+    let picked = with_dark_lights(build.clone());
+    assert!(build.world().lights.tree().is_none() && picked.world().lights.tree().is_some());
+    for (shadows, samples) in [(Shadows::Soft, 1), (Shadows::Soft, 2), (Shadows::Hard, 1), (Shadows::Off, 1)]
+    {
+        let [all, some] = [&build, &picked].map(|build| build.clone().shadows(shadows, samples));
+        assert_same(&format!("whitted, {shadows:?}"), &some, &all, (16, 16), 4e-3);
+    }
+    for depth in [1, 3] {
+        let [all, some] = [&build, &picked].map(|build| by_paths(build.clone(), depth));
+        assert_same(&format!("path, depth {depth}"), &some, &all, (16, 24), 6e-3);
+    }
+    for view in [View::Specular, View::Diffuse] {
+        let [all, some] = [&build, &picked].map(|build| build.clone().viewed(view));
+        assert_same(&format!("{view:?}"), &some, &all, (64, 16), 1e-2);
+    }
+}
+
+#[test]
+fn picks_inside_glass_and_behind_mirrors_bring_what_all_lights_do() {
+    let build = every_kind(room(matte(0.5)).sphere(v(0.0, 0.5, 1.6), 0.5, glass(1.5))).quad(
+        v(-2.0, 0.0, -2.5),
+        v(4.0, 0.0, 0.0),
+        v(0.0, 2.0, 0.0),
+        mirror(0.8),
+    );
+    let picked = with_dark_lights(build.clone());
+    assert_same("whitted", &picked, &build, (32, 16), 4e-3);
+    assert_same("path", &by_paths(picked, 4), &by_paths(build, 4), (32, 24), 1.5e-2);
+}
+
+/// A lamp of two by two over the floor, as so many by so many quads.
+fn cut_lamp(build: Build, parts: u32) -> Build {
+    let side = 2.0 / f64::from(parts);
+    (0..parts * parts).fold(build, |build, i| {
+        let corner = v(-1.0 + side * f64::from(i % parts), 2.0, -1.0 + side * f64::from(i / parts));
+        build.quad(corner, v(side, 0.0, 0.0), v(0.0, 0.0, side), emitter(2.0))
+    })
+}
+
+#[test]
+fn a_lamp_that_is_cut_into_a_thousand_lights_as_before() {
+    for (what, floor) in [("matte", matte(0.7)), ("sharp", phong(0.2, 0.6, 300.0, 0.0))] {
+        let [whole, cut] = [1, 32].map(|parts| cut_lamp(room(floor.clone()), parts));
+        assert_same(&format!("whitted, {what}"), &cut, &whole, (16, 16), 3e-3);
+        assert_same(&format!("path, {what}"), &by_paths(cut, 3), &by_paths(whole, 3), (16, 24), 6e-3);
+    }
+}
+
+/// Triangles of sizes from 1 to 100 over the floor, most of them with their fronts down, some sideways.
+fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
+    let mut random = Random(4);
+    let triangle = |i: u32| {
+        let size = 0.004 * 10_f64.powf(2.0 * random.unit().powi(3));
+        let place = v(random.signed() * 1.5, 2.0 + 0.3 * random.unit(), random.signed() * 1.5);
+        let (a, b) = (random.direction() * size, random.direction() * size);
+        let (a, b) = if (a.cross(b).y < 0.0) == (i % 5 > 0) { (a, b) } else { (b, a) };
+        [place, place + a, place + b]
+    };
+    (0..count).map(triangle).collect()
+}
+
+#[test]
+fn a_mesh_of_thousands_of_uneven_lamps_lights_as_each_of_them_alone() {
+    let triangles = uneven_triangles(3000);
+    let rounded = |corner: DVec3| corner.as_vec3().as_dvec3();
+    let alone = triangles
+        .iter()
+        .fold(room(matte(0.7)), |build, corners| build.triangle(corners.map(rounded), emitter(20.0)));
+    let mesh = TriangleMesh {
+        positions: triangles.iter().flatten().map(|corner| corner.as_vec3()).collect(),
+        triangles: (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        ..TriangleMesh::default()
+    };
+    let mesh = room(matte(0.7)).mesh(mesh, AS_IT_IS, emitter(20.0));
+    assert!(mesh.world().lights.tree().is_none(), "a mesh is one light");
+    assert_same("whitted", &mesh.clone().shadows(Shadows::Soft, 8), &alone, (16, 16), 5e-3);
+    assert_same("path", &by_paths(mesh, 2), &by_paths(alone, 2), (16, 24), 1e-2);
+}
+
+#[test]
+fn a_hundred_points_over_a_floor_light_it_as_their_sum() {
+    // E = Σ I·cos/d², radiance ρ·E/π: picks are all that is random.
+    let mut random = Random(9);
+    let places: Vec<DVec3> =
+        (0..100).map(|_| v(random.signed() * 2.0, 1.0 + random.unit(), random.signed() * 2.0)).collect();
+    let floor = scene().quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), matte(0.7));
+    let floor = floor.seen(v(0.1, 0.5, 0.2), DVec3::ZERO);
+    let lit = places.iter().fold(floor, |build, &place| build.point_light(place, 0.5, Falloff::Square));
+    let exact: f64 =
+        places.iter().map(|d| 0.5 * d.y / d.length().powi(3)).sum::<f64>() * 0.7 / std::f64::consts::PI;
+    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+        let values = build.values(4, 64);
+        let (mean, error) = mean_and_error(&values);
+        assert!(error < 2e-3 * exact, "{what}: {error} of {exact}");
+        assert!((mean - exact).abs() < 4.5 * error, "{what}: {mean} ± {error} is not {exact}");
+        // Picks in proportion to what arrives: 128 of them scatter by a few hundredths at most.
+        assert!(error * 8.0 < 0.05 * exact, "{what}: {}", error * 8.0 / exact);
+    }
+}
