@@ -78,39 +78,50 @@ def glimt(binary, scene, samples, seed):
     return stages["render"]["seconds"], image.astype(np.float64)
 
 
-def compare(scene, binaries, rounds):
+def spread(pictures):
+    """The relMSE of one of some pictures to what a renderer computes, by how far they are apart: E|a - b|^2 is twice the variance."""
+    mean, variance = np.mean(pictures, axis=0), np.var(pictures, axis=0, ddof=1)
+    return float(np.mean(variance / (mean**2 + 0.01)))
+
+
+def compare(scene, binaries, rounds, by_spread):
     """Print the rows of a scene."""
     ways = {"Mitsuba": {}, "its light alone": LIGHT_ALONE} if scene.max_depth == 1 else {"Mitsuba": {}}
     loaded = {name: Mitsuba(scene, options) for name, options in ways.items()}
     by_glimt = lambda binary: lambda samples, seed: glimt(binary, scene, samples, seed)
     # Each is held to its own: Mitsuba lifts shadow rays off surfaces by a fixed epsilon, which moves the edges of shadows.
-    own = reference(scene, "mitsuba", list(loaded.values())[-1].render)
-    glimts = reference(scene, "glimt", by_glimt(binaries[0]))
-    if rounds > 0:
-        renderers = []
-        for name, mitsuba in loaded.items():
-            mitsuba.render(SAMPLES, 0)
-            renderers.append((name, mitsuba.render, own))
-        for binary in binaries:
-            renderers.append((Path(binary).name, by_glimt(binary), glimts))
-        results = [([], []) for _ in renderers]
-        for round_number in range(1, rounds + 1):
-            for (_, render, reference_picture), (seconds, errors) in zip(renderers, results):
-                taken, picture = render(SAMPLES, round_number)
-                seconds.append(taken)
-                errors.append(rel_mse(picture, reference_picture))
-        product = lambda result: statistics.median(result[0]) * statistics.mean(result[1])
-        for (name, *_), result in zip(renderers, results):
-            seconds, error = statistics.median(result[0]), statistics.mean(result[1])
-            ratio = product(result) / product(results[0])
-            print(f"{scene.name:18}{name:16}{seconds:9.3f}{error:10.2e}{seconds * error:10.2e}{ratio:12.2f}")
-        if scene.anchor is None:
+    own = glimts = None
+    if not by_spread:
+        own = reference(scene, "mitsuba", list(loaded.values())[-1].render)
+        glimts = reference(scene, "glimt", by_glimt(binaries[0]))
+    renderers = []
+    for name, mitsuba in loaded.items() if rounds > 0 else ():
+        mitsuba.render(SAMPLES, 0)
+        renderers.append((name, mitsuba.render, own))
+    for binary in binaries if rounds > 0 else ():
+        renderers.append((Path(binary).name, by_glimt(binary), glimts))
+    seconds, pictures = [[] for _ in renderers], [[] for _ in renderers]
+    for round_number in range(1, rounds + 1):
+        for (_, render, _), taken, seen in zip(renderers, seconds, pictures):
+            time_taken, picture = render(SAMPLES, round_number)
+            taken.append(time_taken)
+            seen.append(picture)
+    results = []
+    for (name, _, held_to), taken, seen in zip(renderers, seconds, pictures):
+        error = spread(seen) if by_spread else statistics.mean(rel_mse(picture, held_to) for picture in seen)
+        results.append((statistics.median(taken), error))
+        product, of_mitsuba = (result[0] * result[1] for result in (results[-1], results[0]))
+        figures = f"{results[-1][0]:9.3f}{error:10.2e}{product:10.2e}{product / of_mitsuba:12.2f}"
+        print(f"{scene.name:18}{name:16}{figures}", flush=True)
+    if results:
+        off = results[0][1] / scene.anchor - 1 if scene.anchor else None
+        if off is None:
             print(f"{scene.name}: no anchor")
-        else:
-            off = statistics.mean(results[0][1]) / scene.anchor - 1
-            if abs(off) > 0.1:
-                print(f"{scene.name}: no anchor, Mitsuba's relMSE is {off:+.0%} off {scene.anchor:.1e}")
+        elif abs(off) > 0.1:
+            print(f"{scene.name}: no anchor, Mitsuba's relMSE is {off:+.0%} off {scene.anchor:.1e}")
     # Brightness on the whole tells a lost or doubled part of the light, which noise hides pixel by pixel.
+    if by_spread:
+        own, glimts = np.mean(pictures[0], axis=0), np.mean(pictures[-1], axis=0)
     bias = np.mean(glimts) / np.mean(own) - 1
     print(f"{scene.name:18}{'references':16}{'':9}{rel_mse(glimts, own):10.2e}  apart, mean {bias:+.3%}", flush=True)
 
@@ -119,13 +130,15 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("names", nargs="*", help="scenes whose name contains one of these")
     parser.add_argument("--rounds", type=int, default=5, help="0: make the references alone")
+    by_spread = "errors by how far the rounds' pictures are apart, without references"
+    parser.add_argument("--spread", action="store_true", help=by_spread)
     parser.add_argument("--glimt", nargs="+", default=[ROOT / "target" / "release" / "glimt"])
     options = parser.parse_args()
     dr.set_thread_count(THREADS)
     print(f"{'':18}{'':16}{'seconds':>9}{'relMSE':>10}{'product':>10}{'to Mitsuba':>12}")
     for scene in SCENES:
         if not options.names or any(name in scene.name for name in options.names):
-            compare(scene, options.glimt, options.rounds)
+            compare(scene, options.glimt, options.rounds, options.spread)
 
 
 if __name__ == "__main__":

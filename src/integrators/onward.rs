@@ -37,10 +37,11 @@ impl Onward {
         Self { leads_on, is_risked: depth >= Self::SURE }
     }
 
-    /// The chance of a path to go on.
+    /// The chance of a path to go on: the root of what it carries, as its part of the variance is in proportion to the square of
+    /// that (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
     #[inline(always)]
     fn chance(self, carried: f32) -> f32 {
-        if self.is_risked & (carried < 1.0) { carried } else { 1.0 }
+        if self.is_risked & (carried < 1.0) { carried.sqrt() } else { 1.0 }
     }
 
     /// A path after a mirror or glass: it may end there, else it counts for those that do.
@@ -166,10 +167,16 @@ impl Shot<'_> {
 
     /// What a path brings of the radiance that comes from beyond the scene; light samples bring the rest.
     pub fn light_beyond(&self, path: &PathRay) -> Vec3 {
+        let environment = self.world.lights.environment();
+        self.light_beyond_with(environment.map(|environment| environment.arriving(path.ray.direction)), path)
+    }
+
+    /// The same where it is known what of the light from all around arrives, and the density of its samples.
+    pub fn light_beyond_with(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, density) = (&self.world.lights, path.history.density);
         let samples = self.settings.render.shadow_samples as f32;
         let share = |of_light: f32| if density > 0.0 { weight(of_light * samples / density) } else { 1.0 };
-        lights.beyond_by_density(path.ray.direction, share)
+        lights.beyond_with(sky, path.ray.direction, share)
     }
 
     /// [`Shot::lamp_radiance`] of a ray that leaves the scene.

@@ -97,11 +97,22 @@ impl Lights {
         !self.suns.is_empty() || self.environment.is_some()
     }
 
+    /// The light from all around.
+    pub fn environment(&self) -> Option<&Environment> {
+        self.environment.as_ref()
+    }
+
     /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by the density in
     /// sr⁻¹ of its samples from there.
     pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
+        let sky = self.environment.as_ref().map(|environment| environment.arriving(direction));
+        self.beyond_with(sky, direction, share)
+    }
+
+    /// The same where it is known what [`Environment::arriving`] says.
+    pub fn beyond_with(&self, sky: Option<(Vec3, f32)>, direction: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
         let suns = self.suns.iter().map(|sun| (sun.radiance(direction), sun.pdf(direction)));
-        let environment = self.environment.iter().map(|environment| environment.arriving(direction));
+        let environment = sky.into_iter();
         let seen = suns.chain(environment).filter(|(radiance, _)| *radiance != Vec3::ZERO);
         seen.map(|(radiance, density)| radiance * share(density)).sum()
     }

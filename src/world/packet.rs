@@ -5,7 +5,7 @@ use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::lights::SourceRow;
-use crate::math::lanes::{TRUE, bits};
+use crate::math::lanes::{TRUE, bits, take, take_u32};
 
 impl Geometry {
     /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
@@ -68,17 +68,18 @@ impl ClosestTest for Nearest<'_> {
         let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
         object.closest_rows(self.rows, met, &of_these(met, ends), &mut found);
-        for (lane, end) in ends.iter_mut().enumerate() {
-            let t = found.t[lane];
-            let is_nearer = (t < *end) | ((t == *end) & (id < self.object[lane]));
-            *end = if is_nearer { t } else { *end };
-            self.hits.t[lane] = if is_nearer { t } else { self.hits.t[lane] };
-            self.object[lane] = if is_nearer { id } else { self.object[lane] };
-            let (primitive, own) = (found.primitive[lane], self.hits.primitive[lane]);
-            self.hits.primitive[lane] = if is_nearer { primitive } else { own };
-            self.hits.u[lane] = if is_nearer { found.u[lane] } else { self.hits.u[lane] };
-            self.hits.v[lane] = if is_nearer { found.v[lane] } else { self.hits.v[lane] };
+        let mut nearer = [0; PACKET];
+        for lane in 0..PACKET {
+            let (t, end) = (found.t[lane], ends[lane]);
+            let is_nearer = (t < end) | ((t == end) & (id < self.object[lane]));
+            nearer[lane] = if is_nearer { TRUE } else { 0 };
         }
+        take(&nearer, &found.t, ends);
+        take(&nearer, &found.t, &mut self.hits.t);
+        take(&nearer, &found.u, &mut self.hits.u);
+        take(&nearer, &found.v, &mut self.hits.v);
+        take_u32(&nearer, &found.primitive, &mut self.hits.primitive);
+        take_u32(&nearer, &[id; PACKET], &mut self.object);
     }
 }
 
