@@ -100,7 +100,9 @@ class Scene:
         def add(kind, number, shape, material):
             diffuse, emission = lobes(self.materials[material])
             if isinstance(diffuse, str):
-                reflectance = {"type": "bitmap", "filename": str(assets / diffuse)}
+                # Its v = 0 is at the top row.
+                upright = t().scale([1, -1, 1])
+                reflectance = {"type": "bitmap", "filename": str(assets / diffuse), "to_uv": upright}
             else:
                 reflectance = rgb(diffuse)
             shape["bsdf"] = {"type": "twosided", "b": {"type": "diffuse", "reflectance": reflectance}}
@@ -178,7 +180,7 @@ SCENES = [
         spheres=BALLS,
         points=[([2.5, 5, 3], [60, 60, 60])],
     ),
-    Scene(name="A all light", anchor=5.5e-4, boxes=BLOCKS, max_depth=DEPTH, **BOX),
+    Scene(name="A all light", anchor=5.5e-4, boxes=BLOCKS, max_depth=6, **BOX),
     Scene(
         name="C lens",
         anchor=None,

@@ -137,7 +137,21 @@ mod tests {
     use std::collections::HashSet;
 
     use super::*;
+    use crate::geometry::ShapeHit;
     use crate::sampling::CAMERA_PATH;
+
+    #[test]
+    fn places_are_together_by_object_and_in_order() {
+        let hit = |object: u32| (object != 9).then_some(Hit { shape: ShapeHit::at(1.0), object });
+        let hits: Vec<Option<Hit>> = [5, 9, 0, 5, 63, 9, 0, 5].map(hit).to_vec();
+        let mut by_object = ByObject::default();
+        for _ in 0..2 {
+            by_object.sort(&hits);
+            assert_eq!(by_object.places(), [2, 6, 0, 3, 7, 4, 1, 5]);
+        }
+        by_object.sort(&[]);
+        assert!(by_object.places().is_empty());
+    }
 
     fn numbered(path: u32) -> PathRay {
         let ray = Ray::new(Vec3::ZERO, Vec3::Z);

@@ -107,7 +107,7 @@ impl Divisor {
     /// large number. For all quotients with divisors of up to 2¹⁹, and all below 2³¹: the half is then further off than rounding.
     #[inline(always)]
     fn quotient(self, number: u32) -> u32 {
-        const LARGE: f64 = (1_u64 << 52) as f64;
+        const LARGE: f64 = (3_u64 << 51) as f64;
         ((f64::from(number) + 0.5) * self.inverse - 0.5 + LARGE).to_bits() as u32
     }
 }

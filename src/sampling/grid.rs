@@ -163,6 +163,27 @@ mod tests {
     }
 
     #[test]
+    fn every_number_leads_to_the_last_share_that_starts_before_it() {
+        for count in [1_usize, 2, 3, 7, 64, 1000] {
+            let weight = |i: usize| match i % 5 {
+                0 | 3 => 0.0,
+                1 => 1.0,
+                _ => 1e-3 * (i * i) as f64,
+            };
+            let mut sums = Vec::new();
+            add_sums(&(0..count).map(|i| weight(i + 1)).collect::<Vec<_>>(), &mut sums);
+            let guide: Vec<u32> = guide(&sums).collect();
+            let borders =
+                sums[..count].iter().flat_map(|&sum| [sum.next_down().max(0.0), sum, sum.next_up()]);
+            let even = (0..10_000).map(|i| i as f32 / 1e4);
+            for u in borders.chain(even).filter(|u| *u < 1.0) {
+                let expected = (0..count).rev().find(|&i| sums[i] <= u).expect("the first starts at 0");
+                assert_eq!(find(&sums, &guide, u).0, expected, "{u} of {count}");
+            }
+        }
+    }
+
+    #[test]
     fn nothing_is_no_distribution() {
         assert_eq!(Grid::new(2, [vec![0.0, 0.0]].into_iter()), None);
         assert_eq!(Grid::new(2, std::iter::empty()), None);
