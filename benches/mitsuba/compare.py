@@ -15,15 +15,17 @@ import mitsuba as mi
 import numpy as np
 
 mi.set_variant("llvm_ad_rgb")
+import assets  # noqa: E402
 from scenes import SCENES  # noqa: E402
 
 HOME = Path(os.environ["GLIMT_MITSUBA_HOME"])
 ROOT = Path(__file__).resolve().parent.parent.parent
 THREADS = 2
 SAMPLES = 256
-# Mitsuba as it comes samples the light and the BSDF; told that the light is enough, it does half of the work.
-INTEGRATORS = {"Mitsuba": {}, "its light alone": {"emitter_samples": 1, "bsdf_samples": 0}}
-REFERENCE = (24, 1024)  # renders, of as many samples
+# Mitsuba's direct light as it comes samples the light and the BSDF; told that the light is enough, it does half of the work.
+LIGHT_ALONE = {"emitter_samples": 1, "bsdf_samples": 0}
+# Renders of a reference, of as many samples: of direct light, which is soon done, and of paths.
+DIRECT_REFERENCE, PATH_REFERENCE = (24, 1024), (16, 1024)
 
 
 def rel_mse(picture, reference):
@@ -34,8 +36,8 @@ def rel_mse(picture, reference):
 class Mitsuba:
     """One scene, loaded once."""
 
-    def __init__(self, scene, integrator):
-        self.scene = mi.load_dict(scene.mitsuba(mi, integrator))
+    def __init__(self, scene, options):
+        self.scene = mi.load_dict(scene.mitsuba(mi, assets.directory(HOME), options))
 
     def render(self, samples, seed):
         """Seconds and the picture; the caller has rendered once before, which compiles."""
@@ -47,13 +49,20 @@ class Mitsuba:
 
 
 def reference(scene, renderer, render):
-    """The mean of many of a renderer's own pictures, kept in a file: delete it when what the renderer computes changes."""
-    key = hashlib.sha256(scene.toml(*REFERENCE).encode()).hexdigest()[:16]
-    file = HOME / f"reference-{renderer}-{key}.npy"
-    if not file.exists():
-        count, samples = REFERENCE
-        np.save(file, np.mean([render(samples, 1000 + i)[1] for i in range(count)], axis=0))
-    return np.load(file)
+    """The mean of many of a renderer's own pictures, kept in a file, also while they are not yet all: delete it when what the
+    renderer computes changes."""
+    count, samples = DIRECT_REFERENCE if scene.max_depth == 1 else PATH_REFERENCE
+    key = hashlib.sha256(scene.toml(count, samples, assets.directory(HOME)).encode()).hexdigest()[:16]
+    file = HOME / f"reference-{renderer}-{key}.npz"
+    pictures, total = 0, 0.0
+    if file.exists():
+        kept = np.load(file)
+        pictures, total = int(kept["pictures"]), kept["total"]
+    for number in range(pictures, count):
+        total = total + render(samples, 1000 + number)[1]
+        np.savez(HOME / "unfinished.npz", pictures=number + 1, total=total)
+        (HOME / "unfinished.npz").rename(file)
+    return total / count
 
 
 def glimt(binary, scene, samples, seed):
@@ -61,7 +70,7 @@ def glimt(binary, scene, samples, seed):
     folder = HOME / "out"
     folder.mkdir(exist_ok=True)
     file, picture, report = folder / "scene.toml", folder / "picture.exr", folder / "report.json"
-    file.write_text(scene.toml(samples, seed))
+    file.write_text(scene.toml(samples, seed, assets.directory(HOME)))
     command = [binary, "--once", file, "-o", picture, "--report", report, "--threads", str(THREADS)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     stages = {stage["name"]: stage for stage in json.loads(report.read_text())["stages"]}
@@ -69,44 +78,67 @@ def glimt(binary, scene, samples, seed):
     return stages["render"]["seconds"], image.astype(np.float64)
 
 
+def spread(pictures):
+    """The relMSE of one of some pictures to what a renderer computes, by how far they are apart: E|a - b|^2 is twice the variance."""
+    mean, variance = np.mean(pictures, axis=0), np.var(pictures, axis=0, ddof=1)
+    return float(np.mean(variance / (mean**2 + 0.01)))
+
+
+def compare(scene, binaries, rounds, by_spread):
+    """Print the rows of a scene."""
+    ways = {"Mitsuba": {}, "its light alone": LIGHT_ALONE} if scene.max_depth == 1 else {"Mitsuba": {}}
+    loaded = {name: Mitsuba(scene, options) for name, options in ways.items()}
+    by_glimt = lambda binary: lambda samples, seed: glimt(binary, scene, samples, seed)
+    # Each is held to its own: Mitsuba lifts shadow rays off surfaces by a fixed epsilon, which moves the edges of shadows.
+    own = glimts = None
+    if not by_spread:
+        own = reference(scene, "mitsuba", list(loaded.values())[-1].render)
+        glimts = reference(scene, "glimt", by_glimt(binaries[0]))
+    renderers = []
+    for name, mitsuba in loaded.items() if rounds > 0 else ():
+        mitsuba.render(SAMPLES, 0)
+        renderers.append((name, mitsuba.render, own))
+    for binary in binaries if rounds > 0 else ():
+        renderers.append((Path(binary).name, by_glimt(binary), glimts))
+    seconds, pictures = [[] for _ in renderers], [[] for _ in renderers]
+    for round_number in range(1, rounds + 1):
+        for (_, render, _), taken, seen in zip(renderers, seconds, pictures):
+            time_taken, picture = render(SAMPLES, round_number)
+            taken.append(time_taken)
+            seen.append(picture)
+    results = []
+    for (name, _, held_to), taken, seen in zip(renderers, seconds, pictures):
+        error = spread(seen) if by_spread else statistics.mean(rel_mse(picture, held_to) for picture in seen)
+        results.append((statistics.median(taken), error))
+        product, of_mitsuba = (result[0] * result[1] for result in (results[-1], results[0]))
+        figures = f"{results[-1][0]:9.3f}{error:10.2e}{product:10.2e}{product / of_mitsuba:12.2f}"
+        print(f"{scene.name:18}{name:16}{figures}", flush=True)
+    if results:
+        off = results[0][1] / scene.anchor - 1 if scene.anchor else None
+        if off is None:
+            print(f"{scene.name}: no anchor")
+        elif abs(off) > 0.1:
+            print(f"{scene.name}: no anchor, Mitsuba's relMSE is {off:+.0%} off {scene.anchor:.1e}")
+    # Brightness on the whole tells a lost or doubled part of the light, which noise hides pixel by pixel.
+    if by_spread:
+        own, glimts = np.mean(pictures[0], axis=0), np.mean(pictures[-1], axis=0)
+    bias = np.mean(glimts) / np.mean(own) - 1
+    print(f"{scene.name:18}{'references':16}{'':9}{rel_mse(glimts, own):10.2e}  apart, mean {bias:+.3%}", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("names", nargs="*", help="scenes whose name contains one of these")
-    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--rounds", type=int, default=5, help="0: make the references alone")
+    by_spread = "errors by how far the rounds' pictures are apart, without references"
+    parser.add_argument("--spread", action="store_true", help=by_spread)
     parser.add_argument("--glimt", nargs="+", default=[ROOT / "target" / "release" / "glimt"])
     options = parser.parse_args()
     dr.set_thread_count(THREADS)
-    print(f"{'':16}{'':16}{'seconds':>9}{'relMSE':>10}{'product':>10}{'to Mitsuba':>12}")
+    print(f"{'':18}{'':16}{'seconds':>9}{'relMSE':>10}{'product':>10}{'to Mitsuba':>12}")
     for scene in SCENES:
-        if options.names and not any(name in scene.name for name in options.names):
-            continue
-        loaded = {name: Mitsuba(scene, integrator) for name, integrator in INTEGRATORS.items()}
-        by_glimt = lambda binary: lambda samples, seed: glimt(binary, scene, samples, seed)
-        # Each is held to its own: Mitsuba lifts shadow rays off surfaces by a fixed epsilon, which moves the edges of shadows.
-        own = reference(scene, "mitsuba", loaded["its light alone"].render)
-        glimts = reference(scene, "glimt", by_glimt(options.glimt[0]))
-        renderers = []
-        for name, mitsuba in loaded.items():
-            mitsuba.render(SAMPLES, 0)
-            renderers.append((name, mitsuba.render, own))
-        for binary in options.glimt:
-            renderers.append((Path(binary).name, by_glimt(binary), glimts))
-        results = [([], []) for _ in renderers]
-        for round_number in range(1, options.rounds + 1):
-            for (_, render, reference_picture), (seconds, errors) in zip(renderers, results):
-                taken, picture = render(SAMPLES, round_number)
-                seconds.append(taken)
-                errors.append(rel_mse(picture, reference_picture))
-        product = lambda result: statistics.median(result[0]) * statistics.mean(result[1])
-        for (name, *_), result in zip(renderers, results):
-            seconds, error = statistics.median(result[0]), statistics.mean(result[1])
-            ratio = product(result) / product(results[0])
-            print(f"{scene.name:16}{name:16}{seconds:9.3f}{error:10.2e}{seconds * error:10.2e}{ratio:12.2f}")
-        print(f"{scene.name:16}{'references':16}{'':9}{rel_mse(glimts, own):10.2e}  apart")
-        off = statistics.mean(results[0][1]) / scene.anchor - 1
-        if abs(off) > 0.1:
-            print(f"{scene.name}: does not count, Mitsuba's relMSE is {off:+.0%} off its anchor {scene.anchor:.1e}")
-        sys.stdout.flush()
+        if not options.names or any(name in scene.name for name in options.names):
+            compare(scene, options.glimt, options.rounds, options.spread)
 
 
 if __name__ == "__main__":

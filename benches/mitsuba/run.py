@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """glimt beside Mitsuba 3 (llvm, multijitter): seconds x relMSE of the same scenes, in one run.
 
-    python3 benches/mitsuba/run.py [NAME...] [--rounds N] [--glimt BINARY...]
+    python3 benches/mitsuba/run.py [NAME...] [--rounds N] [--spread] [--glimt BINARY...]
+
+Errors are those to references, which take minutes to make and are kept; `--spread` takes the rounds' pictures alone.
 
 Makes an environment of its own in target/mitsuba: Mitsuba by pip, and Debian's LLVM by `apt-get download` where
 DRJIT_LIBLLVM_PATH names none. glimt is target/release/glimt, which has to be built; several binaries are compared.

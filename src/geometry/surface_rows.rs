@@ -4,7 +4,7 @@ use super::rows::{HitRows, PACKET, RayRows};
 use super::surface::error;
 use super::{RayF64, Shape, ShapeHit};
 use crate::math::DVec3;
-use crate::math::lanes::{Lanes3, set_lane};
+use crate::math::lanes::{Lanes3, set_lane, take, truths};
 
 /// What of [`SurfacePoint`](super::SurfacePoint)s lights need, side by side; without shading normals.
 #[derive(Clone, Debug)]
@@ -68,19 +68,11 @@ impl SurfaceRow {
             set_lane(&mut found.error, lane, error(point, reach));
             set_lane(&mut found.normal, lane, normal.normalize().as_vec3());
         }
-        self.take(&found.point, of, |own| &mut own.point);
-        self.take(&found.error, of, |own| &mut own.error);
-        self.take(&found.normal, of, |own| &mut own.normal);
-    }
-
-    #[inline(always)]
-    fn take(&mut self, found: &Lanes3, of: u32, part: impl Fn(&mut Self) -> &mut Lanes3) {
-        let own = part(self);
+        let of = truths(of);
         for axis in 0..3 {
-            for lane in 0..PACKET {
-                let is_of = of & 1 << lane != 0;
-                own[axis][lane] = if is_of { found[axis][lane] } else { own[axis][lane] };
-            }
+            take(&of, &found.point[axis], &mut self.point[axis]);
+            take(&of, &found.error[axis], &mut self.error[axis]);
+            take(&of, &found.normal[axis], &mut self.normal[axis]);
         }
     }
 }

@@ -147,6 +147,12 @@ mod tests {
                     let place = block.place(first + lane as u32);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");
                 }
+                let slots = std::array::from_fn(|lane| first + 7 * lane as u32);
+                let (xs, ys, samples) = block.places_of(&slots);
+                for lane in 0..PACKET {
+                    let place = block.place(slots[lane]);
+                    assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + 7 * {lane}");
+                }
             }
         }
     }

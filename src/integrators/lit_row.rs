@@ -89,15 +89,7 @@ impl LitRow {
         for i in 0..LANES {
             is_run &= slots[i] == slots[0] + i as u32;
         }
-        let (xs, ys, samples) = if is_run {
-            block.places(slots[0])
-        } else {
-            let [mut xs, mut ys, mut samples] = [[0; LANES]; 3];
-            for i in (0..LANES).filter(|i| self.used & 1 << i != 0) {
-                (xs[i], ys[i], samples[i]) = block.place(slots[i]);
-            }
-            (xs, ys, samples)
-        };
+        let (xs, ys, samples) = if is_run { block.places(slots[0]) } else { block.places_of(slots) };
         SamplerRow::new(shot.settings.render.seed, &xs, &ys, &samples)
     }
 

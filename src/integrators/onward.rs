@@ -37,10 +37,11 @@ impl Onward {
         Self { leads_on, is_risked: depth >= Self::SURE }
     }
 
-    /// The chance of a path to go on.
+    /// The chance of a path to go on: the root of what it carries, as its part of the variance is in proportion to the square of
+    /// that (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
     #[inline(always)]
     fn chance(self, carried: f32) -> f32 {
-        if self.is_risked & (carried < 1.0) { carried } else { 1.0 }
+        if self.is_risked & (carried < 1.0) { carried.sqrt() } else { 1.0 }
     }
 
     /// A path after a mirror or glass: it may end there, else it counts for those that do.
@@ -171,28 +172,42 @@ impl Shot<'_> {
 
     /// What a path brings of the radiance that comes from beyond the scene; light samples bring the rest.
     pub fn light_beyond(&self, path: &PathRay) -> Vec3 {
+        let environment = self.world.lights.environment();
+        self.light_beyond_with(environment.map(|environment| environment.arriving(path.ray.direction)), path)
+    }
+
+    /// The same where it is known what of the light from all around arrives, and the density of its samples.
+    pub fn light_beyond_with(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, density) = (&self.world.lights, path.history.density);
         let samples = self.settings.render.shadow_samples as f32;
         if !(density > 0.0) {
-            return lights.beyond_by_density(path.ray.direction, |_, _| 1.0);
+            return lights.beyond_with(sky, path.ray.direction, |_, _| 1.0);
         }
-        self.shared_beyond(&path.ray, path.history.normal, |of_light| weight(of_light * samples / density))
+        let share = |of_light: f32| weight(of_light * samples / density);
+        self.shared_beyond(sky, &path.ray, path.history.normal, share)
     }
 
     /// [`Shot::lamp_radiance`] of a ray that leaves the scene.
     pub fn radiance_beyond(&self, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
-        self.shared_beyond(ray, normal, |of_light| weight(of_light / density))
+        let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
+        self.shared_beyond(sky, ray, normal, |of_light| weight(of_light / density))
     }
 
-    /// What a ray sees that leaves the scene from a surface with this normal; of each light the share that is given by the
-    /// density of its samples.
-    fn shared_beyond(&self, ray: &Ray, normal: Vec3, share: impl Fn(f32) -> f32) -> Vec3 {
+    /// What a ray sees that leaves the scene from a surface with this normal, where it is known what of the light from all around
+    /// arrives; of each light the share that is given by the density of its samples.
+    fn shared_beyond(
+        &self,
+        sky: Option<(Vec3, f32)>,
+        ray: &Ray,
+        normal: Vec3,
+        share: impl Fn(f32) -> f32,
+    ) -> Vec3 {
         let lights = &self.world.lights;
         if !lights.are_beyond() {
             return Vec3::ZERO;
         }
         let samples = lights.samples_at(ray.origin, normal);
-        lights.beyond_by_density(ray.direction, |number, density| share(density * samples.of(number)))
+        lights.beyond_with(sky, ray.direction, |number, density| share(density * samples.of(number)))
     }
 
     /// Density in sr⁻¹ of light samples that come from a hit, which has a normal, for each that a surface with a normal asks

@@ -11,25 +11,47 @@ use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
-use crate::math::lanes::{TRUE, bits, lane, set_lane};
+use crate::math::lanes::{Lanes, Lanes3, TRUE, bits, lane, set_lane, take, truths};
 use crate::sampling::CAMERA_PATH;
 use crate::world::{Hit, Loops, Object, PACKET};
 
 /// Rays that go through the scene together.
 #[derive(Clone, Copy)]
 pub enum Rays<'a> {
-    /// Those of the camera, from a slot on, so many.
-    Camera(&'a CameraRow, u32, usize),
-    /// Of a queue.
-    Paths(&'a [PathRay]),
+    /// Those of the camera, from a slot on, so many, from a place in the round's queue on.
+    Camera(&'a CameraRow, u32, usize, u32),
+    /// Of a queue, from a place on.
+    Paths(&'a [PathRay], u32),
+    /// Of a queue of which it is known what they hit: those at some places.
+    Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
 }
 
 impl Rays<'_> {
     /// How many.
     pub fn count(&self) -> usize {
         match self {
-            Self::Camera(_, _, count) => *count,
-            Self::Paths(paths) => paths.len(),
+            Self::Camera(_, _, count, _) => *count,
+            Self::Paths(paths, _) => paths.len(),
+            Self::Traced(_, _, places) => places.len(),
+        }
+    }
+
+    /// The place of a lane's path in the round's queue; any number where there is no path.
+    #[inline(always)]
+    pub fn place(&self, lane: usize) -> u32 {
+        match self {
+            Self::Camera(_, _, _, first) | Self::Paths(_, first) => first + lane as u32,
+            Self::Traced(_, _, places) => places.get(lane).copied().unwrap_or(0),
+        }
+    }
+
+    /// Of a queue: the path in a lane.
+    #[inline(always)]
+    fn of_queue(&self, lane: usize) -> Option<&PathRay> {
+        match self {
+            Self::Camera(..) => None,
+            Self::Paths(paths, _) => paths.get(lane),
+            Self::Traced(paths, _, places) => paths.get(*places.get(lane)? as usize),
         }
     }
 }
@@ -45,6 +67,8 @@ pub struct Met {
     pub plain: u32,
     /// A bit for each plain surface that sends out light towards the ray.
     pub shining: u32,
+    /// [`Environment::arriving_row`](crate::lights::Environment::arriving_row) where any ray meets nothing.
+    sky: (Lanes3, Lanes),
 }
 
 impl Met {
@@ -56,24 +80,29 @@ impl Met {
     /// One of the rays.
     pub fn path(&self, shot: &Shot<'_>, rays: &Rays<'_>, lane: usize) -> PathRay {
         match rays {
-            Rays::Camera(row, first, _) => shot.camera_path(row.rays.ray(lane), first + lane as u32),
-            Rays::Paths(paths) => paths[lane],
+            Rays::Camera(row, first, ..) => shot.camera_path(row.rays.ray(lane), first + lane as u32),
+            Rays::Paths(paths, _) => paths[lane],
+            Rays::Traced(paths, _, places) => paths[places[lane] as usize],
         }
+    }
+
+    /// Radiance that a ray sees of light from all around, which meets nothing, and the density in sr⁻¹ of samples from there.
+    pub fn sky(&self, lane_of_ray: usize) -> (Vec3, f32) {
+        (lane(&self.sky.0, lane_of_ray), self.sky.1[lane_of_ray])
     }
 }
 
 impl Shot<'_> {
-    /// What at most [`PACKET`] rays meet, whose places in the round's queue start at `first`. The plain surfaces are put into the
-    /// row, ready to be lit; those that reflect light are `used` in it.
-    pub fn meet(&self, rays: Rays<'_>, first: u32, measure: Measure, row: &mut LitRow) -> Met {
-        self.world.geometry.instructions().run(Meeting { shot: self, rays, first, measure, row })
+    /// What at most [`PACKET`] rays meet. The plain surfaces are put into the row, ready to be lit; those that reflect light are
+    /// `used` in it.
+    pub fn meet(&self, rays: Rays<'_>, measure: Measure, row: &mut LitRow) -> Met {
+        self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, row })
     }
 }
 
 struct Meeting<'a> {
     shot: &'a Shot<'a>,
     rays: Rays<'a>,
-    first: u32,
     measure: Measure,
     row: &'a mut LitRow,
 }
@@ -83,20 +112,21 @@ impl Loops for Meeting<'_> {
 
     #[inline(always)]
     fn run(self) -> Met {
-        let Self { shot, rays, first, measure, row } = self;
+        let Self { shot, rays, measure, row } = self;
         let world = shot.world;
         row.reset();
         let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
         let rows = match rays {
-            Rays::Camera(row, _, count) => {
+            Rays::Camera(row, _, count, _) => {
                 ends[..count].fill(f32::INFINITY);
                 traced = ((1_u64 << count) - 1) as u32;
                 &row.rays
             }
-            Rays::Paths(paths) => {
+            Rays::Paths(..) | Rays::Traced(..) => {
                 let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
-                for (lane, path) in paths.iter().enumerate().take(PACKET) {
+                for lane in 0..PACKET {
+                    let Some(path) = rays.of_queue(lane) else { break };
                     set_lane(&mut origin, lane, path.ray.origin);
                     set_lane(&mut direction, lane, path.ray.direction);
                     ends[lane] = path.ray.t_max;
@@ -106,15 +136,28 @@ impl Loops for Meeting<'_> {
                 &of_paths
             }
         };
-        let (hits, object) = world.geometry.closest_rows(rows, &mut ends, traced);
+        let (hits, object) = match rays {
+            Rays::Camera(..) | Rays::Paths(..) => world.geometry.closest_rows(rows, &mut ends, traced),
+            Rays::Traced(_, known, places) => {
+                let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
+                for (lane, &place) in places.iter().enumerate().take(PACKET) {
+                    if let Some(hit) = &known[place as usize] {
+                        hits.put(lane, &hit.shape);
+                        object[lane] = hit.object;
+                    }
+                }
+                (hits, object)
+            }
+        };
         let mut surface = SurfaceRow::EMPTY;
         let any = hits.any();
         let (mut left, mut plain, mut shining) = (any, 0, 0);
         let mut seen = !0;
         match rays {
             Rays::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
-            Rays::Paths(paths) => {
-                for (lane, path) in paths.iter().enumerate() {
+            Rays::Paths(..) | Rays::Traced(..) => {
+                for lane in 0..PACKET {
+                    let Some(path) = rays.of_queue(lane) else { break };
                     left &= if path.medium.is_air() { !0 } else { !(1 << lane) };
                     seen &= if path.history.is_seen { !0 } else { !(1 << lane) };
                 }
@@ -141,8 +184,13 @@ impl Loops for Meeting<'_> {
                 }
             }
         }
-        let front = if plain == 0 { 0 } else { row.place(&rays, first, rows, &surface) };
-        Met { hits, object, any, plain, shining: shining & front }
+        let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface) };
+        let all = ((1_u64 << rays.count()) - 1) as u32;
+        let sky = match world.lights.environment() {
+            Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
+            Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
+        };
+        Met { hits, object, any, plain, shining: shining & front, sky }
     }
 }
 
@@ -151,24 +199,20 @@ impl LitRow {
     #[inline(always)]
     fn set_bsdf(&mut self, of: u32, bsdf: &PhongBsdf, measure: Measure) {
         let [diffuse, specular] = bsdf_parts(bsdf, measure);
-        for lane in 0..PACKET {
-            let is_of = of & 1 << lane != 0;
-            for axis in 0..3 {
-                let (own, new) = (&mut self.diffuse[axis][lane], diffuse[axis]);
-                *own = if is_of { new } else { *own };
-                let (own, new) = (&mut self.specular[axis][lane], specular[axis]);
-                *own = if is_of { new } else { *own };
-            }
-            self.shininess[lane] = if is_of { bsdf.shininess } else { self.shininess[lane] };
-            self.albedos[0][lane] = if is_of { bsdf.diffuse.max_element() } else { self.albedos[0][lane] };
-            self.albedos[1][lane] = if is_of { bsdf.specular.max_element() } else { self.albedos[1][lane] };
+        let of = truths(of);
+        for axis in 0..3 {
+            take(&of, &[diffuse[axis]; PACKET], &mut self.diffuse[axis]);
+            take(&of, &[specular[axis]; PACKET], &mut self.specular[axis]);
         }
+        take(&of, &[bsdf.shininess; PACKET], &mut self.shininess);
+        take(&of, &[bsdf.diffuse.max_element(); PACKET], &mut self.albedos[0]);
+        take(&of, &[bsdf.specular.max_element(); PACKET], &mut self.albedos[1]);
         self.is_glossy |= bsdf.specular != Vec3::ZERO;
     }
 
     /// Where paths meet plain surfaces; a bit for each that comes to the front.
     #[inline(always)]
-    fn place(&mut self, paths: &Rays<'_>, first: u32, rays: &RayRows, surface: &SurfaceRow) -> u32 {
+    fn place(&mut self, paths: &Rays<'_>, rays: &RayRows, surface: &SurfaceRow) -> u32 {
         let mut front = [0; PACKET];
         self.medium = [0; PACKET];
         for i in 0..PACKET {
@@ -183,21 +227,25 @@ impl LitRow {
             set_lane(&mut self.mirrored_eye, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
         }
         match paths {
-            Rays::Camera(_, slot, _) => {
+            Rays::Camera(_, slot, ..) => {
                 self.throughput = [[1.0; PACKET]; 3];
                 self.path = [CAMERA_PATH + 1; PACKET];
                 self.carried = [1.0; PACKET];
                 for i in 0..PACKET {
-                    (self.slot[i], self.place[i]) = (slot + i as u32, first + i as u32);
+                    self.slot[i] = slot + i as u32;
                 }
             }
-            Rays::Paths(paths) => {
-                for (i, path) in paths.iter().enumerate().take(PACKET) {
+            Rays::Paths(..) | Rays::Traced(..) => {
+                for i in 0..PACKET {
+                    let Some(path) = paths.of_queue(i) else { break };
                     set_lane(&mut self.throughput, i, path.throughput);
                     self.carried[i] = path.history.carried;
-                    (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, first + i as u32);
+                    (self.slot[i], self.path[i]) = (path.slot, path.path);
                 }
             }
+        }
+        for i in 0..PACKET {
+            self.place[i] = paths.place(i);
         }
         bits(front)
     }

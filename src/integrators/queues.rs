@@ -77,8 +77,45 @@ pub struct Queues {
     pub lit: LitQueue,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
+    /// Their order by what they hit.
+    pub by_object: ByObject,
     /// What is near to a hit of glass.
     pub crossing: CrossingMemory,
+}
+
+/// Places in a queue, those together whose rays hit the same object, so that packets of them are shaded by few loops.
+#[derive(Default)]
+pub struct ByObject {
+    places: Vec<u32>,
+}
+
+impl ByObject {
+    /// Objects are told apart by so many of their last bits.
+    const KINDS: usize = 64;
+
+    /// Of these hits; what hits nothing is last, and what is alike in the order of the queue.
+    pub fn sort(&mut self, hits: &[Option<Hit>]) {
+        let kind = |hit: &Option<Hit>| hit.map_or(Self::KINDS, |hit| hit.object as usize % Self::KINDS);
+        let mut starts = [0_u32; Self::KINDS + 2];
+        for hit in hits {
+            starts[kind(hit) + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        self.places.clear();
+        self.places.resize(hits.len(), 0);
+        for (place, hit) in (0..).zip(hits) {
+            let start = &mut starts[kind(hit)];
+            self.places[*start as usize] = place;
+            *start += 1;
+        }
+    }
+
+    /// Each place once.
+    pub fn places(&self) -> &[u32] {
+        &self.places
+    }
 }
 
 impl Queues {
@@ -102,7 +139,21 @@ mod tests {
     use std::collections::HashSet;
 
     use super::*;
+    use crate::geometry::ShapeHit;
     use crate::sampling::CAMERA_PATH;
+
+    #[test]
+    fn places_are_together_by_object_and_in_order() {
+        let hit = |object: u32| (object != 9).then_some(Hit { shape: ShapeHit::at(1.0), object });
+        let hits: Vec<Option<Hit>> = [5, 9, 0, 5, 63, 9, 0, 5].map(hit).to_vec();
+        let mut by_object = ByObject::default();
+        for _ in 0..2 {
+            by_object.sort(&hits);
+            assert_eq!(by_object.places(), [2, 6, 0, 3, 7, 4, 1, 5]);
+        }
+        by_object.sort(&[]);
+        assert!(by_object.places().is_empty());
+    }
 
     fn numbered(path: u32) -> PathRay {
         let ray = Ray::new(Vec3::ZERO, Vec3::Z);

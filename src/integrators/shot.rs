@@ -50,6 +50,22 @@ impl SampleBlock {
         (self.tile.x + x, self.tile.y + y, self.samples.start + sample)
     }
 
+    /// Columns, rows and sample numbers of slots; any where there is none.
+    #[inline(always)]
+    pub fn places_of(&self, slots: &[u32; PACKET]) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
+        let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
+        let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(self.tile.width));
+        for lane in 0..PACKET {
+            let pixel = by_samples.quotient(slots[lane]);
+            let y = by_width.quotient(pixel);
+            xs[lane] = self.tile.x.wrapping_add(pixel.wrapping_sub(y.wrapping_mul(self.tile.width)));
+            ys[lane] = self.tile.y.wrapping_add(y);
+            let first = pixel.wrapping_mul(self.samples.len() as u32);
+            samples[lane] = self.samples.start.wrapping_add(slots[lane].wrapping_sub(first));
+        }
+        (xs, ys, samples)
+    }
+
     /// Columns, rows and sample numbers of the slots from `first` on, also beyond the last.
     #[inline(always)]
     pub fn places(&self, first: u32) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
@@ -72,5 +88,26 @@ impl SampleBlock {
             }
         }
         (xs, ys, samples)
+    }
+}
+
+/// Divides whole numbers by one, without the instruction for that, which there is for one number at a time alone.
+#[derive(Clone, Copy)]
+struct Divisor {
+    inverse: f64,
+}
+
+impl Divisor {
+    #[inline(always)]
+    fn new(divisor: u32) -> Self {
+        Self { inverse: 1.0 / f64::from(divisor) }
+    }
+
+    /// Of what a half more gives, which lies off all whole numbers, the part before the point: rounded by the last digits of a
+    /// large number. For all quotients with divisors of up to 2¹⁹, and all below 2³¹: the half is then further off than rounding.
+    #[inline(always)]
+    fn quotient(self, number: u32) -> u32 {
+        const LARGE: f64 = (3_u64 << 51) as f64;
+        ((f64::from(number) + 0.5) * self.inverse - 0.5 + LARGE).to_bits() as u32
     }
 }

@@ -45,7 +45,7 @@ pub fn trace(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, crossing, camera, .. } = queues;
+    let Queues { rays, next, lit, crossing, camera, hits, by_object } = queues;
     next.clear();
     let is_path = match shot.settings.render.integrator {
         Integrator::Whitted => false,
@@ -61,7 +61,7 @@ pub fn trace(
         for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
             negative(first, row.negative);
             let count = (slots.end - first).min(PACKET as u32) as usize;
-            wave.shade_packet(Rays::Camera(row, first, count), first - slots.start)?;
+            wave.shade_packet(Rays::Camera(row, first, count, first - slots.start))?;
         }
     }
     wave.light()?;
@@ -69,8 +69,16 @@ pub fn trace(
     wave.next_round(rays);
     while !rays.is_empty() {
         wave.lit.expect(rays.len());
-        for (number, paths) in rays.chunks(PACKET).enumerate() {
-            wave.shade_packet(Rays::Paths(paths), (number * PACKET) as u32)?;
+        if wave.is_path {
+            shot.closest_hits(rays, hits)?;
+            by_object.sort(hits);
+            for places in by_object.places().chunks(PACKET) {
+                wave.shade_packet(Rays::Traced(rays, hits, places))?;
+            }
+        } else {
+            for (paths, first) in rays.chunks(PACKET).zip((0..).step_by(PACKET)) {
+                wave.shade_packet(Rays::Paths(paths, first))?;
+            }
         }
         let slots: &[PathRay] = rays;
         wave.light()?;
@@ -120,13 +128,13 @@ impl Wave<'_, '_> {
         self.begin_round();
     }
 
-    /// What each ray of a packet meets; its places in the round's queue start at `first`.
-    fn shade_packet(&mut self, rays: Rays<'_>, first: u32) -> Result<(), Cancelled> {
+    /// What each ray of a packet meets.
+    fn shade_packet(&mut self, rays: Rays<'_>) -> Result<(), Cancelled> {
         let shot = self.shot;
-        if (first as usize).is_multiple_of(POLL_INTERVAL) {
+        if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
             shot.token.check()?;
         }
-        let met = shot.meet(rays, first, self.sink.measure, self.lit.spare());
+        let met = shot.meet(rays, self.sink.measure, self.lit.spare());
         if self.depth < shot.settings.render.max_depth && self.sink.takes_reflected() {
             self.lit.keep();
         }
@@ -142,10 +150,13 @@ impl Wave<'_, '_> {
             match met.hit(lane) {
                 Some(hit) if met.plain & bit != 0 => self.add_own_light(&path, &hit, met.shining & bit != 0),
                 Some(hit) => {
-                    self.place = first + lane as u32;
+                    self.place = rays.place(lane);
                     self.shade(path, hit);
                 }
-                None => self.leave(&path),
+                None => {
+                    let sky = shot.world.lights.environment().map(|_| met.sky(lane));
+                    self.add_beyond(&path, shot.light_beyond_with(sky, &path));
+                }
             }
         }
         if self.lit.is_full() {
@@ -175,9 +186,12 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// The background lights nothing.
     fn leave(&mut self, path: &PathRay) {
-        let beyond = self.shot.light_beyond(path);
+        self.add_beyond(path, self.shot.light_beyond(path));
+    }
+
+    /// What a path meets beyond everything; the background lights nothing.
+    fn add_beyond(&mut self, path: &PathRay, beyond: Vec3) {
         if path.history.is_seen {
             let background = self.shot.settings.render.background;
             self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));

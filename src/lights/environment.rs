@@ -7,6 +7,7 @@ use super::sky::SkyMap;
 use super::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use super::{End, LightSample, Source};
 use crate::math::frame::Frame;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
@@ -24,6 +25,16 @@ pub enum Environment {
         /// Turns about +y, counterclockwise seen from above, in [0, 1).
         turn: f32,
     },
+}
+
+/// Ways for light from all around to arrive, side by side.
+pub struct SkyRow {
+    /// Unit directions to where it comes from.
+    pub directions: Lanes3,
+    /// [`LightSample::weight`].
+    pub weights: Lanes3,
+    /// One over the densities in sr⁻¹; 0 where nothing arrives.
+    pub inverse_densities: Lanes,
 }
 
 /// Density of samples of a constant radiance: they are those that the front of a surface sees.
@@ -58,7 +69,50 @@ impl Environment {
         }
     }
 
-    /// One over the density of a sample; 0 where there are none.
+    /// [`Environment::arriving`] from directions side by side.
+    #[inline(always)]
+    pub fn arriving_row(&self, directions: &Lanes3) -> (Lanes3, Lanes) {
+        match self {
+            Self::Constant(Vec3 { x, y, z }) => {
+                ([[*x; LANES], [*y; LANES], [*z; LANES]], [HEMISPHERE; LANES])
+            }
+            Self::Map { sky, factor, turn } => {
+                let (mut colors, densities) = sky.lookup_row(directions, *turn);
+                for i in 0..LANES {
+                    let color = lane(&colors, i) * *factor;
+                    set_lane(&mut colors, i, color);
+                }
+                (colors, densities)
+            }
+        }
+    }
+
+    /// Ways for its light to arrive at surfaces of these normals, side by side.
+    #[inline(always)]
+    pub fn sample_row(&self, normals: &Lanes3, u: &[Lanes; 2]) -> SkyRow {
+        let directions = match self {
+            Self::Constant(_) => {
+                let mut directions = [[0.0; LANES]; 3];
+                for i in 0..LANES {
+                    let frame = Frame::from_normal(lane(normals, i));
+                    set_lane(&mut directions, i, frame.to_world(warp::cone([u[0][i], u[1][i]], 1.0)));
+                }
+                directions
+            }
+            Self::Map { sky, turn, .. } => sky.sample_row(u, *turn),
+        };
+        let (mut weights, densities) = self.arriving_row(&directions);
+        let mut inverse_densities = [0.0; LANES];
+        for i in 0..LANES {
+            // At the edge of a dark cell rounding may lead into it.
+            inverse_densities[i] = if densities[i] > 0.0 { 1.0 / densities[i] } else { 0.0 };
+            let weight = lane(&weights, i) * inverse_densities[i];
+            set_lane(&mut weights, i, weight);
+        }
+        SkyRow { directions, weights, inverse_densities }
+    }
+
+    /// One over the density of its samples from a direction, in sr.
     #[inline(always)]
     pub fn inverse_density(&self, direction: Vec3) -> f32 {
         let (_, density) = self.arriving(direction);
@@ -67,22 +121,14 @@ impl Environment {
 
     /// A way for its light to arrive at a surface of this normal.
     pub fn sample(&self, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let (direction, weight) = self.arriving_at(normal, u);
-        let is_light = weight != Vec3::ZERO;
-        is_light.then_some(LightSample { end: End::Beyond, direction, weight, source: Source::Nothing })
-    }
-
-    /// A unit direction to where it comes from, and radiance over its density.
-    #[inline(always)]
-    pub fn arriving_at(&self, normal: Vec3, u: [f32; 2]) -> (Vec3, Vec3) {
         let direction = match self {
             Self::Constant(_) => Frame::from_normal(normal).to_world(warp::cone(u, 1.0)),
             Self::Map { sky, turn, .. } => sky.sample(u, *turn),
         };
         let (radiance, density) = self.arriving(direction);
-        // At the edge of a dark cell rounding may lead into it.
-        let inverse = if density > 0.0 { 1.0 / density } else { 0.0 };
-        (direction, radiance * inverse)
+        let weight = radiance * if density > 0.0 { 1.0 / density } else { 0.0 };
+        let is_light = weight != Vec3::ZERO;
+        is_light.then_some(LightSample { end: End::Beyond, direction, weight, source: Source::Nothing })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Samples of one light for a row of points.
 
 use super::emitter::{Arrival, Emitter};
+use super::environment::SkyRow;
 use super::{End, Light, LightSample, Source};
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
@@ -18,6 +19,8 @@ pub struct LightRow {
     pub sources: SourceRow,
     /// A bit for each whose light comes from beyond everything.
     pub beyond: u32,
+    /// One over the densities in sr⁻¹, of light from all around alone: others tell theirs when they are asked.
+    of_sky: Lanes,
 }
 
 /// [`Source`]s side by side.
@@ -96,6 +99,7 @@ impl LightRow {
             weights: [[0.0; LANES]; 3],
             sources: SourceRow::of(source),
             beyond: 0,
+            of_sky: [0.0; LANES],
         }
     }
 
@@ -156,7 +160,9 @@ impl Light {
             }
             Self::Directional(light) => return row_beyond!(i => light.arriving([u[0][i], u[1][i]])),
             Self::Environment(light) => {
-                return row_beyond!(i => light.arriving_at(lane(normals, i), [u[0][i], u[1][i]]));
+                let SkyRow { directions, weights, inverse_densities } = light.sample_row(normals, u);
+                let dark = LightRow::dark(Source::Nothing);
+                return LightRow { directions, weights, beyond: u32::MAX, of_sky: inverse_densities, ..dark };
             }
             Self::Area(light) => light,
         };
@@ -194,11 +200,7 @@ impl Light {
         match self {
             Self::Point(_) | Self::Spot(_) => {}
             Self::Directional(light) => inverse = [light.inverse_density(); LANES],
-            Self::Environment(light) => {
-                for i in 0..LANES {
-                    inverse[i] = light.inverse_density(lane(&samples.directions, i));
-                }
-            }
+            Self::Environment(_) => inverse = samples.of_sky,
             Self::Area(light) => {
                 let of_radiance = 1.0 / light.radiance.max_element();
                 for i in 0..LANES {

@@ -140,13 +140,29 @@ impl Lights {
         !self.suns.is_empty() || self.environment.is_some()
     }
 
+    /// The light from all around.
+    pub fn environment(&self) -> Option<&Environment> {
+        self.environment.as_ref().map(|(_, environment)| environment)
+    }
+
     /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by its number and
     /// the density in sr⁻¹ of its samples from there.
     pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
+        let sky = self.environment().map(|environment| environment.arriving(direction));
+        self.beyond_with(sky, direction, share)
+    }
+
+    /// The same where it is known what [`Environment::arriving`] says.
+    pub fn beyond_with(
+        &self,
+        sky: Option<(Vec3, f32)>,
+        direction: Vec3,
+        share: impl Fn(u32, f32) -> f32,
+    ) -> Vec3 {
         let suns =
             self.suns.iter().map(|(number, sun)| (*number, (sun.radiance(direction), sun.pdf(direction))));
-        let environment = self.environment.iter().map(|(number, light)| (*number, light.arriving(direction)));
-        let seen = suns.chain(environment).filter(|(_, (radiance, _))| *radiance != Vec3::ZERO);
+        let number = self.environment.iter().map(|(number, _)| *number);
+        let seen = suns.chain(number.zip(sky)).filter(|(_, (radiance, _))| *radiance != Vec3::ZERO);
         seen.map(|(number, (radiance, density))| radiance * share(number, density)).sum()
     }
 

@@ -7,6 +7,7 @@ use crate::materials::texels::Texels;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::elementary::{atan2, sin_cos};
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::grid::{Grid, InGrid};
 
 /// A map, top row at +y, the middle of it towards −z, its right quarter towards +x, with the distribution that its directions
@@ -83,13 +84,58 @@ impl SkyMap {
     /// A unit direction.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> Vec3 {
-        let InGrid { column, row, rest } = self.cells.sample(u);
+        self.direction(&self.cells.sample(u), turn)
+    }
+
+    #[inline(always)]
+    fn direction(&self, at: &InGrid, turn: f32) -> Vec3 {
+        let InGrid { column, row, rest } = *at;
         let extent = self.heights[row + 1] - self.heights[row];
-        let y = self.heights[row] + extent * f64::from(rest[1]);
+        self.towards(column as f32, self.heights[row] + extent * f64::from(rest[1]), rest[0], turn)
+    }
+
+    /// A unit direction of a height in a column, so far along it.
+    #[inline(always)]
+    fn towards(&self, column: f32, y: f64, along: f32, turn: f32) -> Vec3 {
         let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
-        let turns = (column as f32 + 0.5 + rest[0]) / self.texels.width as f32 - 0.5 - turn;
+        let turns = (column + 0.5 + along) / self.texels.width as f32 - 0.5 - turn;
         let (sin, cos) = sin_cos(2.0 * PI * turns);
         Vec3::new(across * sin, y as f32, -across * cos)
+    }
+
+    /// [`SkyMap::sample`] side by side. What is looked up is looked up between loops without branches.
+    #[inline(always)]
+    pub fn sample_row(&self, u: &[Lanes; 2], turn: f32) -> Lanes3 {
+        let (mut columns, mut along, mut heights) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let InGrid { column, row, rest } = self.cells.sample([u[0][i], u[1][i]]);
+            let extent = self.heights[row + 1] - self.heights[row];
+            heights[i] = self.heights[row] + extent * f64::from(rest[1]);
+            (columns[i], along[i]) = (column as f32, rest[0]);
+        }
+        let mut directions = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            set_lane(&mut directions, i, self.towards(columns[i], heights[i], along[i], turn));
+        }
+        directions
+    }
+
+    /// [`SkyMap::lookup`] side by side.
+    #[inline(always)]
+    pub fn lookup_row(&self, directions: &Lanes3, turn: f32) -> (Lanes3, Lanes) {
+        let (mut columns, mut rows, mut between) = ([0; LANES], [0; LANES], [[0.0; LANES]; 2]);
+        for i in 0..LANES {
+            let place = self.place(lane(directions, i), turn);
+            (columns[i], rows[i]) = (place.column, place.row);
+            (between[0][i], between[1][i]) = (place.between[0], place.between[1]);
+        }
+        let (mut colors, mut densities) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        for i in 0..LANES {
+            let place = Place { column: columns[i], row: rows[i], between: [between[0][i], between[1][i]] };
+            set_lane(&mut colors, i, self.color(&place));
+            densities[i] = self.density(&place);
+        }
+        (colors, densities)
     }
 
     #[inline(always)]

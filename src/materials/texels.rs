@@ -35,6 +35,7 @@ pub enum TexelData {
 
 impl Texels {
     /// Linear value of column `x`, row `y` from the top; both in range.
+    #[inline]
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
         let index = y as usize * self.width as usize + x as usize;
         match &self.data {

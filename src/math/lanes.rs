@@ -30,3 +30,49 @@ pub type Truths = [u32; LANES];
 
 /// What holds, in [`Truths`].
 pub const TRUE: u32 = u32::MAX;
+
+/// The lanes whose bits are set.
+#[inline(always)]
+pub fn truths(bits: u32) -> Truths {
+    let mut holds = [0; LANES];
+    for i in 0..LANES {
+        holds[i] = if bits & 1 << i != 0 { TRUE } else { 0 };
+    }
+    holds
+}
+
+/// Take other numbers in the lanes where something holds. By bits: of `if` and `else` compilers may choose between places in
+/// memory, one lane after the other.
+#[inline(always)]
+pub fn take(holds: &Truths, new: &Lanes, own: &mut Lanes) {
+    for i in 0..LANES {
+        own[i] = f32::from_bits(new[i].to_bits() & holds[i] | own[i].to_bits() & !holds[i]);
+    }
+}
+
+/// [`take`] of whole numbers.
+#[inline(always)]
+pub fn take_u32(holds: &Truths, new: &[u32; LANES], own: &mut [u32; LANES]) {
+    for i in 0..LANES {
+        own[i] = new[i] & holds[i] | own[i] & !holds[i];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_of_bits_are_taken() {
+        for expected in [0, 1, 0x8000, 0xffff, 0x1234, 0xa5a5] {
+            let holds = std::array::from_fn(|i| if expected >> i & 1 == 1 { TRUE } else { 0 });
+            assert_eq!(truths(expected), holds);
+            let (mut own, mut whole) = ([1.0; LANES], [1; LANES]);
+            take(&holds, &[f32::NAN; LANES], &mut own);
+            take_u32(&holds, &[7; LANES], &mut whole);
+            for (i, hold) in holds.iter().enumerate() {
+                assert_eq!((own[i].is_nan(), whole[i] == 7), (*hold == TRUE, *hold == TRUE));
+            }
+        }
+    }
+}

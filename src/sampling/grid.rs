@@ -9,6 +9,9 @@ pub struct Grid {
     rows: Vec<f32>,
     /// Of the columns in each row, `columns + 1` a row.
     in_row: Vec<f32>,
+    /// Where to start to look for a row, and for a column in each row: [`guide`].
+    row_guide: Vec<u32>,
+    column_guide: Vec<u32>,
 }
 
 /// A point of a grid.
@@ -34,14 +37,20 @@ impl Grid {
         }
         let mut rows = Vec::new();
         let total = add_sums(&totals, &mut rows);
-        (total > 0.0 && total.is_finite()).then_some(Self { columns, rows, in_row })
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let row_guide = guide(&rows).collect();
+        let column_guide = in_row.chunks(columns + 1).flat_map(guide).collect();
+        Some(Self { columns, rows, in_row, row_guide, column_guide })
     }
 
     /// The point that two numbers in [0, 1) lead to: the first along the row, the second to the row.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> InGrid {
-        let (row, across) = find(&self.rows, u[1]);
-        let (column, along) = find(self.columns_of(row), u[0]);
+        let (row, across) = find(&self.rows, &self.row_guide, u[1]);
+        let guide = &self.column_guide[row * self.columns..(row + 1) * self.columns];
+        let (column, along) = find(self.columns_of(row), guide, u[0]);
         InGrid { column, row, rest: [along, across] }
     }
 
@@ -80,15 +89,31 @@ fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     total
 }
 
-/// The share that `u` in [0, 1) falls on, and where in it, in [0, 1). Without branches: its way is another for each `u`.
+/// For each of as many equal parts of [0, 1) as there are shares, the one that its start falls on (Chen and Asau, *On Generating
+/// Random Variates from an Empirical Distribution*, 1974).
+fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
+    let (count, mut place) = (sums.len() - 1, 0);
+    (0..count).map(move |part| {
+        place = last_from(sums, place, part as f32 / count as f32);
+        place as u32
+    })
+}
+
+/// The last share that does not start beyond `u`, of those from one on.
 #[inline(always)]
-fn find(sums: &[f32], u: f32) -> (usize, f32) {
-    let (mut first, mut count) = (0, sums.len() - 1);
-    while count > 1 {
-        let half = count / 2;
-        first = if sums[first + half] <= u { first + half } else { first };
-        count -= half;
+fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
+    while place + 2 < sums.len() && sums[place + 1] <= u {
+        place += 1;
     }
+    place
+}
+
+/// The share that `u` in [0, 1) falls on, and where in it, in [0, 1).
+#[inline(always)]
+fn find(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
+    // Rounding may lead to the part after that of `u`.
+    let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
+    let first = last_from(sums, guide[part] as usize, u);
     let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);
     const LAST: f32 = 1.0_f32.next_down();
     (first, if rest < LAST { rest } else { LAST })
@@ -135,6 +160,27 @@ mod tests {
             assert!(probability > 1e-6, "{column}: {probability}");
         }
         assert!(grid.column_probability(0, 77) > 0.98);
+    }
+
+    #[test]
+    fn every_number_leads_to_the_last_share_that_starts_before_it() {
+        for count in [1_usize, 2, 3, 7, 64, 1000] {
+            let weight = |i: usize| match i % 5 {
+                0 | 3 => 0.0,
+                1 => 1.0,
+                _ => 1e-3 * (i * i) as f64,
+            };
+            let mut sums = Vec::new();
+            add_sums(&(0..count).map(|i| weight(i + 1)).collect::<Vec<_>>(), &mut sums);
+            let guide: Vec<u32> = guide(&sums).collect();
+            let borders =
+                sums[..count].iter().flat_map(|&sum| [sum.next_down().max(0.0), sum, sum.next_up()]);
+            let even = (0..10_000).map(|i| i as f32 / 1e4);
+            for u in borders.chain(even).filter(|u| *u < 1.0) {
+                let expected = (0..count).rev().find(|&i| sums[i] <= u).expect("the first starts at 0");
+                assert_eq!(find(&sums, &guide, u).0, expected, "{u} of {count}");
+            }
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET, traced};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::lights::SourceRow;
-use crate::math::lanes::{TRUE, Truths, bits};
+use crate::math::lanes::{TRUE, bits, take, take_u32};
 
 impl Geometry {
     /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
@@ -70,31 +70,19 @@ impl ClosestTest for Nearest<'_> {
         let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
         object.closest_rows(self.rows, met, &of_these(met, ends), &mut found);
-        let mut is_nearer = [0; PACKET];
+        let mut nearer = [0; PACKET];
         for lane in 0..PACKET {
             let (t, end) = (found.t[lane], ends[lane]);
-            let nearer = (t < end) | ((t == end) & (id < self.object[lane]));
-            is_nearer[lane] = if nearer { TRUE } else { 0 };
+            let is_nearer = (t < end) | ((t == end) & (id < self.object[lane]));
+            nearer[lane] = if is_nearer { TRUE } else { 0 };
         }
-        let hits = &mut self.hits;
-        *ends = chosen(&is_nearer, &found.t, ends);
-        hits.t = chosen(&is_nearer, &found.t, &hits.t);
-        hits.primitive = chosen(&is_nearer, &found.primitive, &hits.primitive);
-        hits.u = chosen(&is_nearer, &found.u, &hits.u);
-        hits.v = chosen(&is_nearer, &found.v, &hits.v);
-        self.object = chosen(&is_nearer, &[id; PACKET], &self.object);
+        take(&nearer, &found.t, ends);
+        take(&nearer, &found.t, &mut self.hits.t);
+        take(&nearer, &found.u, &mut self.hits.u);
+        take(&nearer, &found.v, &mut self.hits.v);
+        take_u32(&nearer, &found.primitive, &mut self.hits.primitive);
+        take_u32(&nearer, &[id; PACKET], &mut self.object);
     }
-}
-
-/// The first where something holds, the second elsewhere. One row after the other: a loop over several at once becomes a test of
-/// one lane after the other.
-#[inline(always)]
-fn chosen<T: Copy>(holds: &Truths, yes: &[T; PACKET], no: &[T; PACKET]) -> [T; PACKET] {
-    let mut own = *no;
-    for lane in 0..PACKET {
-        own[lane] = if holds[lane] != 0 { yes[lane] } else { no[lane] };
-    }
-    own
 }
 
 /// Looks for what is in the way of shadow rays.
