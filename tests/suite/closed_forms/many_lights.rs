@@ -34,13 +34,13 @@ fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), m
     assert!((a - b).abs() < 5.0 * error + 1e-5 * b, "{what}: {a} ± {of_a} is not {b} ± {of_b}");
 }
 
-/// A floor with things on it, seen by a few pixels.
+/// A floor with things on it, seen by a few pixels from below the lamps: their edges would be most of the noise.
 fn room(floor: glimt::scene::description::Material) -> Build {
     scene()
         .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
         .cuboid(v(-0.8, 0.5, 0.0), v(0.8, 1.0, 0.8), v(0.0, 20.0, 0.0), matte(0.6))
         .sphere(v(0.7, 0.4, 0.3), 0.4, phong(0.3, 0.5, 40.0, 0.0))
-        .pictured(v(0.0, 2.5, 5.0), v(0.0, 0.3, 0.0), 40.0, 12, 12)
+        .pictured(v(0.0, 1.3, 3.2), DVec3::ZERO, 30.0, 12, 12)
 }
 
 /// One light of each kind and more, at most 32.
@@ -86,11 +86,11 @@ fn picks_among_lights_of_every_kind_bring_what_all_of_them_do() {
     for (shadows, samples) in [(Shadows::Soft, 1), (Shadows::Soft, 2), (Shadows::Hard, 1), (Shadows::Off, 1)]
     {
         let [all, some] = [&build, &picked].map(|build| build.clone().shadows(shadows, samples));
-        assert_same(&format!("whitted, {shadows:?}"), &some, &all, (16, 16), 4e-3);
+        assert_same(&format!("whitted, {shadows:?}"), &some, &all, (64, 16), 4e-3);
     }
     for depth in [1, 3] {
         let [all, some] = [&build, &picked].map(|build| by_paths(build.clone(), depth));
-        assert_same(&format!("path, depth {depth}"), &some, &all, (16, 24), 6e-3);
+        assert_same(&format!("path, depth {depth}"), &some, &all, (64, 24), 6e-3);
     }
     for view in [View::Specular, View::Diffuse] {
         let [all, some] = [&build, &picked].map(|build| build.clone().viewed(view));
@@ -122,10 +122,10 @@ fn cut_lamp(build: Build, parts: u32) -> Build {
 
 #[test]
 fn a_lamp_that_is_cut_into_a_thousand_lights_as_before() {
-    for (what, floor) in [("matte", matte(0.7)), ("sharp", phong(0.2, 0.6, 300.0, 0.0))] {
+    for (what, floor, noise) in [("matte", matte(0.7), 1.0), ("sharp", phong(0.2, 0.6, 300.0, 0.0), 2.5)] {
         let [whole, cut] = [1, 32].map(|parts| cut_lamp(room(floor.clone()), parts));
-        assert_same(&format!("whitted, {what}"), &cut, &whole, (16, 16), 3e-3);
-        assert_same(&format!("path, {what}"), &by_paths(cut, 3), &by_paths(whole, 3), (16, 24), 6e-3);
+        assert_same(&format!("whitted, {what}"), &cut, &whole, (64, 16), 3e-3 * noise);
+        assert_same(&format!("path, {what}"), &by_paths(cut, 3), &by_paths(whole, 3), (64, 24), 6e-3 * noise);
     }
 }
 
@@ -156,8 +156,8 @@ fn a_mesh_of_thousands_of_uneven_lamps_lights_as_each_of_them_alone() {
     };
     let mesh = room(matte(0.7)).mesh(mesh, AS_IT_IS, emitter(20.0));
     assert!(mesh.world().lights.tree().is_none(), "a mesh is one light");
-    assert_same("whitted", &mesh.clone().shadows(Shadows::Soft, 8), &alone, (16, 16), 5e-3);
-    assert_same("path", &by_paths(mesh, 2), &by_paths(alone, 2), (16, 24), 1e-2);
+    assert_same("whitted", &mesh.clone().shadows(Shadows::Soft, 8), &alone, (64, 16), 5e-3);
+    assert_same("path", &by_paths(mesh, 2), &by_paths(alone, 2), (64, 24), 1e-2);
 }
 
 #[test]
