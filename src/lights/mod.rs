@@ -34,6 +34,8 @@ pub use tree::{Cut, LightBounds, LightTree, Pick};
 use crate::math::Vec3;
 
 /// A light of any kind.
+// Most lights of a scene are shapes; they lie side by side.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
     /// Without extent.
