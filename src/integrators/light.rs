@@ -7,7 +7,7 @@ use super::shot::Shot;
 use super::view::Measure;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{LightRow, Middle, Source, SourceRow};
+use crate::lights::{LightRow, Middle, Pattern, Source, SourceRow};
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
@@ -35,6 +35,8 @@ pub struct LightRays {
     pub shadow: u64,
     /// In lobes.
     pub scattered: u64,
+    /// Look-ups of the lamps' textures.
+    pub lookups: u64,
 }
 
 /// What of the light that arrives at the vertices of a row gets to the eye.
@@ -90,6 +92,10 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32);
+                    if let Some(pattern) = light.pattern() {
+                        values = self.tinted(pattern, &samples, active, values);
+                        sums.rays.lookups += u64::from(active.count_ones());
+                    }
                     if WEIGHED {
                         values = self.others.left(self.row, light, &samples, values, count);
                     }
@@ -126,6 +132,23 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         values
     }
 
+    /// What samples of a lamp bring by the colours of the lamp at their points.
+    #[cold]
+    #[inline(never)]
+    fn tinted(&self, pattern: &Pattern, samples: &LightRow, active: u32, mut values: Lanes3) -> Lanes3 {
+        for i in lanes(active) {
+            let color = pattern.at(lane(&samples.targets, i), samples.sources.part[i]);
+            let color = match self.measure {
+                Measure::Radiance(_) => color,
+                Measure::ArrivingShare => Vec3::splat(luminance(color)),
+                Measure::Work => Vec3::ONE,
+            };
+            let value = lane(&values, i) * color;
+            set_lane(&mut values, i, value);
+        }
+        values
+    }
+
     /// Add what samples of one light bring, if they bring anything; where it waits for one ray, it is put beside.
     #[inline(always)]
     fn add(
@@ -155,8 +178,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// What waits for one ray to the middle of its light.
     #[inline(always)]
     fn add_waiting(&self, middle: Option<(Middle, Source)>, waiting: &Waiting, sums: &mut Sums) {
-        let Some((middle, source)) = middle.filter(|_| self.shot.settings.render.shadows != Shadows::Off)
-        else {
+        let is_untraced = self.shot.settings.render.shadows == Shadows::Off;
+        if is_untraced && self.measure == Measure::Work {
+            return;
+        }
+        let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
             return add_where(waiting.active, &waiting.light, &mut sums.light);
         };
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
@@ -185,8 +211,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             traced[i] = if ends[i] >= 0.0 { TRUE } else { 0 };
         }
         let traced = bits(traced);
-        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
         sums.rays.shadow += u64::from(traced.count_ones());
+        if self.measure == Measure::Work {
+            return add_work(self.shot, rays, ends, traced, &mut sums.light);
+        }
+        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, sources);
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
@@ -228,6 +257,17 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             ends[i] = f32::INFINITY;
         }
         (RayRows::of(self.row.from, direction), ends)
+    }
+}
+
+/// Add what the rays whose bits are set meet in the trees, up to their ends.
+#[cold]
+#[inline(never)]
+pub(super) fn add_work(shot: &Shot<'_>, rays: &RayRows, ends: &Ends, traced: u32, sums: &mut Lanes3) {
+    for i in lanes(traced) {
+        let work = shot.world.geometry.work(&Ray { t_max: ends[i], ..rays.ray(i) });
+        let sum = lane(sums, i) + Vec3::splat(work as f32);
+        set_lane(sums, i, sum);
     }
 }
 

@@ -72,6 +72,7 @@ impl LitRow {
         let shows = match measure {
             Measure::Radiance(Parts { specular, .. }) => specular,
             Measure::ArrivingShare => false,
+            Measure::Work => true,
         };
         let is_soft = shot.settings.render.shadows == Shadows::Soft;
         if !(self.is_glossy && shows && is_soft && shot.world.lights.can_be_found()) {
@@ -278,6 +279,7 @@ pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
             [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
         }
         Measure::ArrivingShare => [Vec3::ONE, Vec3::ZERO],
+        Measure::Work => bsdf_parts(bsdf, Measure::ALL),
     }
 }
 

@@ -36,11 +36,16 @@ impl Sink<'_> {
         }
     }
 
+    /// Work that a ray takes.
+    pub fn add_work(&mut self, slot: u32, count: u32) {
+        self.radiance[slot as usize] += Vec3::splat(count as f32);
+    }
+
     /// The parts of radiance that are taken as they are.
     fn parts(&self) -> Parts {
         match self.measure {
             Measure::Radiance(parts) => parts,
-            Measure::ArrivingShare => Parts::NONE,
+            Measure::ArrivingShare | Measure::Work => Parts::NONE,
         }
     }
 
@@ -48,7 +53,7 @@ impl Sink<'_> {
     pub fn takes_reflected(&self) -> bool {
         match self.measure {
             Measure::Radiance(parts) => parts.diffuse || parts.specular,
-            Measure::ArrivingShare => true,
+            Measure::ArrivingShare | Measure::Work => true,
         }
     }
 

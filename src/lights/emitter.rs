@@ -3,6 +3,7 @@
 use super::cuboid::BoxEmitter;
 use super::disk::DiskEmitter;
 use super::mesh::MeshEmitter;
+use super::pattern::Pattern;
 use super::rectangle::QuadEmitter;
 use super::round::{ConeSide, CylinderSide, RoundEmitter};
 use super::sphere::SphereEmitter;
@@ -13,13 +14,15 @@ use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
 use crate::math::{DVec3, Vec3};
 
-/// A shape that sends the same radiance everywhere from its front side.
+/// A shape that sends out light from its front side, in every direction alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
     /// Which shape.
     pub shape: Emitter,
-    /// Its radiance.
+    /// Its radiance; with a pattern, what that is multiplied by.
     pub radiance: Vec3,
+    /// What it is multiplied by from point to point.
+    pub pattern: Option<Pattern>,
     /// The object that it is.
     pub object: u32,
     /// Which part of it.
@@ -74,12 +77,23 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Torus(torus) => Emitter::Torus(TorusEmitter::new(*torus)),
         Shape::Plane(_) => return None,
     };
-    Some(AreaLight { shape: emitter, radiance, object, part: Part::Whole })
+    Some(AreaLight { shape: emitter, radiance, pattern: None, object, part: Part::Whole })
 }
 
 impl AreaLight {
     /// [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let sample = self.plain_sample(point, u)?;
+        let (Some(pattern), End::At(target)) = (&self.pattern, sample.end) else { return Some(sample) };
+        let primitive = match sample.source {
+            Source::Primitive(_, primitive) => primitive,
+            Source::Object(_) | Source::Nothing => 0,
+        };
+        Some(LightSample { weight: sample.weight * pattern.at(target, primitive), ..sample })
+    }
+
+    /// The same without its pattern.
+    pub fn plain_sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: Arrival| {
             let Arrival { direction, target, factor } = sample;
             let (end, source) = (End::At(target), Source::Object(self.object));

@@ -8,6 +8,7 @@ pub mod environment;
 mod linear;
 mod meridians;
 pub mod mesh;
+pub mod pattern;
 pub mod point;
 pub mod rectangle;
 pub mod round;
@@ -22,6 +23,7 @@ pub mod triangle;
 pub use directional::DirectionalLight;
 pub use emitter::{AreaLight, Part, area_light};
 pub use environment::Environment;
+pub use pattern::{Chart, Patch, Pattern};
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
 pub use set::Lights;
@@ -126,6 +128,15 @@ impl Light {
             Self::Directional(light) => light.sample(u),
             Self::Environment(light) => light.sample(normal, u),
             Self::Area(light) => light.sample(point, u),
+        }
+    }
+
+    /// What its radiance is multiplied by from point to point; none: nothing.
+    #[inline(always)]
+    pub fn pattern(&self) -> Option<&Pattern> {
+        match self {
+            Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => None,
+            Self::Area(light) => light.pattern.as_ref(),
         }
     }
 

@@ -184,6 +184,7 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
         Light::Area(AreaLight {
             shape: Emitter::Mesh(MeshEmitter::new(triangles).expect("an area")),
             radiance: Vec3::splat(radiance),
+            pattern: None,
             object: 3,
             part: Part::Listed,
         })

@@ -6,10 +6,12 @@ mod distant;
 mod facets;
 mod far;
 mod film;
+mod footprints;
 mod glass;
 mod global;
 mod hard;
 mod mirror;
+mod patterns;
 mod robust;
 mod round;
 mod round_lights;
@@ -20,6 +22,7 @@ mod shading;
 mod sky;
 mod speckle;
 mod touching;
+mod views;
 
 use glimt::math::DVec3;
 
