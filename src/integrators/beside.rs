@@ -161,7 +161,8 @@ impl Loops for LobeRays<'_> {
                 let radiance = match hits.get(i) {
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };
-                        let radiance = shot.lamp_radiance(&rays.ray(i), &hit, density, &mut arrived.rays.lookups);
+                        let radiance =
+                            shot.lamp_radiance(&rays.ray(i), &hit, density, &mut arrived.rays.lookups);
                         radiance * transmittance(i, hit.shape.t)
                     }
                     None => {

@@ -1,16 +1,15 @@
 //! From a world and a tile to radiance. Rays travel in batches: a queue of camera rays, the shadow rays of their hits,
 //! the queue of the next bounces.
 //!
-//! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues`, their way to hits
-//! (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what touches it (`crossing`), the ways on at mirrors
-//! and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the `light` there, the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows the rays round by round, for both
-//! methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are of first hits.
+//! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues` with the beams that they
+//! stand for (`cone`), their way to hits (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what
+//! touches it (`crossing`), the ways on at mirrors and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the
+//! `light` there, the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows
+//! the rays round by round, for both methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are
+//! of first hits, `bounds` are lines over the picture.
 
-<<<<<<< HEAD
 mod beside;
-=======
 mod bounds;
->>>>>>> 2459756 (Emission by textures, levels of textures by ray cones, views of trees, work, samples and errors)
 mod camera;
 mod cone;
 mod counters;
