@@ -36,6 +36,14 @@ impl Sink<'_> {
         }
     }
 
+    /// Light of a lamp that a path meets after a surface which the eye sees.
+    pub fn add_met(&mut self, slot: u32, radiance: Vec3) {
+        match self.measure {
+            Measure::Radiance(_) => self.add_arrived(slot, radiance, false),
+            Measure::ArrivingShare | Measure::Work => {}
+        }
+    }
+
     /// Work that a ray takes.
     pub fn add_work(&mut self, slot: u32, count: u32) {
         self.radiance[slot as usize] += Vec3::splat(count as f32);

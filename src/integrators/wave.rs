@@ -189,7 +189,7 @@ impl Wave<'_, '_> {
         if path.history.is_seen {
             self.sink.add(path.slot, Part::Emitted, path.throughput * radiance);
         } else {
-            self.sink.add_arrived(path.slot, path.throughput * radiance * weight, false);
+            self.sink.add_met(path.slot, path.throughput * radiance * weight);
         }
     }
 
@@ -200,7 +200,7 @@ impl Wave<'_, '_> {
             let background = self.shot.settings.render.background;
             self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
         } else if beyond != Vec3::ZERO {
-            self.sink.add_arrived(path.slot, path.throughput * beyond, false);
+            self.sink.add_met(path.slot, path.throughput * beyond);
         }
     }
 

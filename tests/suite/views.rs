@@ -91,13 +91,13 @@ fn a_floor_that_goes_on_for_ever_leaves_what_is_near_its_shades() {
     let range = report["image"]["range"].as_array().expect("near and far").clone();
     let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
     let depths: Vec<f32> = floats(&desk, "depth.exr").iter().map(|pixel| pixel[0]).collect();
-    assert!(near < 3.5 && far > 20.0, "{near} {far}");
+    assert!(near < 2.0 && far > 10.0, "{near} {far}");
     assert!((f64::from(depths.iter().copied().fold(0.0, f32::max)) - far).abs() < 0.5 * far);
     assert!(notes(&desk, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));
-    // The ball at 3.5 and the floor in its place at 4.5 differ by more than a fifth of the shades.
+    // The ball at 3.5 and the floor beside it at 5.7: straight they would be 37 shades apart.
     let shown = image::open(desk.path("depth.png")).expect("a picture").into_rgb8();
     let at = |x, y| i32::from(shown.get_pixel(x, y).0[0]);
-    assert!(at(16, 13) - at(2, 15) > 25 || at(16, 13) - at(2, 14) > 50, "{} {}", at(16, 13), at(2, 15));
+    assert!(at(16, 13) - at(2, 15) > 42, "{} {}", at(16, 13), at(2, 15));
     let beauty = desk.report("floor.toml -o beauty.png");
     assert!(beauty["image"]["range"].is_null());
 }

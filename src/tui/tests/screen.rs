@@ -6,9 +6,8 @@ use proptest::prelude::*;
 use ratatui::style::Color;
 
 use super::{BLUE, RED, cells_of};
-use crate::integrators::View;
 use crate::pipeline::protocol::{self, Failure, Stage, StageReport, Status};
-use crate::pipeline::settings::Overrides;
+use crate::pipeline::settings::{Overrides, View};
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
 use crate::tui::color::ColorDepth;

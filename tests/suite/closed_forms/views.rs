@@ -57,7 +57,7 @@ fn both_kinds_of_trees_over_triangles_show_their_boxes() {
         positions: (0..40)
             .flat_map(|i| {
                 let x = if i < 20 { -1.5 + 0.05 * i as f32 } else { 0.5 + 0.05 * (i - 20) as f32 };
-                [corner(x, -1.0), corner(x + 0.05, -1.0), corner(x, 1.0)]
+                [corner(x, -1.9), corner(x + 0.05, -1.9), corner(x, 1.9)]
             })
             .collect(),
         triangles: (0..40).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
@@ -67,11 +67,11 @@ fn both_kinds_of_trees_over_triangles_show_their_boxes() {
         |accel: Accel| framed(scene().accel(accel).mesh(mesh(), AS_IT_IS, matte(0.5)), View::Bounds);
     let (boxes, planes) = (picture(Accel::Bvh), picture(Accel::KdTree));
     for picture in [&boxes, &planes] {
-        // The root: 24 pixels to each side, 16 up and down.
-        for (x, y) in [(8, 32), (55, 32), (20, 16), (44, 47)] {
+        // The root: 24 and 24.8 pixels to the sides, 30.4 up and down.
+        for (x, y) in [(8, 32), (56, 32), (12, 62), (46, 62)] {
             assert!(at(picture, x, y).max_element() > 0.3, "{x}, {y}");
         }
-        assert_eq!((at(picture, 4, 32), at(picture, 60, 32)), (DVec3::ZERO, DVec3::ZERO));
+        assert_eq!((at(picture, 4, 32), at(picture, 61, 32)), (DVec3::ZERO, DVec3::ZERO));
     }
     let lit = |picture: &[DVec3]| (10..54).filter(|&x| at(picture, x, 32).max_element() > 0.3).count();
     assert!(lit(&boxes) > 0 && lit(&planes) > 0, "what is inside of the root shows");
