@@ -22,7 +22,7 @@ pub struct AreaLight {
     /// Its radiance; with a pattern, what that is multiplied by.
     pub radiance: Vec3,
     /// What it is multiplied by from point to point.
-    pub pattern: Option<Pattern>,
+    pub pattern: Option<Box<Pattern>>,
     /// The object that it is.
     pub object: u32,
     /// Which part of it.

@@ -136,7 +136,7 @@ impl Light {
     pub fn pattern(&self) -> Option<&Pattern> {
         match self {
             Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => None,
-            Self::Area(light) => light.pattern.as_ref(),
+            Self::Area(light) => light.pattern.as_deref(),
         }
     }
 

@@ -85,7 +85,8 @@ fn lit(emission: Emission) -> Emission {
 /// The light that a shape is which emits.
 fn shape_light(shape: &Shape, emission: &Emission, object: u32) -> Option<AreaLight> {
     let light = area_light(shape, emission.scale, object).filter(|_| emission.shines())?;
-    let pattern = emission.texture.as_ref().map(|texture| Pattern::new(texture, Chart::Shape(*shape)));
+    let pattern =
+        emission.texture.as_ref().map(|texture| Box::new(Pattern::new(texture, Chart::Shape(*shape))));
     Some(AreaLight { pattern, ..light })
 }
 
@@ -110,7 +111,8 @@ fn mesh_lights(
         let pattern = emission.texture.as_ref().map(|texture| {
             let patch =
                 |id| Patch { primitive: id, corners: mesh.world_corners(id), uvs: mesh.corner_uvs(id) };
-            Pattern::new(texture, Chart::Triangles(triangles_of(mesh, own).map(patch).collect()))
+            let patches = triangles_of(mesh, own).map(patch).collect();
+            Box::new(Pattern::new(texture, Chart::Triangles(patches)))
         });
         Some(AreaLight { shape, radiance: emission.scale, pattern, object, part: Part::Listed })
     };
