@@ -2,6 +2,7 @@
 //! [`wide_bvh`], a tree over triangles whose leaves hold them ready for vector instructions, and [`kd_tree`], its
 //! alternative.
 
+mod along;
 pub mod bvh;
 pub mod kd_tree;
 mod reference;
@@ -12,6 +13,7 @@ mod pathological;
 #[cfg(test)]
 mod tests;
 
+pub use along::{Cell, Stretch};
 pub use bvh::{AnyTest, Bvh, ClosestTest, traced};
 pub use kd_tree::KdTree;
 pub use wide_bvh::{Instructions, Loops, WideBvh, bits};

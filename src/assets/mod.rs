@@ -92,7 +92,7 @@ pub struct FileMaterial {
     pub specular: Vec3,
     /// Ns.
     pub shininess: f32,
-    /// Ke, radiance.
+    /// Ke, radiance; with a texture, what that is multiplied by.
     pub emission: Vec3,
     /// Ni.
     pub ior: f32,
@@ -102,6 +102,8 @@ pub struct FileMaterial {
     pub diffuse_texture: Option<PathBuf>,
     /// map_Ks.
     pub specular_texture: Option<PathBuf>,
+    /// map_Ke.
+    pub emission_texture: Option<PathBuf>,
     /// norm or map_Bump, read as a normal map.
     pub normal_texture: Option<PathBuf>,
 }

@@ -9,12 +9,15 @@
 mod curves;
 mod noise;
 mod preview;
+mod quantity;
 mod resample;
 mod srgb;
+pub mod stretch;
 mod sums;
 pub mod tone;
 
 pub use preview::Previewer;
+pub use quantity::Quantity;
 pub use srgb::linear_to_srgb8;
 pub use sums::{Film, FilmError, SampleStats, TILE_SIZE};
 

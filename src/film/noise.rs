@@ -22,6 +22,8 @@ pub(super) struct Steps {
     last: Vec<f64>,
     /// Sums over the pixels of the squared steps to 2, 4, 8, … samples.
     squares: Vec<f64>,
+    /// The last step of each pixel.
+    recent: Vec<f32>,
 }
 
 impl Steps {
@@ -29,12 +31,20 @@ impl Steps {
     pub(super) fn reserved(area: usize) -> Option<Self> {
         let mut last = Vec::new();
         last.try_reserve_exact(area).ok()?;
-        Some(Self { last, squares: Vec::new() })
+        let mut recent = Vec::new();
+        recent.try_reserve_exact(area).ok()?;
+        Some(Self { last, squares: Vec::new(), recent })
     }
 
     /// For so many pixels; cannot fail where the memory was reserved.
     pub(super) fn fill(&mut self, area: usize) {
         self.last.resize(area, 0.0);
+        self.recent.resize(area, 0.0);
+    }
+
+    /// The last step of a pixel, squared.
+    pub(super) fn square(&self, pixel: usize) -> f64 {
+        self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
     /// A pixel has a power of two of samples, which make this luminance.
@@ -44,6 +54,7 @@ impl Steps {
             self.squares.resize(self.squares.len().max(level), 0.0);
             let step = luminance - self.last[pixel];
             self.squares[level - 1] += step * step;
+            self.recent[pixel] = step as f32;
         }
         self.last[pixel] = luminance;
     }
@@ -63,9 +74,14 @@ fn variance(steps: &[f64], count: u32) -> Option<f64> {
         Some(before) => 0.5 * (last + steps[before] / RATE),
         None => last,
     };
+    Some(pixel_variance(step, count))
+}
+
+/// The variance of a mean of `count` ≥ 2 samples by the squared step to the last power of two of them.
+pub(super) fn pixel_variance(step: f64, count: u32) -> f64 {
     // Between powers of two as for independent samples.
-    let part = f64::from(1 << level) / f64::from(count);
-    Some(step / (RATE - 1.0) * part)
+    let part = f64::from(1_u32 << count.ilog2()) / f64::from(count);
+    step / (RATE - 1.0) * part
 }
 
 impl Film {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::resample::Axis;
-use super::{Film, RadianceImage, is_in_pool};
+use super::{Film, Quantity, RadianceImage, is_in_pool};
 use crate::math::{DVec3, Vec3};
 
 /// Shrinks (or enlarges) a film by area, exactly for any ratio, and remembers what each tile gave, so that a picture
@@ -13,6 +13,7 @@ use crate::math::{DVec3, Vec3};
 /// that has, the base shows.
 #[derive(Debug)]
 pub struct Previewer {
+    quantity: Quantity,
     width: u32,
     height: u32,
     film_id: Option<u64>,
@@ -42,8 +43,18 @@ const TILES_AT_ONCE: usize = 32;
 impl Previewer {
     /// For pictures of this size; at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
+        Self::of(Quantity::Radiance, width, height)
+    }
+
+    /// The same of another number of the samples.
+    pub fn of(quantity: Quantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
-        Self { width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
+        Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
+    }
+
+    /// What its pictures are of.
+    pub fn quantity(&self) -> Quantity {
+        self.quantity
     }
 
     /// Columns and rows of its pictures.
@@ -76,7 +87,7 @@ impl Previewer {
         let mut looked = 0;
         while looked < self.shares.len() {
             let end = (self.next + at_once).min(self.shares.len());
-            refresh(&mut self.shares[self.next..end], self.next, film, axes);
+            refresh(&mut self.shares[self.next..end], self.next, (film, self.quantity), axes);
             looked += end - self.next;
             self.next = if end == self.shares.len() { 0 } else { end };
             self.is_whole |= self.next == 0;
@@ -106,10 +117,10 @@ impl Previewer {
 }
 
 /// Take up these tiles, the first of which is `first`.
-fn refresh(shares: &mut [Share], first: usize, film: &Film, axes: [Axis; 2]) {
+fn refresh(shares: &mut [Share], first: usize, (film, quantity): (&Film, Quantity), axes: [Axis; 2]) {
     let refresh = |(i, share): (usize, &mut Share)| {
         if film.tile(first + i).revision != share.revision {
-            share.refresh(film, first + i, axes);
+            share.refresh((film, quantity), first + i, axes);
         }
     };
     if is_in_pool() && shares.len() > TILES_AT_ONCE {
@@ -120,7 +131,7 @@ fn refresh(shares: &mut [Share], first: usize, film: &Film, axes: [Axis; 2]) {
 }
 
 impl Share {
-    fn refresh(&mut self, film: &Film, tile: usize, [columns, rows]: [Axis; 2]) {
+    fn refresh(&mut self, (film, quantity): (&Film, Quantity), tile: usize, [columns, rows]: [Axis; 2]) {
         let Some(rect) = film.tile_rect(tile) else { return };
         let first = |axis: Axis, index| axis.covered(index).next().map_or(0, |(new, _)| new);
         let last = |axis: Axis, index| axis.covered(index).last().map_or(0, |(new, _)| new);
@@ -136,7 +147,8 @@ impl Share {
         for y in 0..rect.height {
             let down = rows.covered(rect.y + y);
             for (x, across) in across.iter().enumerate() {
-                let Some(mean) = tile.mean(y as usize * rect.width as usize + x) else { continue };
+                let index = y as usize * rect.width as usize + x;
+                let Some(mean) = tile.value(quantity, index, rect.width as usize) else { continue };
                 for (row, row_weight) in down.clone() {
                     let line = &mut self.cells[(row - self.y) as usize * self.width as usize..];
                     for &(column, column_weight) in across {

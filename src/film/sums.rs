@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::noise::{Steps, luminance};
-use super::{RadianceImage, Rect, TileSamples};
+use super::{Quantity, RadianceImage, Rect, TileSamples};
 use crate::math::{DVec3, Vec3};
 
-/// Pixels along a tile's side: 1024 pixels of 36 bytes stay in a core's second-level cache.
+/// Pixels along a tile's side: 1024 pixels of 40 bytes stay in a core's second-level cache.
 pub const TILE_SIZE: u32 = 32;
 
 /// Why there is no film.
@@ -267,6 +267,11 @@ impl Film {
 
     /// The picture so far: the mean of every pixel's samples; black where there are none, and outside the crop.
     pub fn radiance(&self) -> RadianceImage {
+        self.image(Quantity::Radiance)
+    }
+
+    /// The same of another number of the samples.
+    pub fn image(&self, quantity: Quantity) -> RadianceImage {
         let mut image = RadianceImage::black(self.width, self.height);
         for (i, tile) in self.tiles.iter().enumerate() {
             let rect = tile_rect(self.crop, i);
@@ -275,8 +280,9 @@ impl Film {
                 let start = (rect.y + row) as usize * self.width as usize + rect.x as usize;
                 let line = &mut image.pixels[start..][..rect.width as usize];
                 for (x, pixel) in line.iter_mut().enumerate() {
-                    let mean = tile.mean(row as usize * rect.width as usize + x);
-                    *pixel = mean.map_or(Vec3::ZERO, DVec3::as_vec3);
+                    let columns = rect.width as usize;
+                    let value = tile.value(quantity, row as usize * columns + x, columns);
+                    *pixel = value.map_or(Vec3::ZERO, DVec3::as_vec3);
                 }
             }
         }
@@ -350,7 +356,7 @@ fn rings(crop: Rect) -> Vec<usize> {
 }
 
 /// Of one pixel's sum, last mean and count.
-const SUM_BYTES: usize = size_of::<DVec3>() + size_of::<f64>() + size_of::<u32>();
+const SUM_BYTES: usize = size_of::<DVec3>() + size_of::<f64>() + size_of::<f32>() + size_of::<u32>();
 
 /// For the sums of the crop, and for the whole picture as radiance and as sRGB.
 fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {

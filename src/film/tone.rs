@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::stretch::Stretch;
 use super::{Picture, Picture16, RadianceImage, curves, is_in_pool, linear_to_srgb8};
 use crate::choice;
 use crate::math::Vec3;
@@ -48,53 +49,8 @@ pub struct ToneMapping {
     pub curve: Tonemap,
     /// How that is encoded.
     pub transfer: Transfer,
-    /// Whether the numbers are distances.
-    pub distances: Distances,
-}
-
-/// Distances, which have no brightness of their own.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Distances {
-    /// The numbers are none.
-    #[default]
-    None,
-    /// To be stretched to what is seen; black until [`ToneMapping::of_picture`] says what that is.
-    Unknown,
-    /// The nearest is white, the farthest dark, 0 stands for nothing and is black.
-    Between {
-        /// The nearest.
-        near: f32,
-        /// The farthest.
-        far: f32,
-    },
-}
-
-impl Distances {
-    /// How dark the farthest is.
-    const DARKEST: f32 = 0.1;
-
-    /// The ends of what is seen. Pixels at the border of nothing are averages of distances and nothing: they do not count.
-    fn ends(image: &RadianceImage) -> [f32; 2] {
-        let (width, height) = (image.width as usize, image.height as usize);
-        let at = |x: usize, y: usize| image.pixels[y * width + x].x;
-        let is_whole = |x: usize, y: usize| {
-            let around = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
-            around(y, height).all(|y| around(x, width).all(|x| at(x, y) > 0.0))
-        };
-        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let whole = places.filter(|&(x, y)| is_whole(x, y)).map(|(x, y)| at(x, y));
-        whole.fold([f32::INFINITY, 0.0], |[near, far], x| [near.min(x), far.max(x)])
-    }
-
-    /// Brightness of a distance. What is nearer than all that is seen is a pixel that is filled in part.
-    fn nearness(near: f32, far: f32, distance: f32) -> f32 {
-        if distance < near {
-            return if near.is_finite() { distance / near } else { distance.min(1.0) };
-        }
-        let range = far - near;
-        let part = if range > 0.0 { ((distance - near) / range).min(1.0) } else { 0.0 };
-        1.0 - (1.0 - Self::DARKEST) * part
-    }
+    /// What numbers are stretched by that have no brightness of their own.
+    pub stretch: Stretch,
 }
 
 /// Far above everything that any curve tells apart, far below what overflows inside one.
@@ -108,18 +64,12 @@ impl ToneMapping {
         exposure_stops: 0.0,
         curve: Tonemap::None,
         transfer: Transfer::Identity,
-        distances: Distances::None,
+        stretch: Stretch::None,
     };
 
-    /// For this picture, all of it: distances are stretched to what is seen in it.
+    /// For this picture, all of it: numbers are stretched to what is seen in it.
     pub fn of_picture(self, image: &RadianceImage) -> Self {
-        match self.distances {
-            Distances::None | Distances::Between { .. } => self,
-            Distances::Unknown => {
-                let [near, far] = Distances::ends(image);
-                Self { distances: Distances::Between { near, far }, ..self }
-            }
-        }
+        Self { stretch: self.stretch.of_picture(image), ..self }
     }
 
     /// One colour: linear display light in [0, 1], whatever is fed; NaN and negative components count as 0.
@@ -128,13 +78,7 @@ impl ToneMapping {
     }
 
     fn exposed(&self, radiance: Vec3, factor: f32) -> Vec3 {
-        let radiance = match self.distances {
-            Distances::None => radiance,
-            Distances::Unknown => Vec3::ZERO,
-            Distances::Between { near, far } => {
-                Vec3::from_array(radiance.to_array().map(|x| Distances::nearness(near, far, x)))
-            }
-        };
+        let radiance = self.stretch.apply(radiance);
         let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
         let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
         match self.curve {

@@ -79,8 +79,7 @@ impl Cone {
         }
         let local = self.frame.local(point);
         let out = radial(local.truncate());
-        let down = DVec2::new(self.radius, self.height) / self.slant;
-        let along = DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant);
+        let (down, along) = self.along(local);
         let around = out.perp() * (-TAU * down.x * along);
         SurfacePoint::exact(
             self.frame.point((out * (down.x * along)).extend(down.y * along)),
@@ -90,6 +89,30 @@ impl Cone {
             self.frame.vector((out * -self.radius).extend(-self.height)),
             self.reach(),
         )
+    }
+
+    /// The unit vector from the tip down the side, as (outwards, along the axis), and how far down a point is.
+    fn along(&self, local: DVec3) -> (DVec2, f64) {
+        let down = DVec2::new(self.radius, self.height) / self.slant;
+        (down, DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant))
+    }
+
+    /// Texture coordinates of a point of the surface.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        let local = self.frame.local(point);
+        let (across, below) = (local.truncate().length(), self.height - local.z);
+        let off_side = (across * self.height - local.z * self.radius) / self.slant;
+        if self.capped && below.abs() < off_side.abs() {
+            return self.base().uv_at(point);
+        }
+        let (_, along) = self.along(local);
+        DVec2::new(turn(mirrored(radial(local.truncate()))), 1.0 - along / self.slant)
+    }
+
+    /// Mean curvature at a point of a part; that of the normals' turn around the axis, which has no end at the tip.
+    pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
+        let across = self.frame.local(point).truncate().length();
+        if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
     }
 
     fn reach(&self) -> f64 {

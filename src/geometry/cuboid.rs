@@ -5,7 +5,7 @@ use super::surface::flat_axes;
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
-use crate::math::{DMat3, DVec3, Vec2};
+use crate::math::{DMat3, DVec2, DVec3, Vec2};
 
 /// A box with its own axes; the front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,12 +90,25 @@ impl Cuboid {
     /// The surface at a hit: the point is put onto the face.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal: outwards, reach } = self.exact(ray, hit);
-        let (_, normal) = face_normal(hit.primitive);
-        let local = self.local(ray, hit);
-        let (u, v) = flat_axes(normal);
-        let (width, height) = (2.0 * self.half.dot(u.abs()), 2.0 * self.half.dot(v.abs()));
-        let uv = Vec2::new((0.5 + local.dot(u) / width) as f32, (0.5 + local.dot(v) / height) as f32);
+        let chart = self.chart(hit.primitive);
+        let uv = chart.uv(self.local(ray, hit));
+        let Chart { u, v, width, height } = chart;
+        let uv = uv.as_vec2();
         SurfacePoint::exact(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
+    }
+
+    /// Texture coordinates of a point of the surface.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        let local = self.axes.transpose() * (point - self.center);
+        // The face that it is on is the one that it is farthest out to.
+        let axis = (local / self.half).abs().max_position();
+        let face = 2 * axis as u32 + u32::from(local[axis] > 0.0);
+        self.chart(face).uv(local)
+    }
+
+    fn chart(&self, face: u32) -> Chart {
+        let (u, v) = flat_axes(face_normal(face).1);
+        Chart { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
     /// A hit along its axes, from the centre, put onto the face.
@@ -174,6 +187,20 @@ impl Cuboid {
         let along = (self.axes.transpose() * direction).abs();
         let [x, _, y, _, z, _] = self.areas();
         DVec3::new(x, y, z).dot(along)
+    }
+}
+
+/// How a face has its texture coordinates: unit vectors along u and v in the box's axes, and the face's sides.
+struct Chart {
+    u: DVec3,
+    v: DVec3,
+    width: f64,
+    height: f64,
+}
+
+impl Chart {
+    fn uv(&self, local: DVec3) -> DVec2 {
+        DVec2::new(0.5 + local.dot(self.u) / self.width, 0.5 + local.dot(self.v) / self.height)
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::axial::{self, AxialFrame, Line, Stretch, across, at_turn, exact_t, radial, ring_shown, turn};
 use super::disk::{BORDER, Disk};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::{DVec3, Vec2};
+use crate::math::{DVec2, DVec3, Vec2};
 
 /// A round bar between two end points, or the bare tube; the front is outside. Parts: 0 the side, 1 the cap at the
 /// first end, 2 the cap at the second.
@@ -68,7 +68,7 @@ impl Cylinder {
         let local = self.frame.local(point);
         let out = radial(local.truncate());
         let z = local.z.clamp(-self.half_length, self.half_length);
-        let v = 0.5 + z / (2.0 * self.half_length);
+        let v = self.height(z);
         SurfacePoint::exact(
             self.frame.point((out * self.radius).extend(z)),
             self.frame.vector(out.extend(0.0)),
@@ -77,6 +77,26 @@ impl Cylinder {
             self.frame.vector(DVec3::Z * (2.0 * self.half_length)),
             self.reach(),
         )
+    }
+
+    /// v of a point of the side.
+    fn height(&self, z: f64) -> f64 {
+        0.5 + z / (2.0 * self.half_length)
+    }
+
+    /// Texture coordinates of a point of the surface.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        let local = self.frame.local(point);
+        let (inwards, below) = (self.radius - local.truncate().length(), self.half_length - local.z.abs());
+        if self.capped && below.abs() < inwards.abs() {
+            return self.cap(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
+        }
+        DVec2::new(turn(radial(local.truncate())), self.height(local.z))
+    }
+
+    /// Mean curvature of a part.
+    pub fn curvature(&self, part: u32) -> f64 {
+        if part == 0 { 0.5 / self.radius } else { 0.0 }
     }
 
     fn reach(&self) -> f64 {

@@ -60,8 +60,7 @@ impl Disk {
 
     /// The surface nearest to a point, computed from lengths up to `reach`.
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
-        let p = self.frame.local(point).truncate().clamp_length_max(self.radius);
-        let uv = DVec2::splat(0.5) + p / (2.0 * self.radius);
+        let (p, uv) = self.chart(point);
         let edge = 2.0 * self.radius;
         SurfacePoint::exact(
             self.frame.point(p.extend(0.0)),
@@ -71,6 +70,17 @@ impl Disk {
             self.frame.vector(DVec3::Y * edge),
             reach,
         )
+    }
+
+    /// A point in the plane of its frame, and its texture coordinates.
+    fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
+        let p = self.frame.local(point).truncate().clamp_length_max(self.radius);
+        (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
+    }
+
+    /// Texture coordinates of a point of it.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        self.chart(point).1
     }
 
     /// The point of the disk that a point of the unit disk becomes.

@@ -25,7 +25,7 @@ pub use aabb::Aabb;
 pub use ray::{Ray, RayF64};
 pub use surface::{AreaPoint, Asked, ShapeHit, SurfacePoint};
 
-use crate::math::{DVec3, Vec2};
+use crate::math::{DVec2, DVec3, Vec2};
 use cone::Cone;
 use cuboid::Cuboid;
 use cylinder::Cylinder;
@@ -182,6 +182,22 @@ impl Shape {
         is_closed.then(|| self.contains(point))
     }
 
+    /// Texture coordinates of a point of its surface.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        of_any!(self, it => it.uv_at(point))
+    }
+
+    /// Mean curvature at a point of a part, > 0 where it bulges to the front.
+    pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
+        match self {
+            Self::Quad(_) | Self::Plane(_) | Self::Box(_) | Self::Triangle(_) | Self::Disk(_) => 0.0,
+            Self::Sphere(sphere) => 1.0 / sphere.radius,
+            Self::Cylinder(cylinder) => cylinder.curvature(part),
+            Self::Cone(cone) => cone.curvature(part, point),
+            Self::Torus(torus) => torus.curvature(point),
+        }
+    }
+
     /// The area whose front faces a unit direction, times the cosines; of a torus the mean over all directions.
     pub fn shown(&self, direction: DVec3) -> f64 {
         of_any!(self, it => it.shown(direction))
@@ -305,6 +321,74 @@ mod tests {
                 is_closed || matches!(shape, Shape::Cylinder(_) | Shape::Cone(_)),
                 "{shape:?}"
             );
+        }
+    }
+
+    #[test]
+    fn tangents_are_how_points_move_with_their_texture_coordinates() {
+        for shape in shapes() {
+            let mut seen = 0;
+            for (ray, hit) in hits(&shape) {
+                let surface = shape.surface(&ray, &hit);
+                let point = surface.point.as_dvec3();
+                let uv = shape.uv_at(point);
+                let (u, v) = (surface.dpdu.as_dvec3(), surface.dpdv.as_dvec3());
+                // Near seams, borders and the poles a step leads elsewhere.
+                let step = 1e-4;
+                let is_inside = |uv: DVec2| uv.min_element() > 0.02 && uv.max_element() < 0.98;
+                let is_round =
+                    matches!(shape, Shape::Disk(_)) || hit.primitive > 0 && !matches!(shape, Shape::Box(_));
+                if is_round && (surface.uv - DVec2::splat(0.5)).length() > 0.48 {
+                    continue;
+                }
+                if !matches!(shape, Shape::Plane(_)) && !is_inside(surface.uv) {
+                    continue;
+                }
+                seen += 1;
+                assert!(
+                    (uv - surface.uv).length() < 1e-5 + 1e-7 * uv.length(),
+                    "{shape:?}: {uv} {}",
+                    surface.uv
+                );
+                let moved = [shape.uv_at(point + u * step) - uv, shape.uv_at(point + v * step) - uv];
+                let off = (moved[0] - DVec2::X * step).length().max((moved[1] - DVec2::Y * step).length());
+                assert!(off < 0.02 * step, "{shape:?} at {uv}: {moved:?}");
+                // By the contract u grows from x to z on spheres: their pictures are mirrored, those on other shapes are not.
+                let is_mirrored = u.cross(v).dot(surface.normal.as_dvec3()) < 0.0;
+                assert_eq!(is_mirrored, matches!(shape, Shape::Sphere(_)), "{shape:?}");
+                assert!((u.dot(surface.normal.as_dvec3())).abs() < 1e-5 * u.length(), "{shape:?}");
+            }
+            assert!(seen > 100, "{shape:?}");
+        }
+    }
+
+    #[test]
+    fn curvature_is_half_the_divergence_of_the_normals() {
+        for shape in shapes() {
+            for (ray, hit) in hits(&shape).step_by(7) {
+                let surface = shape.surface(&ray, &hit);
+                let (point, normal) = (surface.point.as_dvec3(), surface.normal.as_dvec3());
+                let step = 1e-2;
+                let normal_at = |aside: DVec3| {
+                    let from = point + aside * step + normal * (4.0 * step);
+                    let ray = RayF64 { origin: from, direction: -normal, t_max: f64::INFINITY };
+                    let hit = shape
+                        .intersect(&ray)
+                        .filter(|near| near.primitive == hit.primitive && near.t < 0.1)?;
+                    Some(shape.surface(&ray, &hit).normal.as_dvec3())
+                };
+                let (a, b) = normal.any_orthonormal_pair();
+                let along = |e: DVec3| Some((normal_at(e)? - normal_at(-e)?).dot(e) / (2.0 * step));
+                let Some(divergence) = along(a).zip(along(b)).map(|(a, b)| a + b) else { continue };
+                let curvature = shape.curvature(hit.primitive, point);
+                let allowed = 0.02 * curvature.abs() + 2e-3;
+                // Next to the tip of a cone the steps are too long.
+                let is_tip = matches!(shape, Shape::Cone(_)) && curvature > 6.0;
+                assert!(
+                    is_tip || (0.5 * divergence - curvature).abs() < allowed,
+                    "{shape:?}: {divergence} {curvature}"
+                );
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{TRUE, bits};
-use crate::math::{DVec3, Vec2};
+use crate::math::{DVec2, DVec3, Vec2};
 
 /// Room given to a quad's border in units of its edges, so that two quads which share an edge leave no gap between
 /// them; far below what an `f32` ray can tell apart.
@@ -85,8 +85,18 @@ impl Parallelogram {
     /// Of a hit along the edges, in [0, 1].
     #[inline(always)]
     fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
-        let from_corner = ray.at(f64::from(hit.t)) - self.corner;
+        self.coordinates_of(ray.at(f64::from(hit.t)))
+    }
+
+    #[inline(always)]
+    fn coordinates_of(&self, point: DVec3) -> [f64; 2] {
+        let from_corner = point - self.corner;
         [self.dual_u, self.dual_v].map(|dual| from_corner.dot(dual).max(0.0).min(1.0))
+    }
+
+    /// Texture coordinates of a point of it.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        DVec2::from_array(self.coordinates_of(point))
     }
 
     /// The box around it.

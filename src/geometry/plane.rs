@@ -63,8 +63,18 @@ impl Plane {
     /// Of a hit along its axes.
     #[inline(always)]
     fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
-        let offset = ray.at(f64::from(hit.t)) - self.point;
+        self.coordinates_of(ray.at(f64::from(hit.t)))
+    }
+
+    #[inline(always)]
+    fn coordinates_of(&self, point: DVec3) -> [f64; 2] {
+        let offset = point - self.point;
         [offset.dot(self.u), offset.dot(self.v)]
+    }
+
+    /// Texture coordinates of a point of it.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        DVec2::from_array(self.coordinates_of(point))
     }
 
     /// It has no part with an area.

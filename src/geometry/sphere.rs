@@ -6,7 +6,7 @@ use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{TRUE, bits};
-use crate::math::{DVec3, Vec2};
+use crate::math::{DVec2, DVec3, Vec2};
 
 /// All points at one distance from a centre; the front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +82,11 @@ impl Sphere {
     pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         SurfacePoint::exact(point, normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, reach)
+    }
+
+    /// Texture coordinates of a point of the surface.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        sphere_parametrisation((point - self.center).normalize_or(DVec3::Y)).0.as_dvec2()
     }
 
     /// The box around it.

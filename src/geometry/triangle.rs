@@ -3,7 +3,7 @@
 use super::rows::{Ends, HitRows, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::{DVec3, Vec2};
+use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
 /// A triangle; the front is along (b − a) × (c − a).
@@ -59,6 +59,11 @@ impl Triangle {
         SurfacePoint::exact(point, normal, Vec2::new(hit.u, hit.v), self.b - self.a, self.c - self.a, reach)
     }
 
+    /// Texture coordinates of a point of it.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        weights([self.a, self.b, self.c], point)
+    }
+
     /// The box around it.
     pub fn bounds(&self) -> Aabb {
         Aabb::around_f64([self.a, self.b, self.c])
@@ -94,6 +99,14 @@ impl Triangle {
     pub fn shown(&self, direction: DVec3) -> f64 {
         (0.5 * self.normal().dot(direction)).max(0.0)
     }
+}
+
+/// Weights of the second and the third corner of a triangle that make a point of it.
+pub fn weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
+    let (ab, ac, ap) = (b - a, c - a, point - a);
+    let normal = ab.cross(ac);
+    let of = |area: DVec3| area.dot(normal) / normal.length_squared();
+    DVec2::new(of(ap.cross(ac)), of(ab.cross(ap)))
 }
 
 impl Exact for Triangle {

@@ -1,10 +1,11 @@
 //! Rays that find the light of lamps beside samples of the lamps, and what is left of those samples then (multiple importance
 //! sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
-use super::light::Arrived;
+use super::light::{Arrived, add_work};
 use super::lit_row::{LitRow, Response};
 use super::medium::{Medium, absorption};
 use super::shot::Shot;
+use super::view::Measure;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::lights::LightRow;
 use crate::materials::Lobes;
@@ -119,6 +120,7 @@ pub(super) struct LobeRays<'a> {
     pub(super) shot: &'a Shot<'a>,
     pub(super) row: &'a LitRow,
     pub(super) sharp: u32,
+    pub(super) measure: Measure,
     /// Those that the vertices are in; none where all are in air.
     pub(super) media: Option<&'a [Medium]>,
     /// What they are added to.
@@ -130,7 +132,7 @@ impl Loops for LobeRays<'_> {
 
     #[inline(always)]
     fn run(self) -> Arrived {
-        let Self { shot, row, sharp, media, mut arrived } = self;
+        let Self { shot, row, sharp, measure, media, mut arrived } = self;
         let count = shot.settings.render.shadow_samples;
         let sampler = row.sampler(shot);
         let transmittance = |i: usize, distance: f32| {
@@ -153,12 +155,21 @@ impl Loops for LobeRays<'_> {
             let rays = RayRows::of(row.from, directions);
             let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends, sent);
             arrived.rays.scattered += u64::from(sent.count_ones());
+            if measure == Measure::Work {
+                for i in lanes(sent) {
+                    ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
+                }
+                add_work(shot, &rays, &ends, sent, &mut arrived.light);
+                continue;
+            }
             for i in lanes(sent) {
                 let density = glossy_lobe(row, i).density(lane(&directions, i), glosses[i]);
                 let radiance = match hits.get(i) {
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };
-                        let radiance = shot.lamp_radiance(&rays.ray(i), lane(&row.normal, i), &hit, density);
+                        let normal = lane(&row.normal, i);
+                        let lookups = &mut arrived.rays.lookups;
+                        let radiance = shot.lamp_radiance(&rays.ray(i), normal, &hit, density, lookups);
                         radiance * transmittance(i, hit.shape.t)
                     }
                     None => {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::cone::Cone;
 use super::medium::{Inside, Medium};
 use super::queues::{History, PathRay};
 use super::shot::Shot;
@@ -58,7 +59,8 @@ impl Shot<'_> {
             self.world.glass_around(ray.origin).map(|(object, material)| Inside { object, material });
         let medium = around.fold(Medium::default(), Medium::entered);
         let history = History::CAMERA;
-        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, history }
+        let cone = Cone { width: 0.0, spread: self.pixel_spread };
+        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, history, cone }
     }
 
     /// The rays of the slots from `first` on, also beyond the last. To be called inside of loops for each instruction set.

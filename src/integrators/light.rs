@@ -7,7 +7,7 @@ use super::shot::Shot;
 use super::view::Measure;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{LightRow, Middle, Source, SourceRow};
+use crate::lights::{LightRow, Middle, Pattern, Source, SourceRow};
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
@@ -35,6 +35,8 @@ pub struct LightRays {
     pub shadow: u64,
     /// In lobes.
     pub scattered: u64,
+    /// Look-ups of the lamps' textures.
+    pub lookups: u64,
 }
 
 /// What of the light that arrives at the vertices of a row gets to the eye.
@@ -54,8 +56,11 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    pub(super) const NOTHING: Self =
-        Self { light: [[0.0; LANES]; 3], total: [0.0; LANES], rays: LightRays { shadow: 0, scattered: 0 } };
+    pub(super) const NOTHING: Self = Self {
+        light: [[0.0; LANES]; 3],
+        total: [0.0; LANES],
+        rays: LightRays { shadow: 0, scattered: 0, lookups: 0 },
+    };
 
     /// What they come to.
     #[inline(always)]
@@ -107,6 +112,10 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32);
+                    if let Some(pattern) = light.pattern() {
+                        values = self.tinted(pattern, &samples, active, values);
+                        sums.rays.lookups += u64::from(active.count_ones());
+                    }
                     if WEIGHED {
                         let of_light = light.inverse_densities(&samples);
                         let others = self.others.to_each(count);
@@ -134,6 +143,23 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             let distance = if is_beyond { f32::MAX } else { way.length() };
             let left = absorption(self.shot.world, media[self.row.medium[i] as usize], distance);
             let value = lane(&values, i) * left;
+            set_lane(&mut values, i, value);
+        }
+        values
+    }
+
+    /// What samples of a lamp bring by the colours of the lamp at their points.
+    #[cold]
+    #[inline(never)]
+    fn tinted(&self, pattern: &Pattern, samples: &LightRow, active: u32, mut values: Lanes3) -> Lanes3 {
+        for i in lanes(active) {
+            let color = pattern.at(lane(&samples.targets, i), samples.sources.part[i]);
+            let color = match self.measure {
+                Measure::Radiance(_) => color,
+                Measure::ArrivingShare => Vec3::splat(luminance(color)),
+                Measure::Work => Vec3::ONE,
+            };
+            let value = lane(&values, i) * color;
             set_lane(&mut values, i, value);
         }
         values
@@ -169,8 +195,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// What waits for one ray to the middle of its light.
     #[inline(always)]
     fn add_waiting(&self, middle: Option<(Middle, Source)>, waiting: &Waiting, sums: &mut Sums) {
-        let Some((middle, source)) = middle.filter(|_| self.shot.settings.render.shadows != Shadows::Off)
-        else {
+        let is_untraced = self.shot.settings.render.shadows == Shadows::Off;
+        if is_untraced && self.measure == Measure::Work {
+            return;
+        }
+        let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
             return add_where(waiting.active, &waiting.light, &mut sums.light);
         };
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
@@ -202,8 +231,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         values: &Lanes3,
         sums: &mut Sums,
     ) {
-        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, traced, sources);
         sums.rays.shadow += u64::from(traced.count_ones());
+        if self.measure == Measure::Work {
+            return add_work(self.shot, rays, ends, traced, &mut sums.light);
+        }
+        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, traced, sources);
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
@@ -245,6 +277,17 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             ends[i] = f32::INFINITY;
         }
         (RayRows::of(self.row.from, direction), ends)
+    }
+}
+
+/// Add what the rays whose bits are set meet in the trees, up to their ends.
+#[cold]
+#[inline(never)]
+pub(super) fn add_work(shot: &Shot<'_>, rays: &RayRows, ends: &Ends, traced: u32, sums: &mut Lanes3) {
+    for i in lanes(traced) {
+        let work = shot.world.geometry.work(&Ray { t_max: ends[i], ..rays.ray(i) });
+        let sum = lane(sums, i) + Vec3::splat(work as f32);
+        set_lane(sums, i, sum);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The rows of vertices that wait to be lit, and what arrives by them.
 
 use super::beside::{LobeRays, Others};
+use super::cone::Cone;
 use super::light::{LightRays, Lighting};
 use super::lit_row::{ALL, LitRow};
 use super::medium::Medium;
@@ -31,6 +32,8 @@ pub struct LitQueue {
     arrived: Vec<Vec3>,
     /// The glass around vertices; the first is none.
     media: Vec<Medium>,
+    /// The beams that come to the vertices of the paths of the round, where they are asked for.
+    cones: Vec<Cone>,
 }
 
 impl LitQueue {
@@ -45,13 +48,22 @@ impl LitQueue {
         self.count >= Self::FULL
     }
 
-    /// A round of so many paths begins.
-    pub fn expect(&mut self, paths: usize) {
+    /// A round of so many paths begins, whose beams are asked for or not.
+    pub fn expect(&mut self, paths: usize, has_cones: bool) {
         self.clear();
+        self.cones.clear();
+        self.cones.resize(if has_cones { paths } else { 0 }, Cone::default());
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
         self.media.clear();
         self.media.push(Medium::default());
+    }
+
+    /// Note the beam that comes to the vertex of a path.
+    pub fn note_cone(&mut self, place: u32, cone: Cone) {
+        if let Some(own) = self.cones.get_mut(place as usize) {
+            *own = cone;
+        }
     }
 
     /// The round is over: the sink gets what lamps send, in the order of the paths; their slots, and whether the eye sees their
@@ -95,6 +107,7 @@ impl LitQueue {
 
     /// One more vertex.
     pub fn push(&mut self, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+        self.note_cone(lit.place, lit.vertex.cone);
         let mut medium = 0;
         if !lit.path.medium.is_air() {
             medium = self.media.len() as u32;
@@ -155,11 +168,15 @@ impl LitQueue {
                 }
             };
             if let Others::Lobes(sharp) = others {
-                arrived = instructions.run(LobeRays { shot, row, sharp, media, arrived });
+                arrived = instructions.run(LobeRays { shot, row, sharp, measure, media, arrived });
             }
             rays.shadow += arrived.rays.shadow;
             rays.scattered += arrived.rays.scattered;
-            arrived.light = row.carried_on(&arrived.light);
+            rays.lookups += arrived.rays.lookups;
+            arrived.light = match measure {
+                Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(&arrived.light),
+                Measure::Work => arrived.light,
+            };
             match row.run() {
                 Some(first) => {
                     let own = &mut self.arrived[first as usize..][..LANES];
@@ -174,7 +191,7 @@ impl LitQueue {
                 }
             }
             if let Some(onward) = onward.filter(|onward| onward.leads_on) {
-                Scattering { shot, row, onward }.scatter(&self.media, next);
+                Scattering { shot, row, onward }.scatter(&self.media, &self.cones, next);
             }
         }
         self.clear();

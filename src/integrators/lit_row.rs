@@ -72,6 +72,7 @@ impl LitRow {
         let shows = match measure {
             Measure::Radiance(Parts { specular, .. }) => specular,
             Measure::ArrivingShare => false,
+            Measure::Work => true,
         };
         let is_soft = shot.settings.render.shadows == Shadows::Soft;
         if !(self.is_glossy && shows && is_soft && shot.world.lights.can_be_found()) {
@@ -286,13 +287,13 @@ pub(super) const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
 /// The diffuse part of f in sr⁻¹, and the glossy one at its peak, as far as they are shown.
 #[inline(always)]
 pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
+    let Parts { diffuse, specular, .. } = match measure {
+        Measure::Radiance(parts) => parts,
+        Measure::Work => Parts::ALL,
+        Measure::ArrivingShare => return [Vec3::ONE, Vec3::ZERO],
+    };
     let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
-    match measure {
-        Measure::Radiance(Parts { diffuse, specular, .. }) => {
-            [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
-        }
-        Measure::ArrivingShare => [Vec3::ONE, Vec3::ZERO],
-    }
+    [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
 }
 
 /// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing

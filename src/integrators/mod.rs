@@ -1,13 +1,17 @@
 //! From a world and a tile to radiance. Rays travel in batches: a queue of camera rays, the shadow rays of their hits,
 //! the queue of the next bounces.
 //!
-//! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues`, their way to hits
-//! (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what touches it (`crossing`), the ways on at mirrors
-//! and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the `light` there, the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows the rays round by round, for both
-//! methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are of first hits.
+//! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues` with the beams that they
+//! stand for (`cone`), their way to hits (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what
+//! touches it (`crossing`), the ways on at mirrors and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the
+//! `light` there, the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows
+//! the rays round by round, for both methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are
+//! of first hits, `bounds` are lines over the picture.
 
 mod beside;
+mod bounds;
 mod camera;
+mod cone;
 mod counters;
 mod crossing;
 mod light;
@@ -62,7 +66,8 @@ pub fn render_tile(
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
     let settings = &RenderSettings { render: settings.render.heeded(), ..*settings };
-    let shot = Shot { world, settings, block: &block, token };
+    let shot = Shot::new(world, settings, &block, token);
+    let clamp = if settings.view.shown().measure() == Measure::Work { 0.0 } else { settings.render.clamp };
     let mut queues = Queues::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
@@ -73,9 +78,13 @@ pub fn render_tile(
                 shot.camera_rays(slots, &mut queues.rays, negative);
                 views::shade(&shot, number, &mut queues, &mut radiance, &mut counters)?;
             }
-            Shown::Light(measure) => {
-                let sink = Sink { measure, radiance: &mut radiance, clamp: settings.render.clamp };
-                wave::trace(&shot, slots, &mut queues, sink, &mut counters, negative)?;
+            shown @ (Shown::Light(_) | Shown::Film(_) | Shown::Bounds) => {
+                let sink = Sink { measure: shown.measure(), radiance: &mut radiance, clamp };
+                wave::trace(&shot, slots.clone(), &mut queues, sink, &mut counters, negative)?;
+                if shown == Shown::Bounds {
+                    shot.camera_rays(slots, &mut queues.rays, |_, _| {});
+                    bounds::draw(&shot, &mut queues, &mut radiance)?;
+                }
             }
         }
     }

@@ -2,14 +2,16 @@
 //! that meets a lamp which light samples find too.
 
 use super::beside::weight;
+use super::cone::Cone;
 use super::lit_row::{LitRow, Response};
 use super::medium::Medium;
 use super::queues::{History, PathRay};
 use super::shot::Shot;
 use super::specular::SCATTERED;
-use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
+use crate::geometry::{Ray, SurfacePoint};
 use crate::lights::{Met, Source};
+use crate::materials::TexturePoint;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
@@ -30,7 +32,7 @@ impl Onward {
 
     /// From the vertices after so many scatterings.
     pub fn new(shot: &Shot<'_>, depth: u32) -> Self {
-        let emits = || shot.world.materials.iter().any(|material| material.emission.max_element() > 0.0);
+        let emits = || shot.world.materials.iter().any(|material| material.emission.shines());
         let max_depth = shot.settings.render.max_depth;
         let shines = || shot.world.lights.are_beyond() || emits();
         let leads_on = depth + 1 < max_depth || depth + 1 == max_depth && shines();
@@ -83,10 +85,12 @@ pub struct Ways {
 }
 
 impl Scattering<'_> {
-    /// Add the rays of the next round; the vertices are in these media.
-    pub fn scatter(self, media: &[Medium], next: &mut Vec<PathRay>) {
+    /// Add the rays of the next round; the vertices are in these media, and beams come to them so wide, by their places, where
+    /// that is asked for.
+    pub fn scatter(self, media: &[Medium], cones: &[Cone], next: &mut Vec<PathRay>) {
         let row = self.row;
         let ways = self.shot.world.geometry.instructions().run(self);
+        let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
         next.extend(lanes(ways.alive).map(|i| {
             let mut path = PathRay {
                 ray: Ray::new(lane(&row.from, i), lane(&ways.directions, i)),
@@ -100,6 +104,7 @@ impl Scattering<'_> {
                     carried: ways.carried[i],
                     is_seen: false,
                 },
+                cone: cones.get(row.place[i] as usize).map_or(Cone::default(), of_lobe(ways.densities[i])),
             };
             path.path = path.next_path(SCATTERED);
             path
@@ -223,17 +228,25 @@ impl Shot<'_> {
 
     /// What a ray from a lobe of a surface with a normal brings of the radiance that it meets; light samples, as many as there are
     /// such rays, bring the rest.
-    pub fn lamp_radiance(&self, ray: &Ray, from_normal: Vec3, hit: &Hit, density: f32) -> Vec3 {
+    pub fn lamp_radiance(
+        &self,
+        ray: &Ray,
+        from_normal: Vec3,
+        hit: &Hit,
+        density: f32,
+        lookups: &mut u64,
+    ) -> Vec3 {
         let world = self.world;
-        let emission = world.materials[world.material_index(hit)].emission;
-        if emission == Vec3::ZERO {
-            return emission;
+        let emission = &world.materials[world.material_index(hit)].emission;
+        if !emission.shines() {
+            return Vec3::ZERO;
         }
-        let normal = world.geometry.surface(ray, hit).normal;
+        let SurfacePoint { normal, uv, .. } = world.geometry.surface(ray, hit);
         if !(normal.dot(ray.direction) < 0.0) {
             return Vec3::ZERO;
         }
-        emission * weight(self.sample_density(ray, from_normal, (hit, normal)) / density)
+        let radiance = emission.at(&TexturePoint::sharp(uv), lookups);
+        radiance * weight(self.sample_density(ray, from_normal, (hit, normal)) / density)
     }
 
     /// The same of a lamp that touches glass which the path meets with it: whether light samples find it there is decided by

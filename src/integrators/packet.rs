@@ -175,7 +175,7 @@ impl Loops for Meeting<'_> {
             let Some((material, bsdf)) = world.plain_phong(id) else { continue };
             if surface.fill(shape, rows, &hits, of) {
                 plain |= of;
-                shining |= if material.emission.max_element() > 0.0 { of } else { 0 };
+                shining |= if material.emission.shines() { of } else { 0 };
                 row.used |= if bsdf.is_black() { 0 } else { of };
                 let seen = seen & of;
                 row.set_bsdf(of, &bsdf, measure);

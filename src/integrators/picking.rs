@@ -5,6 +5,7 @@ use arrayvec::ArrayVec;
 
 use super::light::{Arrived, Lighting, Sums, add_where};
 use super::lit_row::Response;
+use super::view::Measure;
 use crate::geometry::rows::lanes;
 use crate::lights::{Cut, LightRow, LightTree, Lights, Middle};
 use crate::math::Vec3;
@@ -168,6 +169,8 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 sums.total[i] += if is_active { sampled.values[0][i] } else { 0.0 };
             }
             match render.shadows {
+                // Nothing is traced, so there is no work.
+                Shadows::Off if self.measure == Measure::Work => {}
                 Shadows::Off => add_where(sampled.active, &sampled.values, &mut sums.light),
                 Shadows::Hard | Shadows::Soft => all.push(sampled),
             }

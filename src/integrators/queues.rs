@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use super::camera::CameraRow;
+use super::cone::Cone;
 use super::crossing::CrossingMemory;
 use super::lit_queue::LitQueue;
 use super::medium::Medium;
@@ -25,6 +26,8 @@ pub struct PathRay {
     pub medium: Medium,
     /// How it came to its direction.
     pub history: History,
+    /// The beam that it stands for.
+    pub cone: Cone,
 }
 
 /// What the light that a path meets depends on beside its ray.
@@ -164,6 +167,7 @@ mod tests {
             path,
             medium: Medium::default(),
             history: History::CAMERA,
+            cone: Cone::default(),
         }
     }
 

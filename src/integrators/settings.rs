@@ -1,6 +1,6 @@
 //! How a world is rendered.
 
-use super::View;
+use super::{Shown, View};
 use crate::math::DVec2;
 use crate::scene::description::Render;
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
@@ -30,6 +30,10 @@ impl RenderSettings {
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         let Self { render, dof, view } = *self;
-        key.add(&render, of).flag(dof).choice(view);
+        key.add(&render, of).flag(dof).choice(view.sampled());
+        // Lines over a picture are as bright as the exposure leaves them to be.
+        if view.shown() == Shown::Bounds {
+            key.f32(render.exposure);
+        }
     }
 }

@@ -18,9 +18,23 @@ pub struct Shot<'a> {
     pub block: &'a SampleBlock,
     /// Says when to stop.
     pub token: &'a CancelToken,
+    /// By how much the beam of a pixel grows with the distance; 0 where nothing asks for it, which are textures with levels.
+    pub pixel_spread: f32,
 }
 
-impl Shot<'_> {
+impl<'a> Shot<'a> {
+    /// Of these samples.
+    pub fn new(
+        world: &'a World,
+        settings: &'a RenderSettings,
+        block: &'a SampleBlock,
+        token: &'a CancelToken,
+    ) -> Self {
+        let pixel_spread =
+            if world.is_mipmapped() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
+        Self { world, settings, block, token, pixel_spread }
+    }
+
     /// The random numbers of a slot.
     pub fn sampler(&self, slot: u32) -> PixelSampler {
         let (x, y, sample) = self.block.place(slot);

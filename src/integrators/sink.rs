@@ -36,11 +36,24 @@ impl Sink<'_> {
         }
     }
 
+    /// Light of a lamp that a path meets after a surface which the eye sees.
+    pub fn add_met(&mut self, slot: u32, radiance: Vec3) {
+        match self.measure {
+            Measure::Radiance(_) => self.add_arrived(slot, radiance, false),
+            Measure::ArrivingShare | Measure::Work => {}
+        }
+    }
+
+    /// Work that a ray takes.
+    pub fn add_work(&mut self, slot: u32, count: u32) {
+        self.radiance[slot as usize] += Vec3::splat(count as f32);
+    }
+
     /// The parts of radiance that are taken as they are.
     fn parts(&self) -> Parts {
         match self.measure {
             Measure::Radiance(parts) => parts,
-            Measure::ArrivingShare => Parts::NONE,
+            Measure::ArrivingShare | Measure::Work => Parts::NONE,
         }
     }
 
@@ -48,7 +61,7 @@ impl Sink<'_> {
     pub fn takes_reflected(&self) -> bool {
         match self.measure {
             Measure::Radiance(parts) => parts.diffuse || parts.specular,
-            Measure::ArrivingShare => true,
+            Measure::ArrivingShare | Measure::Work => true,
         }
     }
 

@@ -1,5 +1,6 @@
 //! The ways on at mirrors and glass.
 
+use super::cone::Bend;
 use super::medium::{Medium, ior};
 use super::queues::PathRay;
 use super::vertices::{Shading, Vertex};
@@ -27,6 +28,7 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
         throughput: path.throughput * reflectance,
         path: path.next_path(REFLECTED),
         history: path.history.mirrored(reflectance.max_element()),
+        cone: vertex.bent_cone(Bend::Reflected),
         ..*path
     }
 }
@@ -55,6 +57,7 @@ pub fn interface(
         path: path.next_path(REFRACTED),
         medium: far,
         history: path.history.mirrored(1.0),
+        cone: vertex.bent_cone(Bend::Refracted(eta)),
         ..*path
     });
     Interface { reflectance, refracted }

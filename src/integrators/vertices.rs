@@ -2,12 +2,13 @@
 //! and the BSDF.
 
 use super::RayCounters;
+use super::cone::{Bend, Cone};
 use super::queues::PathRay;
 use super::shot::Shot;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray, SurfacePoint};
 use crate::materials::phong::PhongBsdf;
-use crate::materials::{Bsdf, Material};
+use crate::materials::{Bsdf, Footprint, Material, TexturePoint};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
@@ -28,39 +29,66 @@ pub struct Vertex<'a> {
     pub normal: Vec3,
     /// −1 where that is the back, else 1.
     side: f32,
+    /// Where its textures are looked up.
+    pub texture_point: TexturePoint,
+    /// The beam of the path, where it meets the surface.
+    pub cone: Cone,
+    /// Mean curvature, > 0 where the surface bulges towards the eye; asked of δ surfaces alone.
+    pub curvature: f32,
 }
 
 impl<'a> Vertex<'a> {
     /// Where a ray hits.
     pub fn new(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
         let material = &shot.world.materials[shot.world.material_index(hit)];
-        Self::met(path, material, shot.world.geometry.surface(&path.ray, hit))
+        let surface = shot.world.geometry.surface(&path.ray, hit);
+        Self::met(shot, path, (material, surface), hit, hit.shape.t)
     }
 
     /// The same, with no more of the surface than its material asks for.
     pub fn to_shade(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
-        Self::shaded(shot, path, &path.ray, hit)
+        Self::shaded(shot, path, (&path.ray, hit), hit.shape.t)
     }
 
-    /// What touches the surface that a ray hits, as the way between the sides of both meets it.
-    pub fn touching(shot: &Shot<'a>, path: &PathRay, sides: Sides, hit: &Hit) -> Self {
-        Self { sides: Some(sides), ..Self::shaded(shot, path, &sides.ray(), hit) }
+    /// What touches the surface that a ray hits at a distance, as the way between the sides of both meets it.
+    pub fn touching(shot: &Shot<'a>, path: &PathRay, (sides, hit): (Sides, &Hit), distance: f32) -> Self {
+        Self { sides: Some(sides), ..Self::shaded(shot, path, (&sides.ray(), hit), distance) }
     }
 
-    fn shaded(shot: &Shot<'a>, path: &PathRay, by: &Ray, hit: &Hit) -> Self {
+    fn shaded(shot: &Shot<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let material = &shot.world.materials[shot.world.material_index(hit)];
-        let (is_textured, is_lit) = match &material.bsdf {
-            Bsdf::Phong(phong) => (phong.constant().is_none(), true),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => (false, false),
+        let is_lit = match &material.bsdf {
+            Bsdf::Phong(_) => true,
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
         };
-        let asked = Asked { uv: is_textured || material.normal_map.is_some(), shadow_point: is_lit };
-        Self::met(path, material, shot.world.geometry.asked_surface(by, hit, asked))
+        let asked = Asked { uv: material.is_textured(), shadow_point: is_lit };
+        let surface = shot.world.geometry.asked_surface(by, hit, asked);
+        Self::met(shot, path, (material, surface), hit, distance)
     }
 
-    fn met(path: &PathRay, material: &'a Material, surface: SurfacePoint) -> Self {
+    fn met(
+        shot: &Shot<'a>,
+        path: &PathRay,
+        (material, surface): (&'a Material, SurfacePoint),
+        hit: &Hit,
+        distance: f32,
+    ) -> Self {
         let to_eye = -path.ray.direction;
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
+        let cone = path.cone.after(distance);
+        let (mut footprint, mut curvature) = (Footprint::POINT, 0.0);
+        if shot.pixel_spread > 0.0 {
+            let tangents = [surface.dpdu, surface.dpdv];
+            footprint = Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents);
+            curvature = match &material.bsdf {
+                Bsdf::Phong(_) => 0.0,
+                Bsdf::Mirror(_) | Bsdf::Glass(_) => side * shot.world.geometry.curvature(hit, &surface),
+            };
+        }
         Self {
+            texture_point: TexturePoint { uv: surface.uv, footprint },
+            cone,
+            curvature,
             material,
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             to_eye,
@@ -73,7 +101,14 @@ impl<'a> Vertex<'a> {
 
     /// Whether it sends out light towards the path.
     pub fn emits(&self) -> bool {
-        self.is_front && self.material.emission != Vec3::ZERO
+        self.is_front && self.material.emission.shines()
+    }
+
+    /// The radiance that it sends out. To paths that light samples share their lamps with it is what those find: that of the point.
+    pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
+        let is_shared = path.history.density > 0.0;
+        let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
+        self.material.emission.at(&at, &mut counters.texture_lookups)
     }
 
     /// The same, with rays that leave from these.
@@ -86,7 +121,7 @@ impl<'a> Vertex<'a> {
         let surface = &self.surface;
         let Some(map) = &self.material.normal_map else { return surface.shading_normal };
         counters.texture_lookups += 1;
-        map.bend(surface.uv, surface.shading_normal, surface.dpdu, surface.dpdv)
+        map.bend(&self.texture_point, surface.shading_normal, surface.dpdu, surface.dpdv)
     }
 
     /// What shading goes by.
@@ -95,6 +130,11 @@ impl<'a> Vertex<'a> {
         let smooth_normal = self.surface.shading_normal * self.side;
         let bend = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
         Shading { normal, smooth_normal, bend }
+    }
+
+    /// The beam that goes on from here, where it is mirrored or refracted.
+    pub fn bent_cone(&self, bend: Bend) -> Cone {
+        self.cone.bent(bend, self.curvature, self.to_eye.dot(self.normal))
     }
 
     /// A ray that starts here.

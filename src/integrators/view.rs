@@ -1,6 +1,7 @@
 //! What a picture shows.
 
 use crate::choice;
+use crate::film::Quantity;
 
 choice! {
     /// What a picture shows.
@@ -27,6 +28,14 @@ choice! {
         Emission = "emission",
         /// Fraction of the lights' radiance that arrives.
         Shadow = "shadow",
+        /// The boxes of the trees over the picture, a colour for each level; faint behind surfaces.
+        Bounds = "bounds",
+        /// Boxes and shapes that the rays of a sample meet, up to their ends.
+        Cost = "cost",
+        /// Samples of each pixel.
+        Samples = "samples",
+        /// Standard error to expect of each pixel's luminance, by what its last samples changed.
+        Error = "error",
     }
 }
 
@@ -41,11 +50,33 @@ impl View {
             Self::Specular => of(Parts { specular: true, ..Parts::NONE }),
             Self::Emission => of(Parts { emitted: true, ..Parts::NONE }),
             Self::Shadow => Shown::Light(Measure::ArrivingShare),
+            Self::Bounds => Shown::Bounds,
+            Self::Cost => Shown::Light(Measure::Work),
+            Self::Samples => Shown::Film(Quantity::Samples),
+            Self::Error => Shown::Film(Quantity::Error),
             Self::Normal => Shown::FirstHit(FirstHit::Normal),
             Self::Depth => Shown::FirstHit(FirstHit::Depth),
             Self::Barycentric => Shown::FirstHit(FirstHit::Barycentric),
             Self::Uv => Shown::FirstHit(FirstHit::Uv),
             Self::Albedo => Shown::FirstHit(FirstHit::Albedo),
+        }
+    }
+}
+
+impl View {
+    /// The view whose samples it shows.
+    pub fn sampled(self) -> Self {
+        match self.shown() {
+            Shown::Film(Quantity::Radiance | Quantity::Samples | Quantity::Error) => Self::Beauty,
+            Shown::Light(_) | Shown::FirstHit(_) | Shown::Bounds => self,
+        }
+    }
+
+    /// What of its samples it shows.
+    pub fn quantity(self) -> Quantity {
+        match self.shown() {
+            Shown::Film(quantity) => quantity,
+            Shown::Light(_) | Shown::FirstHit(_) | Shown::Bounds => Quantity::Radiance,
         }
     }
 }
@@ -57,6 +88,20 @@ pub enum Shown {
     Light(Measure),
     /// A number about the first hit: no exposure or tone curve applies. But for distances it is displayed as it is.
     FirstHit(FirstHit),
+    /// All radiance, and over it the boxes of the trees.
+    Bounds,
+    /// A number about the samples of the picture.
+    Film(Quantity),
+}
+
+impl Shown {
+    /// The measure of light that its samples are of; of first hits none is asked for.
+    pub fn measure(self) -> Measure {
+        match self {
+            Self::Light(measure) => measure,
+            Self::FirstHit(_) | Self::Bounds | Self::Film(_) => Measure::ALL,
+        }
+    }
 }
 
 /// A measure of the light that a sample sees.
@@ -66,6 +111,8 @@ pub enum Measure {
     Radiance(Parts),
     /// The share, from 0 to 1, of what could arrive from the lights that does.
     ArrivingShare,
+    /// What all rays of the sample meet in the trees.
+    Work,
 }
 
 impl Measure {

@@ -26,7 +26,9 @@ pub fn shade(
             FirstHit::Depth => Vec3::splat(distance(shot, surface)),
             FirstHit::Barycentric => surface.barycentric,
             FirstHit::Uv => fraction(surface.uv).as_vec2().extend(0.0),
-            FirstHit::Albedo => vertex.material.bsdf.albedo(surface.uv, &mut counters.texture_lookups),
+            FirstHit::Albedo => {
+                vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups)
+            }
         };
         radiance[path.slot as usize] = value * path.throughput;
     }

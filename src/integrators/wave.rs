@@ -55,7 +55,7 @@ pub fn trace(
     let mut wave =
         Wave { depth: 0, is_path, onward: None, shot, lit, sink, next, crossing, place: 0, counters };
     wave.begin_round();
-    wave.lit.expect(slots.len());
+    wave.lit.expect(slots.len(), shot.pixel_spread > 0.0);
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
         shot.camera_rows(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
@@ -68,7 +68,7 @@ pub fn trace(
     wave.lit.settle_run(slots.start, &mut wave.sink);
     wave.next_round(rays);
     while !rays.is_empty() {
-        wave.lit.expect(rays.len());
+        wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
         if wave.is_path {
             shot.closest_hits(rays, hits)?;
             by_object.sort(hits);
@@ -112,6 +112,7 @@ impl Wave<'_, '_> {
         let before = self.next.len();
         let rays = self.lit.light(self.shot, self.sink.measure, self.onward, self.next)?;
         self.counters.shadow_rays += rays.shadow;
+        self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
         Ok(())
     }
@@ -135,8 +136,19 @@ impl Wave<'_, '_> {
             shot.token.check()?;
         }
         let met = shot.meet(rays, self.sink.measure, self.lit.spare());
+        if self.sink.measure == Measure::Work {
+            for lane in 0..rays.count() {
+                self.add_work(&met.path(shot, &rays, lane), met.hit(lane));
+            }
+        }
         if self.depth < shot.settings.render.max_depth && self.sink.takes_reflected() {
             self.lit.keep();
+            if shot.pixel_spread > 0.0 {
+                for (lane, hit) in lanes(met.plain).filter_map(|lane| Some((lane, met.hit(lane)?))) {
+                    let cone = met.path(shot, &rays, lane).cone.after(hit.shape.t);
+                    self.lit.note_cone(rays.place(lane), cone);
+                }
+            }
         }
         let render = &shot.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
@@ -165,11 +177,17 @@ impl Wave<'_, '_> {
         Ok(())
     }
 
+    /// Add what the ray of a path meets in the trees, up to its hit.
+    fn add_work(&mut self, path: &PathRay, hit: Option<Hit>) {
+        let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
+        self.sink.add_work(path.slot, self.shot.world.geometry.work(&Ray { t_max, ..path.ray }));
+    }
+
     /// What a plain surface sends to the eye by itself.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let Some((material, bsdf)) = self.shot.world.plain_phong(hit.object) else { return };
         if is_shining {
-            self.add_emitted(path, material.emission, self.shot.lamp_weight(path, hit));
+            self.add_emitted(path, material.emission.scale, self.shot.lamp_weight(path, hit));
         }
         let render = &self.shot.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
@@ -182,7 +200,7 @@ impl Wave<'_, '_> {
         if path.history.is_seen {
             self.sink.add(path.slot, Part::Emitted, path.throughput * radiance);
         } else {
-            self.sink.add_arrived(path.slot, path.throughput * radiance * weight, false);
+            self.sink.add_met(path.slot, path.throughput * radiance * weight);
         }
     }
 
@@ -196,7 +214,7 @@ impl Wave<'_, '_> {
             let background = self.shot.settings.render.background;
             self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
         } else if beyond != Vec3::ZERO {
-            self.sink.add_arrived(path.slot, path.throughput * beyond, false);
+            self.sink.add_met(path.slot, path.throughput * beyond);
         }
     }
 
@@ -213,7 +231,7 @@ impl Wave<'_, '_> {
                 shot.crossing(&path, &vertex, hit.shape.t, self.crossing);
             path.medium = near;
             if let Some(touching) = opaque {
-                let vertex = Vertex::touching(shot, &path, sides, &touching);
+                let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let weight = if vertex.emits() { shot.touching_lamp_weight(&path, &touched) } else { 1.0 };
                 return self.shade_surface(path, &vertex, hit.shape.t, weight);
@@ -224,7 +242,12 @@ impl Wave<'_, '_> {
             path.throughput *= absorption(shot.world, near, hit.shape.t);
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
             path.history = path.history.hidden();
-            match shot.world.geometry.closest(&path.ray) {
+            path.cone = path.cone.after(hit.shape.t);
+            let next = shot.world.geometry.closest(&path.ray);
+            if self.sink.measure == Measure::Work {
+                self.add_work(&path, next);
+            }
+            match next {
                 Some(next) => hit = next,
                 None => return self.leave(&path),
             }
@@ -239,7 +262,8 @@ impl Wave<'_, '_> {
         let shot = self.shot;
         path.throughput *= absorption(shot.world, path.medium, distance);
         if vertex.emits() {
-            self.add_emitted(path, vertex.material.emission, weight);
+            let radiance = vertex.emitted(path, self.counters);
+            self.add_emitted(path, radiance, weight);
         }
         self.depth < shot.settings.render.max_depth
     }
@@ -256,7 +280,7 @@ impl Wave<'_, '_> {
     }
 
     fn shade_phong(&mut self, path: &PathRay, vertex: &Vertex<'_>, phong: &Phong) {
-        let bsdf = phong.at(vertex.surface.uv, &mut self.counters.texture_lookups);
+        let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.shot.settings.render.ambient;
         if ambient != Vec3::ZERO {
             self.sink.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);

@@ -4,6 +4,7 @@ use super::emitter::{Arrival, Emitter};
 use super::row::row_of;
 use super::sphere::SphereEmitter;
 use super::{AreaLight, Light, LightRow, Lights, PointLight, Source};
+use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
@@ -22,7 +23,7 @@ impl Lights {
         for i in 1..LANES {
             lights[i] = self.get(picked[i]);
         }
-        let row = if let Some(lights) = all(&lights, point) {
+        let mut row = if let Some(lights) = all(&lights, point) {
             row_of!(Source::Nothing, i => {
                 let (direction, weight) = lights[i].arriving(lane(points, i));
                 (direction, lights[i].position.as_vec3(), weight)
@@ -38,12 +39,20 @@ impl Lights {
             }
             row
         } else {
-            let sample = |i: usize, point| lights[i].sample(point, lane(normals, i), [u[0][i], u[1][i]]);
+            let sample =
+                |i: usize, point| lights[i].plain_sample(point, lane(normals, i), [u[0][i], u[1][i]]);
             LightRow::one_by_one(points, used, sample)
         };
         let mut inverse = [0.0; LANES];
         for i in 0..LANES {
             inverse[i] = lights[i].inverse_density(lane(&row.directions, i), lane(&row.weights, i));
+        }
+        // Densities are those of plain lamps.
+        for i in lanes(used) {
+            if let Some(pattern) = lights[i].pattern() {
+                let weight = lane(&row.weights, i) * pattern.at(lane(&row.targets, i), row.sources.part[i]);
+                set_lane(&mut row.weights, i, weight);
+            }
         }
         (row, inverse)
     }

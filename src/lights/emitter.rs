@@ -3,6 +3,7 @@
 use super::cuboid::BoxEmitter;
 use super::disk::DiskEmitter;
 use super::mesh::MeshEmitter;
+use super::pattern::Pattern;
 use super::rectangle::QuadEmitter;
 use super::round::{ConeSide, CylinderSide, RoundEmitter};
 use super::sphere::SphereEmitter;
@@ -15,13 +16,15 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec3};
 
-/// A shape that sends the same radiance everywhere from its front side.
+/// A shape that sends out light from its front side, in every direction alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
     /// Which shape.
     pub shape: Emitter,
-    /// Its radiance.
+    /// Its radiance; with a pattern, what that is multiplied by.
     pub radiance: Vec3,
+    /// What it is multiplied by from point to point.
+    pub pattern: Option<Box<Pattern>>,
     /// The object that it is.
     pub object: u32,
     /// Which part of it.
@@ -79,7 +82,7 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Plane(_) => return None,
     };
     let bounds = bounds(shape, radiance)?;
-    Some(AreaLight { shape: emitter, radiance, object, part: Part::Whole, bounds })
+    Some(AreaLight { shape: emitter, radiance, pattern: None, object, part: Part::Whole, bounds })
 }
 
 /// Where a shape is and what it sends; none where it has no end. What is flat sends by the cosine, all else a quarter of its area
@@ -107,6 +110,17 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 impl AreaLight {
     /// [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let sample = self.plain_sample(point, normal, u)?;
+        let (Some(pattern), End::At(target)) = (&self.pattern, sample.end) else { return Some(sample) };
+        let primitive = match sample.source {
+            Source::Primitive(_, primitive) => primitive,
+            Source::Object(_) | Source::Nothing => 0,
+        };
+        Some(LightSample { weight: sample.weight * pattern.at(target, primitive), ..sample })
+    }
+
+    /// The same without its pattern.
+    pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: Arrival| {
             let Arrival { direction, target, factor } = sample;
             let (end, source) = (End::At(target), Source::Object(self.object));

@@ -9,6 +9,7 @@ pub mod environment;
 mod linear;
 mod meridians;
 pub mod mesh;
+pub mod pattern;
 pub mod point;
 pub mod rectangle;
 pub mod round;
@@ -24,6 +25,7 @@ pub mod triangle;
 pub use directional::DirectionalLight;
 pub use emitter::{AreaLight, Part, area_light};
 pub use environment::Environment;
+pub use pattern::{Chart, Patch, Pattern};
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
 pub use set::{Lights, Samples};
@@ -136,6 +138,16 @@ impl Light {
         }
     }
 
+    /// The same, as if it sent the same radiance from everywhere.
+    pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        match self {
+            Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => {
+                self.sample(point, normal, u)
+            }
+            Self::Area(light) => light.plain_sample(point, normal, u),
+        }
+    }
+
     /// Where it is and what it sends, for a [`LightTree`]; none of a light that has none.
     pub fn bounds(&self) -> Option<LightBounds> {
         match self {
@@ -146,6 +158,15 @@ impl Light {
             Self::Area(light) => Some(light.bounds),
         }
         .filter(|bounds| bounds.power > 0.0)
+    }
+
+    /// What its radiance is multiplied by from point to point; none: nothing.
+    #[inline(always)]
+    pub fn pattern(&self) -> Option<&Pattern> {
+        match self {
+            Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => None,
+            Self::Area(light) => light.pattern.as_deref(),
+        }
     }
 
     /// Whether there is but one way.

@@ -140,7 +140,7 @@ impl LightRow {
 }
 
 impl Light {
-    /// [`Light::sample`] for the points whose bits are set, each by numbers of its own.
+    /// [`Light::sample`] for the points whose bits are set, each by numbers of its own; without the pattern of a lamp.
     #[inline(always)]
     pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
         let light = match self {
@@ -185,7 +185,7 @@ impl Light {
             | Emitter::Cone(_)
             | Emitter::Torus(_)
             | Emitter::Mesh(_) => LightRow::one_by_one(points, used, |i, point| {
-                light.sample(point, lane(normals, i), [u[0][i], u[1][i]])
+                light.plain_sample(point, lane(normals, i), [u[0][i], u[1][i]])
             }),
         }
     }

@@ -189,6 +189,7 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
             bounds,
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::splat(radiance),
+            pattern: None,
             object: 3,
             part: Part::Listed,
         })

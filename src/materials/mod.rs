@@ -1,21 +1,28 @@
 //! What surfaces do with light.
 
+pub mod emission;
+pub mod footprint;
 pub mod fresnel;
 pub mod glass;
 pub mod lobes;
+pub mod mipmaps;
 pub mod mirror;
 pub mod normal_map;
 pub mod phong;
 pub mod texels;
 pub mod texture;
 
+pub use emission::Emission;
+pub use footprint::{Footprint, TexturePoint};
 pub use glass::Glass;
 pub use lobes::Lobes;
+pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use phong::Phong;
 
-use crate::math::{DVec2, Vec3};
+use crate::math::Vec3;
+use texture::Color;
 
 /// A material, ready to be looked up.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,9 +30,32 @@ pub struct Material {
     /// What it does with light that arrives.
     pub bsdf: Bsdf,
     /// Radiance that its front side sends out, in every direction alike.
-    pub emission: Vec3,
+    pub emission: Emission,
     /// Bends the shading normals.
     pub normal_map: Option<NormalMap>,
+}
+
+impl Material {
+    /// Whether anything of it changes with texture coordinates.
+    pub fn is_textured(&self) -> bool {
+        let in_bsdf = match &self.bsdf {
+            Bsdf::Phong(phong) => phong.constant().is_none(),
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
+        };
+        in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some()
+    }
+
+    /// Whether any of its textures has levels.
+    pub fn is_mipmapped(&self) -> bool {
+        let of_bsdf = match &self.bsdf {
+            Bsdf::Phong(Phong { diffuse, specular, shininess: _, ambient }) => {
+                [Some(diffuse), Some(specular), ambient.as_ref()].map(|color| color.and_then(Color::texture))
+            }
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => [None; 3],
+        };
+        let others = [self.emission.texture.as_ref(), self.normal_map.as_ref().map(|map| &map.texture)];
+        of_bsdf.into_iter().chain(others).flatten().any(|texture| texture.mipmaps.is_some())
+    }
 }
 
 /// What a material does with light that arrives (a bidirectional scattering distribution function).
@@ -49,9 +79,9 @@ impl Bsdf {
     }
 
     /// Its main colour, and how many texture look-ups that took.
-    pub fn albedo(&self, uv: DVec2, lookups: &mut u64) -> Vec3 {
+    pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
-            Self::Phong(phong) => phong.diffuse.at(uv, lookups),
+            Self::Phong(phong) => phong.diffuse.at(at, lookups),
             Self::Mirror(mirror) => mirror.reflectance,
             Self::Glass(glass) => glass.tint,
         }

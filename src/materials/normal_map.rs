@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use super::footprint::TexturePoint;
 use super::texture::Texture;
+use crate::math::Vec3;
 use crate::math::frame::Frame;
-use crate::math::{DVec2, Vec3};
 
 /// A texture of normals, (n + 1)/2 in linear numbers, with z away from the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,8 +19,8 @@ pub struct NormalMap {
 impl NormalMap {
     /// The bent shading normal, on the same side as `normal`; the tangents need not be unit or perpendicular, and where
     /// there are none (0) any frame of the normal serves.
-    pub fn bend(&self, uv: DVec2, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
-        let mapped = self.texture.lookup(uv) * 2.0 - Vec3::ONE;
+    pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
+        let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
         let slope = mapped.truncate() * self.strength;
         let (tangent, bitangent) = tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
@@ -43,32 +44,41 @@ mod tests {
     use super::*;
     use crate::materials::texels::{TexelData, Texels};
     use crate::materials::texture::{TextureFilter, Wrap};
-    use crate::math::Vec2;
+    use crate::math::{DVec2, Vec2};
+
+    fn middle() -> TexturePoint {
+        TexturePoint::sharp(DVec2::ZERO)
+    }
 
     fn map(normal: Vec3) -> NormalMap {
         let data = TexelData::Float(vec![(normal + Vec3::ONE) * 0.5]);
         let texels = Arc::new(Texels { width: 1, height: 1, data, unusable: 0 });
-        let texture =
-            Texture { texels, filter: TextureFilter::Nearest, wrap: Wrap::Repeat, repeat: Vec2::ONE };
+        let texture = Texture {
+            texels,
+            filter: TextureFilter::Nearest,
+            wrap: Wrap::Repeat,
+            repeat: Vec2::ONE,
+            mipmaps: None,
+        };
         NormalMap { texture: Arc::new(texture), strength: 1.0 }
     }
 
     #[test]
     fn a_flat_map_changes_nothing_and_a_tilt_follows_the_tangents() {
         let n = Vec3::Z;
-        assert_eq!(map(Vec3::Z).bend(DVec2::ZERO, n, Vec3::X, Vec3::Y), n);
+        assert_eq!(map(Vec3::Z).bend(&middle(), n, Vec3::X, Vec3::Y), n);
         let tilted = map(Vec3::new(0.6, 0.0, 0.8));
-        let bent = tilted.bend(DVec2::ZERO, n, Vec3::new(0.0, 3.0, 1.0), Vec3::new(-2.0, 0.0, 0.0));
+        let bent = tilted.bend(&middle(), n, Vec3::new(0.0, 3.0, 1.0), Vec3::new(-2.0, 0.0, 0.0));
         assert!((bent - Vec3::new(0.0, 0.6, 0.8)).length() < 1e-6);
         // A mirrored parametrisation bends the other way along v.
         let along_v = map(Vec3::new(0.0, 0.6, 0.8));
-        let bent = along_v.bend(DVec2::ZERO, n, Vec3::X, Vec3::NEG_Y);
+        let bent = along_v.bend(&middle(), n, Vec3::X, Vec3::NEG_Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6);
     }
 
     #[test]
     fn without_tangents_the_normal_is_still_a_unit_vector_on_its_side() {
-        let bent = map(Vec3::new(0.6, 0.0, -0.8)).bend(DVec2::ZERO, Vec3::Y, Vec3::ZERO, Vec3::ZERO);
+        let bent = map(Vec3::new(0.6, 0.0, -0.8)).bend(&middle(), Vec3::Y, Vec3::ZERO, Vec3::ZERO);
         assert!((bent.length() - 1.0).abs() < 1e-6 && bent.y > 0.0);
     }
 }

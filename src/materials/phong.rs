@@ -3,9 +3,10 @@
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
+use super::footprint::TexturePoint;
 use super::lobes::{Lobes, gloss};
 use super::texture::Color;
-use crate::math::{DVec2, Vec3};
+use crate::math::Vec3;
 
 /// Diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,13 +36,13 @@ pub struct PhongBsdf {
 
 impl Phong {
     /// Look its textures up.
-    pub fn at(&self, uv: DVec2, lookups: &mut u64) -> PhongBsdf {
-        let diffuse = self.diffuse.at(uv, lookups);
+    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PhongBsdf {
+        let diffuse = self.diffuse.at(at, lookups);
         PhongBsdf {
             diffuse,
-            specular: self.specular.at(uv, lookups),
+            specular: self.specular.at(at, lookups),
             shininess: self.shininess,
-            ambient: self.ambient.as_ref().map_or(diffuse, |ambient| ambient.at(uv, lookups)),
+            ambient: self.ambient.as_ref().map_or(diffuse, |ambient| ambient.at(at, lookups)),
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use std::sync::LazyLock;
 
-use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
+use crate::math::{DVec3, Vec3};
 
 /// Every sRGB byte decoded.
 static SRGB: LazyLock<[f32; 256]> =
@@ -52,6 +52,13 @@ impl Texels {
             TexelData::Linear8(bytes) => bytes.into_iter().map(of_linear).collect(),
             TexelData::Float(floats) => floats,
         }
+    }
+
+    /// The mean of all.
+    pub fn mean(&self) -> Vec3 {
+        let rows = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
+        let sum: DVec3 = rows.map(|(x, y)| self.get(x, y).as_dvec3()).sum();
+        (sum / self.len() as f64).as_vec3()
     }
 
     /// Whether all of it is 0.

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use super::footprint::{Footprint, TexturePoint};
+use super::mipmaps::Mipmaps;
 use super::texels::Texels;
 use crate::choice;
-use crate::math::{DVec2, Vec2, Vec3};
+use crate::math::elementary::log2;
+use crate::math::{Vec2, Vec3};
 
 choice! {
     /// Texture interpolation.
@@ -13,8 +16,9 @@ choice! {
         Nearest = "nearest",
         /// Between the four nearest texel centres.
         Bilinear = "bilinear",
+        /// The same between two levels of the texture, as far as a pixel sees it.
+        Mipmap = "mipmap",
     }
-    unavailable "mipmap"
 }
 
 choice! {
@@ -34,6 +38,8 @@ choice! {
 pub struct Texture {
     /// The image.
     pub texels: Arc<Texels>,
+    /// Its smaller levels, where the filter is [`TextureFilter::Mipmap`].
+    pub mipmaps: Option<Arc<Mipmaps>>,
     /// Interpolation.
     pub filter: TextureFilter,
     /// Outside [0, 1].
@@ -60,13 +66,21 @@ impl Color {
         }
     }
 
+    /// What it is looked up in, if it is not the same everywhere.
+    pub fn texture(&self) -> Option<&Arc<Texture>> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Texture(texture) => Some(texture),
+        }
+    }
+
     /// The colour at texture coordinates, and how many texture look-ups that took.
-    pub fn at(&self, uv: DVec2, lookups: &mut u64) -> Vec3 {
+    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Constant(color) => *color,
             Self::Texture(texture) => {
                 *lookups += 1;
-                texture.lookup(uv)
+                texture.lookup(at)
             }
         }
     }
@@ -74,32 +88,70 @@ impl Color {
 
 impl Texture {
     /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
-    pub fn lookup(&self, uv: DVec2) -> Vec3 {
-        let size = Vec2::new(self.texels.width as f32, self.texels.height as f32);
+    pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tile = |x: f64| if x.is_finite() { x } else { 0.0 };
-        let place = |x: f64, size: f32| self.wrap.fold(tile(x)) as f32 * size;
-        let tiles = uv * self.repeat.as_dvec2();
-        let (x, y) = (place(tiles.x, size.x), place(tiles.y, size.y));
+        let tiles = at.uv * self.repeat.as_dvec2();
+        let folded = [tiles.x, tiles.y].map(|x| self.wrap.fold(tile(x)) as f32);
         match self.filter {
-            TextureFilter::Nearest => self.texel(x.floor(), y.floor()),
-            TextureFilter::Bilinear => self.bilinear(x - 0.5, y - 0.5),
+            TextureFilter::Nearest => self.nearest(folded),
+            TextureFilter::Bilinear => self.bilinear(&self.texels, folded),
+            TextureFilter::Mipmap => self.trilinear(self.level(&at.footprint), folded),
         }
     }
 
-    fn bilinear(&self, x: f32, y: f32) -> Vec3 {
+    /// The mean of its image, which is that of all of it where a whole number of tiles fits into u and v.
+    pub fn mean(&self) -> Vec3 {
+        let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
+        last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0))
+    }
+
+    /// The level where the footprint is one texel, from 0; more than 0 between two.
+    fn level(&self, footprint: &Footprint) -> f32 {
+        let texels = footprint.texels(size(&self.texels) * self.repeat);
+        if texels > 1.0 { log2(texels) } else { 0.0 }
+    }
+
+    fn nearest(&self, [u, v]: [f32; 2]) -> Vec3 {
+        let size = size(&self.texels);
+        self.texel(&self.texels, (u * size.x).floor(), (v * size.y).floor())
+    }
+
+    /// Between the two levels at `level`.
+    fn trilinear(&self, level: f32, folded: [f32; 2]) -> Vec3 {
+        let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0);
+        let Some(mipmaps) = mipmaps else { return self.bilinear(&self.texels, folded) };
+        let level = level.min(mipmaps.count() as f32);
+        let number = level as usize;
+        let of = |number: usize| match number {
+            0 => &*self.texels,
+            number => mipmaps.level(number).unwrap_or(&self.texels),
+        };
+        let near = self.bilinear(of(number), folded);
+        near.lerp(self.bilinear(of(number + 1), folded), level - number as f32)
+    }
+
+    fn bilinear(&self, texels: &Texels, [u, v]: [f32; 2]) -> Vec3 {
+        let size = size(texels);
+        let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
         let (left, bottom) = (x.floor(), y.floor());
         let (fx, fy) = (x - left, y - bottom);
-        let lower = self.texel(left, bottom).lerp(self.texel(left + 1.0, bottom), fx);
-        let upper = self.texel(left, bottom + 1.0).lerp(self.texel(left + 1.0, bottom + 1.0), fx);
+        let texel = |x: f32, y: f32| self.texel(texels, x, y);
+        let lower = texel(left, bottom).lerp(texel(left + 1.0, bottom), fx);
+        let upper = texel(left, bottom + 1.0).lerp(texel(left + 1.0, bottom + 1.0), fx);
         lower.lerp(upper, fy)
     }
 
     /// A texel by whole numbers, counted from the left and from the bottom, that may lie one outside.
-    fn texel(&self, x: f32, y: f32) -> Vec3 {
-        let column = self.wrap.index(x as i64, i64::from(self.texels.width));
-        let row_from_bottom = self.wrap.index(y as i64, i64::from(self.texels.height));
-        self.texels.get(column, self.texels.height - 1 - row_from_bottom)
+    fn texel(&self, texels: &Texels, x: f32, y: f32) -> Vec3 {
+        let column = self.wrap.index(x as i64, i64::from(texels.width));
+        let row_from_bottom = self.wrap.index(y as i64, i64::from(texels.height));
+        texels.get(column, texels.height - 1 - row_from_bottom)
     }
+}
+
+/// Columns and rows.
+fn size(texels: &Texels) -> Vec2 {
+    Vec2::new(texels.width as f32, texels.height as f32)
 }
 
 impl Wrap {
@@ -130,16 +182,17 @@ impl Wrap {
 mod tests {
     use super::*;
     use crate::materials::texels::TexelData;
+    use crate::math::DVec2;
 
     /// [[0, 1], [2, 3]], bottom row first.
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });
-        Texture { texels, filter, wrap, repeat: Vec2::ONE }
+        Texture { texels, mipmaps: None, filter, wrap, repeat: Vec2::ONE }
     }
 
     fn bilinear(wrap: Wrap, u: f32, v: f32) -> f32 {
-        numbered(TextureFilter::Bilinear, wrap).lookup(Vec2::new(u, v).as_dvec2()).x
+        numbered(TextureFilter::Bilinear, wrap).lookup(&TexturePoint::sharp(Vec2::new(u, v).as_dvec2())).x
     }
 
     #[test]
@@ -162,8 +215,8 @@ mod tests {
         assert!((bilinear(Wrap::Clamp, 9.0, 9.0) - 3.0).abs() < 1e-6);
         let mut repeated = numbered(TextureFilter::Nearest, Wrap::Repeat);
         repeated.repeat = Vec2::new(2.0, 1.0);
-        assert_eq!(repeated.lookup(DVec2::new(0.6, 0.1)).x, 0.0);
-        assert_eq!(repeated.lookup(DVec2::new(0.4, 0.1)).x, 1.0);
+        assert_eq!(repeated.lookup(&TexturePoint::sharp(DVec2::new(0.6, 0.1))).x, 0.0);
+        assert_eq!(repeated.lookup(&TexturePoint::sharp(DVec2::new(0.4, 0.1))).x, 1.0);
     }
 
     #[test]
@@ -174,7 +227,9 @@ mod tests {
                 for bad in [f32::NAN, f32::INFINITY, -1e30, 1e30, 1.0, 0.0, -0.0, 1.0_f32.next_down(), -1e-9]
                 {
                     assert!(
-                        (0.0..=3.0).contains(&texture.lookup(Vec2::new(bad, bad).as_dvec2()).x),
+                        (0.0..=3.0).contains(
+                            &texture.lookup(&TexturePoint::sharp(Vec2::new(bad, bad).as_dvec2())).x
+                        ),
                         "{filter:?} {wrap:?} {bad}"
                     );
                 }

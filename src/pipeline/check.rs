@@ -10,7 +10,7 @@ use super::sink::Sink;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{Lowered, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
-use crate::world::file_emission;
+use crate::world::file_emits;
 
 /// What a scene that is right consists of.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,16 +43,14 @@ pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
     };
     let emits = |object: &&Object| match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].emits(),
-        (None, Some(mesh)) => {
-            meshes[mesh.file].mesh.materials.iter().any(|own| file_emission(own) != Vec3::ZERO)
-        }
+        (None, Some(mesh)) => meshes[mesh.file].mesh.materials.iter().any(file_emits),
         (None, None) => false,
     };
     let environment = scene.environment.iter().filter(|environment| environment.color != Vec3::ZERO).count();
     Ok(Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
-        textures: textures.texels.len() as u64,
+        textures: textures.images.len() as u64,
         lights: (scene.lights.len() + environment + scene.objects.iter().filter(emits).count()) as u64,
         warnings,
     })

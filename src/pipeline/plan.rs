@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::settings::{Effective, Overrides, View};
 use super::targets::NamedBy;
-use crate::film::Rect;
-use crate::film::tone::{Distances, ToneMapping};
+use crate::film::stretch::{Kind, Stretch};
+use crate::film::tone::ToneMapping;
+use crate::film::{Quantity, Rect};
 use crate::integrators::{FirstHit, Measure, RenderSettings, Shown};
 use crate::math::Vec3;
 use crate::output::{BitDepth, Format, OutputError};
@@ -152,11 +153,14 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 /// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
 fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
     match view.shown() {
-        Shown::Light(Measure::Radiance(_)) => {
+        Shown::Light(Measure::Radiance(_)) | Shown::Bounds | Shown::Film(Quantity::Radiance) => {
             ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
         }
         Shown::FirstHit(FirstHit::Depth) => {
-            ToneMapping { distances: Distances::Unknown, ..ToneMapping::DATA }
+            ToneMapping { stretch: Stretch::Unknown(Kind::Distances), ..ToneMapping::DATA }
+        }
+        Shown::Light(Measure::Work) | Shown::Film(Quantity::Samples | Quantity::Error) => {
+            ToneMapping { stretch: Stretch::Unknown(Kind::Amounts), ..ToneMapping::DATA }
         }
         Shown::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
             ToneMapping::DATA
@@ -285,7 +289,11 @@ mod tests {
         for &view in View::ALL {
             let overrides = Overrides { view: Some(view), ..Default::default() };
             let transfer = planned("", &overrides).tone.transfer;
-            let is_display_value = matches!(view.shown(), Shown::FirstHit(_));
+            let is_display_value = match view.shown() {
+                Shown::FirstHit(_) | Shown::Light(Measure::Work) => true,
+                Shown::Film(quantity) => quantity != Quantity::Radiance,
+                Shown::Light(Measure::Radiance(_) | Measure::ArrivingShare) | Shown::Bounds => false,
+            };
             assert_eq!(transfer == Transfer::Identity, is_display_value, "{}", view.name());
         }
     }

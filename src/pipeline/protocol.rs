@@ -333,6 +333,9 @@ pub struct ImageReport {
     pub error: Option<f64>,
     /// Whether every pixel got the samples that were asked for.
     pub complete: bool,
+    /// Of a view that is stretched to what is seen, such as `depth`: the least and the greatest number. Near is white in `depth`,
+    /// the greatest number in others.
+    pub range: Option<[f32; 2]>,
 }
 
 /// Samples per pixel over a picture.
@@ -394,6 +397,8 @@ pub struct Counters {
     pub photons_stored: u64,
     /// Texels read from files.
     pub texels_loaded: u64,
+    /// Bytes held by images, with the levels of those that have them.
+    pub texture_memory_bytes: u64,
     /// Texture look-ups.
     pub texture_lookups: u64,
     /// Samples that were not finite and count as 0.
@@ -416,4 +421,6 @@ pub struct LatestPreview {
     pub generation: u64,
     /// The picture, at most as large as was asked for.
     pub picture: Arc<Picture>,
+    /// The least and the greatest number that it shows, where it is stretched to them: near and far of distances.
+    pub range: Option<[f32; 2]>,
 }

@@ -11,6 +11,7 @@ use super::stages::canvas::Canvas;
 use super::stages::films::Films;
 use super::targets::guarded;
 use crate::control::CancelToken;
+use crate::film::stretch::Stretch;
 use crate::integrators::RayCounters;
 use crate::lights::{LightTree, Lights};
 use crate::output::{OutputError, write::atomic_until};
@@ -25,6 +26,7 @@ pub(super) struct Finished<'a> {
     pub(super) films: &'a Films,
     pub(super) rays: RayCounters,
     pub(super) texels_loaded: u64,
+    pub(super) texture_memory_bytes: u64,
     pub(super) is_written: bool,
 }
 
@@ -68,6 +70,7 @@ fn image(finished: &Finished<'_>) -> ImageReport {
         samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
         error: finished.canvas.film.relative_error(),
         complete: finished.canvas.is_complete(plan.settings.render.samples),
+        range: range(finished),
     }
 }
 
@@ -87,6 +90,15 @@ fn lights(finished: &Finished<'_>) -> LightsReport {
     }
 }
 
+fn range(finished: &Finished<'_>) -> Option<[f32; 2]> {
+    let Finished { plan, canvas, .. } = finished;
+    if plan.tone.stretch == Stretch::None {
+        return None;
+    }
+    let image = canvas.film.image(plan.settings.view.quantity());
+    plan.tone.of_picture(&image).stretch.range().map(|range| range.ends())
+}
+
 fn counters(finished: &Finished<'_>) -> Counters {
     let (world, rays) = (finished.world, finished.rays);
     Counters {
@@ -100,6 +112,7 @@ fn counters(finished: &Finished<'_>) -> Counters {
         photons_emitted: 0,
         photons_stored: 0,
         texels_loaded: finished.texels_loaded,
+        texture_memory_bytes: finished.texture_memory_bytes,
         texture_lookups: rays.texture_lookups,
         non_finite_samples: finished.canvas.film.non_finite_samples(),
         accel_memory_bytes: world.accel_memory_bytes() as u64,

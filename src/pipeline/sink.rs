@@ -47,8 +47,8 @@ impl Sink {
         self.send(Event::Refused { generation: self.generation, conflicts });
     }
 
-    pub(super) fn preview(&self, picture: Picture) {
-        let latest = LatestPreview { generation: self.generation, picture: Arc::new(picture) };
+    pub(super) fn preview(&self, picture: Picture, range: Option<[f32; 2]>) {
+        let latest = LatestPreview { generation: self.generation, picture: Arc::new(picture), range };
         *self.previews.lock().unwrap_or_else(PoisonError::into_inner) = Some(latest);
         self.send(Event::Preview { generation: self.generation });
     }

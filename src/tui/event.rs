@@ -31,8 +31,8 @@ pub(super) enum Event {
     Resize(Window),
     /// The worker says something. Pictures come as [`Event::Picture`].
     Worker(protocol::Event),
-    /// The newest picture of the slot.
-    Picture { generation: u64, picture: Arc<Picture> },
+    /// The newest picture of the slot, with the least and the greatest number where it is stretched to them.
+    Picture { generation: u64, picture: Arc<Picture>, range: Option<[f32; 2]> },
     /// A file that the scene depends on was written.
     Changed(Changed),
     /// Nobody is writing the files that were said to have changed.

@@ -87,7 +87,7 @@ impl Desk {
         let generation = self.state.generation;
         self.worker(protocol::Event::Started { generation });
         self.worker(protocol::Event::Settings { generation, settings: Box::new(settings()) });
-        self.event(Event::Picture { generation, picture: plain_picture(50, 38, color) });
+        self.event(Event::Picture { generation, picture: plain_picture(50, 38, color), range: None });
         self.worker(done(generation, Vec::new(), false));
     }
 
@@ -169,6 +169,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         samples: SampleCounts { min: 64, mean: 64.0, max: 64 },
         error: Some(0.0081),
         complete: true,
+        range: None,
     };
     let report = Report {
         glimt: "0.1.0",

@@ -24,7 +24,7 @@ use super::view;
 use super::view::layout::Layout;
 use super::writer;
 use crate::film::Picture;
-use crate::pipeline::protocol::{self, Command, PreviewSlot};
+use crate::pipeline::protocol::{self, Command, LatestPreview, PreviewSlot};
 
 /// At most 20 frames a second, keys aside.
 const FRAME: Duration = Duration::from_millis(50);
@@ -292,8 +292,8 @@ impl Ui {
     fn take_preview(&mut self) -> Option<End> {
         self.drawn.is_old = false;
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let latest = latest?;
-        self.apply(Event::Picture { generation: latest.generation, picture: latest.picture })
+        let LatestPreview { generation, picture, range } = latest?;
+        self.apply(Event::Picture { generation, picture, range })
     }
 
     fn apply(&mut self, event: Event) -> Option<End> {

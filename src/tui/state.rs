@@ -98,6 +98,8 @@ pub(super) struct FrameReport {
 pub(super) struct Shown {
     pub generation: u64,
     pub picture: Arc<Picture>,
+    /// The least and the greatest number that it shows, where it is stretched to them.
+    pub range: Option<[f32; 2]>,
 }
 
 /// How the front end starts.

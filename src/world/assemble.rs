@@ -12,7 +12,10 @@ impl World {
     pub fn new(scene: &Scene, parts: &Parts, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
         let (materials, object_materials) = lower_materials(scene, parts);
         let camera = Camera::new(&scene.camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
-        let world = Self { camera, geometry, materials, object_materials, lights, glass_at_eye: Vec::new() };
+        let is_mipmapped = materials.iter().any(Material::is_mipmapped);
+        let glass_at_eye = Vec::new();
+        let world =
+            Self { camera, geometry, materials, object_materials, lights, glass_at_eye, is_mipmapped };
         Self { glass_at_eye: world.find_glass_at_eye(), ..world }
     }
 }
@@ -20,11 +23,11 @@ impl World {
 /// The scene's materials, then each mesh file's, then the one for triangles without any.
 fn lower_materials(scene: &Scene, parts: &Parts) -> (Vec<Material>, Vec<ObjectMaterial>) {
     let mut materials: Vec<_> =
-        scene.materials.iter().map(|material| lower::material(scene, parts, material)).collect();
+        scene.materials.iter().map(|material| lower::material(scene, &parts.images, material)).collect();
     let mut first_of_file = Vec::new();
     for mesh in &parts.meshes {
         first_of_file.push(materials.len() as u32);
-        materials.extend(mesh.loaded().materials.iter().map(|own| lower::file_material(parts, own)));
+        materials.extend(mesh.loaded().materials.iter().map(|own| lower::file_material(&parts.images, own)));
     }
     let fallback = materials.len() as u32;
     materials.push(lower::fallback_material());

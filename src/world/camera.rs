@@ -110,6 +110,11 @@ impl Camera {
         self.forward + self.right * place.x + self.up * place.y
     }
 
+    /// By how much the beam of a pixel grows with the distance in the middle of a picture of so many rows.
+    pub fn pixel_spread(&self, rows: u32) -> f32 {
+        (2.0 * self.tan_half_fov / f64::from(rows)) as f32
+    }
+
     /// Distance of a point along the view axis.
     pub fn depth_of(&self, point: DVec3) -> f64 {
         (point - self.position).dot(self.forward)

@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
-use super::lower::file_emission;
-use super::{Geometry, MeshInstance, Object};
+use super::lower::{emission, file_emission};
+use super::{Geometry, Images, MeshInstance, Object};
+use crate::geometry::Shape;
 use crate::lights::emitter::{Emitter, Part};
 use crate::lights::mesh::MeshEmitter;
 use crate::lights::{
-    AreaLight, DirectionalLight, Environment, Light, Lights, PointLight, SkyMap, SpotLight, area_light,
+    AreaLight, Chart, DirectionalLight, Environment, Light, Lights, Patch, Pattern, PointLight, SkyMap,
+    SpotLight, area_light,
 };
+use crate::materials::Emission;
 use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
@@ -20,19 +23,18 @@ pub fn sky(texels: &Arc<Texels>) -> Option<Arc<SkyMap>> {
 
 /// The lights of a scene with these objects: those without extent first, then the environment, then the objects that emit.
 /// A mesh is a light for each of its emitting materials. `sky` is the map of an environment that has one.
-pub fn lights(scene: &Scene, geometry: &Geometry, sky: Option<Arc<SkyMap>>) -> Arc<Lights> {
+pub fn lights(scene: &Scene, geometry: &Geometry, images: &Images, sky: Option<Arc<SkyMap>>) -> Arc<Lights> {
     let points = scene.lights.iter().map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
+    let emissions: Vec<Emission> =
+        scene.materials.iter().map(|material| lit(emission(scene, images, &material.emission))).collect();
     let areas = objects.flat_map(|((id, object), described)| {
-        let emission = described.material.map(|index| scene.materials[index].emission);
+        let emission = described.material.map(|index| &emissions[index]);
         match object {
-            Object::Shape(shape) => match emission {
-                Some(radiance) if radiance != Vec3::ZERO => {
-                    area_light(shape, radiance, id).into_iter().collect()
-                }
-                Some(_) | None => Vec::new(),
-            },
-            Object::Mesh(mesh) => mesh_lights(id, mesh, emission),
+            Object::Shape(shape) => {
+                emission.and_then(|emission| shape_light(shape, emission, id)).into_iter().collect()
+            }
+            Object::Mesh(mesh) => mesh_lights(id, mesh, emission, images),
         }
     });
     let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));
@@ -72,22 +74,57 @@ fn described(light: &description::Light, origin: DVec3) -> Light {
     }
 }
 
+/// Nothing, where a texture is black all over.
+fn lit(emission: Emission) -> Emission {
+    match &emission.texture {
+        Some(texture) if emission.shines() && texture.texels.is_black() => Emission::NONE,
+        Some(_) | None => emission,
+    }
+}
+
+/// The light that a shape is which emits.
+fn shape_light(shape: &Shape, emission: &Emission, object: u32) -> Option<AreaLight> {
+    let light = area_light(shape, emission.scale, object).filter(|_| emission.shines())?;
+    let pattern =
+        emission.texture.as_ref().map(|texture| Box::new(Pattern::new(texture, Chart::Shape(*shape))));
+    Some(AreaLight { pattern, ..light })
+}
+
 /// Of a mesh whose triangles all emit this; none: what their own materials emit.
-fn mesh_lights(object: u32, mesh: &MeshInstance, emission: Option<Vec3>) -> Vec<AreaLight> {
+fn mesh_lights(
+    object: u32,
+    mesh: &MeshInstance,
+    emission: Option<&Emission>,
+    images: &Images,
+) -> Vec<AreaLight> {
     let loaded = mesh.tree.loaded();
-    let emissions: Vec<(Option<u32>, Vec3)> = match emission {
-        Some(radiance) => vec![(None, radiance)],
+    let emissions: Vec<(Option<u32>, Emission)> = match emission {
+        Some(emission) => vec![(None, emission.clone())],
         None => {
-            (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), file_emission(material))).collect()
+            let of_file = |material| lit(file_emission(images, material));
+            (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };
-    let light = |(own, radiance): (Option<u32>, Vec3)| {
+    let light = |(own, emission): (Option<u32>, Emission)| {
         let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
-        let mesh = MeshEmitter::new(triangles)?;
-        let bounds = mesh.bounds().times(radiance);
-        Some(AreaLight { shape: Emitter::Mesh(mesh), radiance, object, part: Part::Listed, bounds })
+        let emitter = MeshEmitter::new(triangles)?;
+        let bounds = emitter.bounds().times(emission.scale);
+        let pattern = emission.texture.as_ref().map(|texture| {
+            let patch =
+                |id| Patch { primitive: id, corners: mesh.world_corners(id), uvs: mesh.corner_uvs(id) };
+            let patches = triangles_of(mesh, own).map(patch).collect();
+            Box::new(Pattern::new(texture, Chart::Triangles(patches)))
+        });
+        Some(AreaLight {
+            shape: Emitter::Mesh(emitter),
+            radiance: emission.scale,
+            pattern,
+            object,
+            part: Part::Listed,
+            bounds,
+        })
     };
-    emissions.into_iter().filter(|(_, radiance)| *radiance != Vec3::ZERO).filter_map(light).collect()
+    emissions.into_iter().filter(|(_, emission)| emission.shines()).filter_map(light).collect()
 }
 
 /// The triangles of one of the mesh file's own materials; none: all.

@@ -155,6 +155,14 @@ impl Geometry {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 
+    /// Mean curvature at a hit, > 0 where the surface bulges to its front.
+    pub fn curvature(&self, hit: &Hit, surface: &SurfacePoint) -> f32 {
+        match &self.objects[hit.object as usize] {
+            Object::Shape(shape) => shape.curvature(hit.shape.primitive, surface.point.as_dvec3()) as f32,
+            Object::Mesh(mesh) => mesh.curvature(hit.shape.primitive, surface.normal),
+        }
+    }
+
     /// The material that a mesh file gives the triangle that was hit, by the file's own count.
     pub fn file_material(&self, hit: &Hit) -> Option<u32> {
         let mesh = self.objects[hit.object as usize].mesh()?;

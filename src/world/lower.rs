@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::Parts;
 use super::textures::{TextureSource, declared_source, file_source};
+use super::{Image, Images};
 use crate::assets::FileMaterial;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, Texture, TextureFilter, Wrap};
-use crate::materials::{Bsdf, Glass, Material, Mirror, NormalMap, Phong};
+use crate::materials::{Bsdf, Emission, Glass, Material, Mirror, NormalMap, Phong};
 use crate::math::{Vec2, Vec3};
-use crate::scene::description::{self, ColorSource, MaterialKind, Scene, TextureUse};
+use crate::scene::description::{self, ColorSource, EmissionSource, MaterialKind, Scene, TextureUse};
 
 /// A material of the scene file.
-pub fn material(scene: &Scene, parts: &Parts, material: &description::Material) -> Material {
-    let color = |source: &ColorSource| declared_color(scene, parts, source);
+pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
+    let color = |source: &ColorSource| declared_color(scene, images, source);
     let bsdf = match &material.kind {
         MaterialKind::Phong { diffuse, specular, shininess, ambient } => Bsdf::Phong(Phong {
             diffuse: color(diffuse),
@@ -25,11 +25,18 @@ pub fn material(scene: &Scene, parts: &Parts, material: &description::Material) 
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: *reflectance }),
         MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass { ior: *ior, tint: *tint }),
     };
+    let emission = emission(scene, images, &material.emission);
     let normal_map = material.normal_map.map(|map| NormalMap {
-        texture: declared_texture(scene, parts, map.texture, TextureUse::Normal),
+        texture: declared_texture(scene, images, map.texture, TextureUse::Normal),
         strength: map.strength,
     });
-    Material { bsdf, emission: material.emission, normal_map }
+    Material { bsdf, emission, normal_map }
+}
+
+/// What a material of the scene file sends out.
+pub fn emission(scene: &Scene, images: &Images, emission: &EmissionSource) -> Emission {
+    let texture = emission.texture.map(|index| declared_texture(scene, images, index, TextureUse::Color));
+    Emission { scale: emission.scale, texture }
 }
 
 /// What a material of a mesh file is. Models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.
@@ -47,26 +54,36 @@ fn kind(own: &FileMaterial) -> FileKind {
     }
 }
 
-/// Radiance of the front side of a mesh file's material.
-pub fn file_emission(own: &FileMaterial) -> Vec3 {
+/// Whether a mesh file's material sends out light.
+pub fn file_emits(own: &FileMaterial) -> bool {
     match kind(own) {
-        FileKind::Phong => own.emission,
-        FileKind::Mirror | FileKind::Glass => Vec3::ZERO,
+        FileKind::Phong => own.emission != Vec3::ZERO,
+        FileKind::Mirror | FileKind::Glass => false,
     }
 }
 
+/// What the front side of a mesh file's material sends out.
+pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
+    if !file_emits(own) {
+        return Emission::NONE;
+    }
+    let texture = own.emission_texture.as_ref();
+    let texture = texture.map(|path| file_texture(images, &file_source(path, TextureUse::Color)));
+    Emission { scale: own.emission, texture }
+}
+
 /// A material of a mesh file. The highlight's strength k becomes ks = 2k/(α + 2).
-pub fn file_material(parts: &Parts, own: &FileMaterial) -> Material {
+pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match kind(own) {
         FileKind::Mirror => Bsdf::Mirror(Mirror { reflectance: own.specular.min(Vec3::ONE) }),
         FileKind::Glass => Bsdf::Glass(Glass { ior: own.ior.clamp(1.0, 10.0), tint: Vec3::ONE }),
-        FileKind::Phong => return file_phong(parts, own),
+        FileKind::Phong => return file_phong(images, own),
     };
-    Material { bsdf, emission: file_emission(own), normal_map: None }
+    Material { bsdf, emission: Emission::NONE, normal_map: None }
 }
 
-fn file_phong(parts: &Parts, own: &FileMaterial) -> Material {
-    let texture = |path: &Path, used| file_texture(parts, &file_source(path, used));
+fn file_phong(images: &Images, own: &FileMaterial) -> Material {
+    let texture = |path: &Path, used| file_texture(images, &file_source(path, used));
     let color = |path: &Option<PathBuf>, constant: Vec3| match path {
         Some(path) => Color::Texture(texture(path, TextureUse::Color)),
         None => Color::Constant(constant),
@@ -81,7 +98,7 @@ fn file_phong(parts: &Parts, own: &FileMaterial) -> Material {
         .normal_texture
         .as_ref()
         .map(|path| NormalMap { texture: texture(path, TextureUse::Normal), strength: 1.0 });
-    Material { bsdf: Bsdf::Phong(phong), emission: file_emission(own), normal_map }
+    Material { bsdf: Bsdf::Phong(phong), emission: file_emission(images, own), normal_map }
 }
 
 /// For triangles of a mesh file that name no material.
@@ -92,34 +109,39 @@ pub fn fallback_material() -> Material {
         shininess: 1.0,
         ambient: None,
     };
-    Material { bsdf: Bsdf::Phong(phong), emission: Vec3::ZERO, normal_map: None }
+    Material { bsdf: Bsdf::Phong(phong), emission: Emission::NONE, normal_map: None }
 }
 
-fn declared_color(scene: &Scene, parts: &Parts, source: &ColorSource) -> Color {
+fn declared_color(scene: &Scene, images: &Images, source: &ColorSource) -> Color {
     match source {
         ColorSource::Constant(color) => Color::Constant(*color),
         ColorSource::Texture(index) => {
-            Color::Texture(declared_texture(scene, parts, *index, TextureUse::Color))
+            Color::Texture(declared_texture(scene, images, *index, TextureUse::Color))
         }
     }
 }
 
-fn declared_texture(scene: &Scene, parts: &Parts, index: usize, used: TextureUse) -> Arc<Texture> {
+fn declared_texture(scene: &Scene, images: &Images, index: usize, used: TextureUse) -> Arc<Texture> {
     let declared = &scene.textures[index];
     let &description::Texture { filter, wrap, repeat, .. } = declared;
-    let texels = texels(parts, &declared_source(scene, index, used));
-    Arc::new(Texture { texels, filter, wrap, repeat })
+    let Image { texels, mipmaps } = image(images, &declared_source(scene, index, used));
+    let mipmaps = match filter {
+        TextureFilter::Nearest | TextureFilter::Bilinear => None,
+        TextureFilter::Mipmap => mipmaps,
+    };
+    Arc::new(Texture { texels, mipmaps, filter, wrap, repeat })
 }
 
-fn file_texture(parts: &Parts, source: &TextureSource) -> Arc<Texture> {
-    let texels = texels(parts, source);
-    Arc::new(Texture { texels, filter: TextureFilter::Bilinear, wrap: Wrap::Repeat, repeat: Vec2::ONE })
+fn file_texture(images: &Images, source: &TextureSource) -> Arc<Texture> {
+    let (filter, wrap, repeat) = (TextureFilter::Bilinear, Wrap::Repeat, Vec2::ONE);
+    let Image { texels, .. } = image(images, source);
+    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat })
 }
 
-/// The texels that were loaded. A material that no object has names textures that were not: they are never looked up.
-fn texels(parts: &Parts, source: &TextureSource) -> Arc<Texels> {
-    parts.textures.get(source).cloned().unwrap_or_else(|| {
+/// The image that was loaded. A material that no object has names textures that were not: they are never looked up.
+fn image(images: &Images, source: &TextureSource) -> Image {
+    images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);
-        Arc::new(Texels { width: 1, height: 1, data, unusable: 0 })
+        Image { texels: Arc::new(Texels { width: 1, height: 1, data, unusable: 0 }), mipmaps: None }
     })
 }

@@ -58,6 +58,37 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
+    /// Texture coordinates of the corners of a triangle, in the order of [`MeshInstance::world_corners`].
+    pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
+        let mesh = &self.tree.loaded().mesh;
+        let [a, b, c] = if mesh.uvs.is_empty() {
+            [Vec2::ZERO, Vec2::X, Vec2::Y]
+        } else {
+            mesh.triangles[triangle as usize].map(|vertex| mesh.uvs[vertex as usize])
+        };
+        if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
+    }
+
+    /// Mean curvature of the surface that a triangle stands for, by its vertices' normals (Akenine-Möller et al. 2021, section 4), > 0
+    /// where it bulges to the front.
+    pub(super) fn curvature(&self, triangle: u32, normal: Vec3) -> f32 {
+        if !self.smooth {
+            return 0.0;
+        }
+        let (mesh, normals) = (&self.tree.loaded().mesh, self.tree.normals());
+        let vertices = mesh.triangles[triangle as usize].map(|vertex| {
+            let own = self.transform.normal(normals[vertex as usize].as_dvec3()).normalize_or_zero();
+            let own = if own.dot(normal.as_dvec3()) < 0.0 { -own } else { own };
+            (self.transform.point(mesh.positions[vertex as usize].as_dvec3()), own)
+        });
+        let along = |i: usize| {
+            let ((p, m), (q, n)) = (vertices[i], vertices[(i + 1) % 3]);
+            let curvature = (n - m).dot(q - p) / (q - p).length_squared();
+            if curvature.is_finite() { curvature } else { 0.0 }
+        };
+        ((along(0) + along(1) + along(2)) / 3.0) as f32
+    }
+
     /// The surface at a hit, as far as it is asked for.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{Ends, KdTree, WideBvh};
+use crate::accel::{Cell, Ends, KdTree, Stretch, WideBvh};
 use crate::assets::LoadedMesh;
 use crate::assets::mesh::vertex_normals;
 use crate::control::{CancelToken, Cancelled};
@@ -99,6 +99,14 @@ impl MeshTree {
         match &self.tree {
             Tree::Boxes(tree) => tree.any(ray, except),
             Tree::Planes(tree) => tree.any(ray, except),
+        }
+    }
+
+    /// Visit the nodes of the tree whose boxes a ray in the mesh's coordinates meets, parents first; `visit` says whether to go on below.
+    pub fn along(&self, ray: &Ray, visit: impl FnMut(&Cell, &Stretch) -> bool) {
+        match &self.tree {
+            Tree::Boxes(tree) => tree.along(ray, visit),
+            Tree::Planes(tree) => tree.along(ray, visit),
         }
     }
 

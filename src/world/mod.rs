@@ -1,5 +1,6 @@
 //! Everything ready to trace: immutable, shared by `Arc`.
 
+mod along;
 mod assemble;
 pub mod camera;
 pub mod contact;
@@ -16,31 +17,43 @@ pub mod textures;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{Loops, PACKET};
+pub use crate::accel::{Cell, Loops, PACKET, Stretch};
 pub use camera::Camera;
 pub use contact::{Meeting, Near, NearTriangles, Sides};
 pub use emitters::{lights, sky};
 pub use geometry::{Geometry, Hit};
-pub use lower::file_emission;
+pub use lower::file_emits;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use object::Object;
 pub use origin::origin;
-pub use textures::{NeededTexture, TextureSource, environment_source, textures_needed};
+pub use textures::{NeededTexture, TextureSource, declared_source, environment_source, textures_needed};
 
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
 use crate::materials::phong::PhongBsdf;
 use crate::materials::texels::Texels;
-use crate::materials::{Bsdf, Material};
+use crate::materials::{Bsdf, Material, Mipmaps};
+
+/// The images of a scene.
+pub type Images = HashMap<TextureSource, Image>;
+
+/// A decoded image.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// The image.
+    pub texels: Arc<Texels>,
+    /// Its levels, where a texture asks for them.
+    pub mipmaps: Option<Arc<Mipmaps>>,
+}
 
 /// What a world is made of.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
     /// One for each of [`crate::scene::description::Scene::mesh_files`].
     pub meshes: Vec<Arc<MeshTree>>,
-    /// The texels of the textures that [`textures_needed`] named.
-    pub textures: HashMap<TextureSource, Arc<Texels>>,
+    /// The images that [`textures_needed`] named.
+    pub images: Images,
     /// Where the scene's camera is an orbiter file: that file.
     pub orbiter: Option<OrbiterCamera>,
 }
@@ -60,6 +73,8 @@ pub struct World {
     pub lights: Arc<Lights>,
     /// The closed shapes of glass that the lens may be in, with their materials.
     glass_at_eye: Vec<(u32, u32)>,
+    /// Whether any material has a texture with levels.
+    is_mipmapped: bool,
 }
 
 /// How an object finds its material.
@@ -94,10 +109,18 @@ impl World {
             ObjectMaterial::One(index) => &self.materials[index as usize],
             ObjectMaterial::OfFile { .. } => return None,
         };
-        match (&material.bsdf, &material.normal_map) {
-            (Bsdf::Phong(phong), None) => Some((material, phong.constant()?)),
-            (Bsdf::Phong(_) | Bsdf::Mirror(_) | Bsdf::Glass(_), _) => None,
+        if material.normal_map.is_some() || material.emission.texture.is_some() {
+            return None;
         }
+        match &material.bsdf {
+            Bsdf::Phong(phong) => Some((material, phong.constant()?)),
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => None,
+        }
+    }
+
+    /// Whether any material has a texture with levels, for which rays must know how wide their beams are.
+    pub fn is_mipmapped(&self) -> bool {
+        self.is_mipmapped
     }
 
     /// Triangles over all mesh instances and single triangles.

@@ -1,13 +1,14 @@
 //! Which image files a scene looks up.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::math::Vec3;
-use crate::scene::description::{Encoding, Scene, TextureUse};
+use crate::scene::description::{Encoding, Scene, TextureFilter, TextureUse};
 
 /// An image file, and how its numbers are read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -31,17 +32,21 @@ pub struct NeededTexture {
     pub mesh_file: Option<usize>,
     /// Whether `[environment]` names it.
     pub is_environment: bool,
+    /// Whether its levels are looked up.
+    pub has_mipmaps: bool,
 }
 
 /// The image files that materials of objects look up, each once. Textures that no such material names are not among
 /// them.
 pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
-    let mut known = HashSet::new();
-    let mut add = |texture: NeededTexture| {
-        if known.insert(texture.source.clone()) {
+    let mut known = HashMap::new();
+    let mut add = |texture: NeededTexture| match known.entry(texture.source.clone()) {
+        Entry::Vacant(new) => {
+            new.insert(needed.len());
             needed.push(texture);
         }
+        Entry::Occupied(place) => needed[*place.get()].has_mipmaps |= texture.has_mipmaps,
     };
     let (used_materials, own_materials) = in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
@@ -52,6 +57,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
                 declared: Some(texture),
                 mesh_file: None,
                 is_environment: false,
+                has_mipmaps: has_mipmaps(scene, texture),
             });
         }
     }
@@ -64,14 +70,30 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
                 declared: None,
                 mesh_file: Some(file),
                 is_environment: false,
+                has_mipmaps: false,
             });
         }
     }
     if let Some(source) = environment_source(scene) {
         let name = "environment".to_owned();
-        add(NeededTexture { source, name, declared: None, mesh_file: None, is_environment: true });
+        add(NeededTexture {
+            source,
+            name,
+            declared: None,
+            mesh_file: None,
+            is_environment: true,
+            has_mipmaps: false,
+        });
     }
     needed
+}
+
+/// Whether the levels of a texture of the scene file are looked up.
+fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
+    match scene.textures[texture].filter {
+        TextureFilter::Nearest | TextureFilter::Bilinear => false,
+        TextureFilter::Mipmap => true,
+    }
 }
 
 /// Where the map of the environment comes from, where that has one that is not made black.
@@ -118,7 +140,7 @@ pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
 }
 
 fn file_textures(material: &FileMaterial) -> impl Iterator<Item = (&Path, TextureUse)> {
-    let color = [&material.diffuse_texture, &material.specular_texture];
+    let color = [&material.diffuse_texture, &material.specular_texture, &material.emission_texture];
     let colors = color.into_iter().flatten().map(|path| (path.as_path(), TextureUse::Color));
     colors.chain(material.normal_texture.iter().map(|path| (path.as_path(), TextureUse::Normal)))
 }

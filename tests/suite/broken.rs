@@ -193,7 +193,9 @@ const BROKEN: &[(&str, &[Said])] = &[
             (22, 13, "`shininess` must be between 0 and 1000000; found -1"),
             (23, 14, "`normal_map` must be the name of a texture; found a table"),
             (24, 19, "`normal_strength` must be at least 0; found -2"),
-            (25, 12, "a texture in `emission` is not supported yet"),
+            (25, 24, r#"there is no texture "brikcs"; did you mean "bricks"?"#),
+            (25, 42, "`scale` must be at least 0; found -1"),
+            (25, 46, "unknown key `sclae` in `emission`; did you mean `scale`?"),
             (28, 13, "unknown key `textur` in `diffuse`; did you mean `texture`?"),
         ],
     ),
@@ -323,13 +325,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (19, 16, "this text is not closed"),
         ],
     ),
-    (
-        "unavailable",
-        &[
-            (5, 9, "`error` > 0 is not available in this version"),
-            (13, 10, r#"filter "mipmap" is not available in this version; use one of "nearest", "bilinear""#),
-        ],
-    ),
+    ("unavailable", &[(5, 9, "`error` > 0 is not available in this version")]),
     (
         "undefined_names",
         &[

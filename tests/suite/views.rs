@@ -17,6 +17,7 @@ fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
         "cornell_glass",
         "dof",
         "mesh",
+        "normal_map",
         "orbiter",
         "phong",
         "refraction",
@@ -67,4 +68,56 @@ fn depth_is_a_distance_in_float_files_and_stretched_in_others() {
     let brightest = shown.pixels().map(|pixel| pixel.0[0]).max();
     assert_eq!((brightest, at(0, 0)), (Some(255), 0), "near is bright, nothing is black");
     assert!(at(16, 12) > 200, "{}", at(16, 12));
+}
+
+/// What a PNG says of itself.
+fn notes(desk: &Desk, name: &str) -> Vec<(String, String)> {
+    let file = std::io::BufReader::new(std::fs::File::open(desk.path(name)).expect("a file"));
+    let reader = png::Decoder::new(file).read_info().expect("a PNG");
+    let texts =
+        reader.info().uncompressed_latin1_text.iter().map(|text| (text.keyword.clone(), text.text.clone()));
+    texts
+        .chain(
+            reader.info().utf8_text.iter().map(|text| (text.keyword.clone(), text.get_text().expect("text"))),
+        )
+        .collect()
+}
+
+#[test]
+fn a_floor_that_goes_on_for_ever_leaves_what_is_near_its_shades() {
+    let desk = Desk::new();
+    let floor = "[[plane]]\nnormal = [0, 1, 0]\npoint = [0, 0.4, 0]\nmaterial = \"ball\"\n";
+    desk.write("floor.toml", format!("{}{floor}", super::desk::SCENE));
+    let report = desk.report("floor.toml --view depth -o depth.png -o depth.exr");
+    let range = report["image"]["range"].as_array().expect("near and far").clone();
+    let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
+    let depths: Vec<f32> = floats(&desk, "depth.exr").iter().map(|pixel| pixel[0]).collect();
+    assert!(near < 2.0 && far > 10.0, "{near} {far}");
+    // Pixels at the border of nothing do not count: there are farther ones.
+    assert!(
+        depths.iter().any(|&depth| f64::from(depth) > far)
+            && depths.iter().any(|&depth| f64::from(depth) == far)
+    );
+    assert!(notes(&desk, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));
+    // The ball at 3.5 and the floor beside it at 5.7: straight they would be 37 shades apart.
+    let shown = image::open(desk.path("depth.png")).expect("a picture").into_rgb8();
+    let at = |x, y| i32::from(shown.get_pixel(x, y).0[0]);
+    assert!(at(16, 13) - at(2, 15) > 42, "{} {}", at(16, 13), at(2, 15));
+    let beauty = desk.report("floor.toml -o beauty.png");
+    assert!(beauty["image"]["range"].is_null());
+}
+
+#[test]
+fn samples_and_errors_are_told_of_each_pixel() {
+    let desk = Desk::new();
+    let report = desk.report("ball.toml --samples 5 --view samples -o samples.exr -o samples.png");
+    assert_eq!(report["image"]["range"], serde_json::json!([0.0, 5.0]));
+    assert!(floats(&desk, "samples.exr").iter().all(|pixel| *pixel == [5.0; 3]));
+    let white = image::open(desk.path("samples.png")).expect("a picture").into_rgb8();
+    assert!(white.pixels().all(|pixel| pixel.0 == [255; 3]));
+    desk.expect("ball.toml --once --samples 16 --view error -o error.exr", 0);
+    let errors = floats(&desk, "error.exr");
+    assert_eq!(errors[0], [0.0; 3], "where all samples are alike nothing is in doubt");
+    assert!(errors.iter().any(|pixel| pixel[0] > 1e-3), "the border of the ball is");
+    assert!(errors.iter().all(|pixel| pixel[0].is_finite() && pixel[0] < 0.5));
 }

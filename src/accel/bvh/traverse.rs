@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::{Bvh, Child, DEEP_STACK, SHALLOW_STACK};
+use crate::accel::{Cell, Stretch};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 use crate::geometry::rows::lanes;
 use crate::geometry::{Aabb, Ray};
@@ -85,6 +86,32 @@ impl Bvh {
             self.any_within::<SHALLOW_STACK>(ray, test)
         } else {
             self.any_within::<DEEP_STACK>(ray, test)
+        }
+    }
+
+    /// Visit the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone; `visit` says whether to go
+    /// on below, `own` gets the ids of leaves.
+    pub fn along(
+        &self,
+        ray: &Ray,
+        mut visit: impl FnMut(&Cell, &Stretch) -> bool,
+        mut own: impl FnMut(u32, u32),
+    ) {
+        let root = (self.bounds, Child { first: 0, count: 0 }, 0);
+        let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
+        while let Some((bounds, child, depth)) = pending.pop() {
+            let Some(stretch) = Stretch::new(&bounds, ray) else { continue };
+            if !visit(&Cell { bounds, depth, shapes: child.count }, &stretch) {
+                continue;
+            }
+            if child.count > 0 {
+                let places = child.first as usize..(child.first + child.count) as usize;
+                self.order[places].iter().for_each(|&id| own(id, depth + 1));
+                continue;
+            }
+            let node = &self.nodes[child.first as usize];
+            let children = node.bounds.iter().zip(node.child).filter(|(bounds, _)| !bounds.is_empty());
+            pending.extend(children.map(|(bounds, child)| (*bounds, child, depth + 1)));
         }
     }
 

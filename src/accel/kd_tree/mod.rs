@@ -9,8 +9,9 @@ mod node;
 mod traverse;
 mod validate;
 
+use crate::accel::{Cell, Stretch};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 
 use node::{Kind, Node, Triangle};
@@ -90,6 +91,27 @@ impl KdTree {
                         place += 1;
                     }
                 }
+            }
+        }
+    }
+
+    /// Visit the nodes whose cells a ray meets, parents first, in an order that depends on the tree alone; `visit` says whether to go
+    /// on below.
+    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
+        let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
+        while let Some((bounds, place, depth)) = pending.pop() {
+            let Some(stretch) = Stretch::new(&bounds, ray) else { continue };
+            let kind = self.nodes[place as usize].kind();
+            let shapes = match kind {
+                Kind::Inner { .. } => 0,
+                Kind::Leaf { count, .. } => count,
+            };
+            if !visit(&Cell { bounds, depth, shapes }, &stretch) {
+                continue;
+            }
+            if let Kind::Inner { axis, at, right } = kind {
+                let [below, above] = halves(bounds, axis, at);
+                pending.extend([(above, right, depth + 1), (below, place + 1, depth + 1)]);
             }
         }
     }

@@ -13,7 +13,7 @@ use crate::math::Vec3;
 
 pub use simd::{Instructions, Loops, bits, pages};
 
-use crate::accel::{Ends, PACKET};
+use crate::accel::{Cell, Ends, PACKET, Stretch};
 
 use node::{Node, TrianglePack};
 
@@ -102,6 +102,31 @@ impl WideBvh {
             }
         }
         visits
+    }
+
+    /// Visit the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone; `visit` says whether to go
+    /// on below.
+    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
+        let root = (self.bounds, node::Child::Inner(0), 0);
+        let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
+        while let Some((bounds, child, depth)) = pending.pop() {
+            let Some(stretch) = Stretch::new(&bounds, ray) else { continue };
+            let shapes = match child {
+                node::Child::Inner(_) => 0,
+                node::Child::Leaf { first, count } => {
+                    let packs = &self.packs[first as usize..(first + count) as usize];
+                    packs.iter().map(|pack| pack.ids().count() as u32).sum()
+                }
+            };
+            if !visit(&Cell { bounds, depth, shapes }, &stretch) {
+                continue;
+            }
+            if let node::Child::Inner(place) = child {
+                let node = &self.nodes[place as usize];
+                let below = |slot: usize| Some((node.bounds(slot)?, node.child(slot), depth + 1));
+                pending.extend((0..node::WIDTH).filter_map(below));
+            }
+        }
     }
 
     /// The nearest hit; of hits at one distance the triangle of the lowest number.

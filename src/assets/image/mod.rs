@@ -17,7 +17,9 @@ use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, 
 use super::contain::contain;
 use super::read::{self, Watch};
 use super::{AssetError, read::in_words};
-use crate::control::{CancelToken, Progress, unwatched};
+use crate::control::{CancelToken, Cancelled, Progress, unwatched};
+use crate::materials::Mipmaps;
+use crate::materials::mipmaps::Halving;
 use crate::materials::texels::Texels;
 use apart::Reporter;
 use counting::Counting;
@@ -81,14 +83,34 @@ pub fn load(
     Ok(texels)
 }
 
-/// Bytes that the texels of an image will take, by what its file says of its size.
+/// Columns, rows and the bytes that the texels of an image will take, by what its file says of its size.
 ///
 /// # Errors
 /// As [`load`], as far as the start of the file shows them.
-pub fn texel_bytes(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<u64, AssetError> {
+pub fn size(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<(u32, u32, u64), AssetError> {
     let watch = Watch { progress: &unwatched, token };
     let file = Source::open(path, limits, token)?;
-    file.read_apart(watch, |file, report| Ok(file.decoder(report)?.1))
+    file.read_apart(watch, |file, report| {
+        let (decoder, bytes) = file.decoder(report)?;
+        let (width, height) = decoder.dimensions();
+        Ok((width, height, bytes))
+    })
+}
+
+/// The levels of an image.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
+    Mipmaps::of(texels, |level| {
+        let halving = Halving::new(level);
+        let mut rows = Vec::with_capacity(level.len() / 4);
+        for y in 0..halving.rows() {
+            token.check()?;
+            halving.row(y, &mut rows);
+        }
+        Ok(halving.texels(rows))
+    })
 }
 
 /// An open image file with what reading it goes by.

@@ -84,16 +84,19 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
     let extra = |key: &str| found.unknown_param.get(key).map(String::as_str);
     let diffuse_texture = file(found.diffuse_texture.as_deref());
     let plain = if diffuse_texture.is_some() { 1.0 } else { 0.6 };
+    let emission_texture = file(extra("map_Ke"));
+    let shining = if emission_texture.is_some() { 1.0 } else { 0.0 };
     FileMaterial {
         name: found.name.clone(),
         diffuse: color(found.diffuse, plain),
         specular: color(found.specular, 0.0),
         shininess: (found.shininess.unwrap_or(0.0) as f32).max(0.0),
-        emission: color(found.emissive, 0.0),
+        emission: color(found.emissive, shining),
         ior: found.optical_density.unwrap_or(1.0) as f32,
         illumination_model: found.illumination_model,
         diffuse_texture,
         specular_texture: file(found.specular_texture.as_deref()),
+        emission_texture,
         normal_texture: file(extra("norm").or(extra("map_Kn")).or(found.normal_texture.as_deref())),
     }
 }
@@ -173,9 +176,9 @@ mod tests {
     fn every_statement_finds_its_field() {
         let text = "newmtl red brick\nKa 0.1 0.2 0.3\nKd 0.5 0.4 -0.3\nKs 0.2 0.2 0.2\nKe 4 5 6\nNs 25\nNi 1.5\n\
                     illum 7\nmap_Kd -s 2 2 2 -o 0.5 wall one.png\nmap_Ks sub\\shine.png\nmap_Bump -bm 0.5 old.png\n\
-                    norm bumps.png\nnewmtl plain\n";
+                    norm bumps.png\nmap_Ke glow.png\nnewmtl plain\nnewmtl bulb\nmap_Ke glow.png\n";
         let materials = read(text).expect("whole");
-        assert_eq!(materials.len(), 2);
+        assert_eq!(materials.len(), 3);
         let file = |name: &str| Some(PathBuf::from("models").join(name));
         let expected = FileMaterial {
             name: "red brick".to_owned(),
@@ -187,10 +190,12 @@ mod tests {
             illumination_model: Some(7),
             diffuse_texture: file("wall one.png"),
             specular_texture: file("sub/shine.png"),
+            emission_texture: file("glow.png"),
             normal_texture: file("bumps.png"),
         };
         assert_eq!(materials[0], expected);
-        assert_eq!(materials[1].diffuse, Vec3::splat(0.6));
+        assert_eq!((materials[1].diffuse, materials[1].emission), (Vec3::splat(0.6), Vec3::ZERO));
+        assert_eq!(materials[2].emission, Vec3::ONE);
     }
 
     #[test]

@@ -68,9 +68,27 @@ impl Torus {
 
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let local = self.frame.local(ray.at(exact_t(hit, self.nearest(ray))));
+        let (out, from_circle) = self.chart(ray.at(exact_t(hit, self.nearest(ray))));
+        self.surface_at(out, from_circle)
+    }
+
+    /// Of a point the direction from the axis, and from the circle in the plane of both.
+    fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
+        let local = self.frame.local(point);
         let out = radial(local.truncate());
-        self.surface_at(out, radial(DVec2::new(local.truncate().length() - self.radius, local.z)))
+        (out, radial(DVec2::new(local.truncate().length() - self.radius, local.z)))
+    }
+
+    /// Texture coordinates of a point of the surface.
+    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+        let (out, from_circle) = self.chart(point);
+        DVec2::new(turn(out), turn(from_circle))
+    }
+
+    /// Mean curvature at a point of the surface.
+    pub fn curvature(&self, point: DVec3) -> f64 {
+        let across = self.chart(point).1.x;
+        0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
     /// The surface in a direction from the axis, and a direction from the circle in the plane of both.

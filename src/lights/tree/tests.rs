@@ -293,6 +293,7 @@ fn the_density_of_a_mesh_is_that_of_its_samples() {
             object: 4,
             part: Part::Listed,
             bounds,
+            pattern: None,
         };
         let (mut next, mut compared) = (random::unit(5), 0);
         for _ in 0..2000 {

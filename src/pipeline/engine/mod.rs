@@ -105,6 +105,7 @@ struct Ready {
     plan: Plan,
     world: Keyed,
     texels_loaded: u64,
+    texture_memory_bytes: u64,
 }
 
 impl Engine {
@@ -134,7 +135,11 @@ impl Engine {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
-        let before = self.films.current().map(|canvas| canvas.key);
+        let shown = |engine: &Self| {
+            let view = engine.plan.as_ref().map(|plan| plan.settings.view);
+            (engine.films.current().map(|canvas| canvas.key), view)
+        };
+        let before = shown(self);
         let outcome = self.run(request, sink, meanwhile, &mut findings);
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.read_named(diagnostics, &request.scene, &self.contents, meanwhile.token);
@@ -154,7 +159,7 @@ impl Engine {
         sink.send(match outcome {
             Ok(report) => {
                 let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-                let is_same = self.films.current().map(|canvas| canvas.key) == before;
+                let is_same = shown(self) == before;
                 let unchanged = is_same && settled(Stage::Render) && settled(Stage::Write);
                 let warnings = [findings.conflicts, findings.warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
@@ -202,6 +207,7 @@ impl Engine {
             films: &self.films,
             rays,
             texels_loaded: ready.texels_loaded,
+            texture_memory_bytes: ready.texture_memory_bytes,
             is_written,
         };
         Ok(report(&finished, table.stages, begin.elapsed().as_secs_f64()))
@@ -250,8 +256,8 @@ impl Engine {
         let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos));
         let lights = table.run(Stage::Lights, gather)?;
         let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
-        let texels_loaded = textures.texels_loaded;
-        Ok(Ready { parsed, plan, world, texels_loaded })
+        let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = textures;
+        Ok(Ready { parsed, plan, world, texels_loaded, texture_memory_bytes })
     }
 
     /// All files that the scene names; every one is tried before the first error ends it.

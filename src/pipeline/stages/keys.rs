@@ -44,17 +44,21 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// What gives light, where it is, and which objects it is. `sky` is the map of the environment.
+/// What gives light, where it is, and which objects it is. `sky` is the map of the environment, `patterns` are the images that
+/// lamps may have on them.
 pub(in crate::pipeline) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
     origin: DVec3,
-    sky: Option<&Key>,
+    (sky, patterns): (Option<&Key>, &[&Key]),
 ) -> Key {
     let mut key = Fingerprint::new("lights");
     key.key(&from(&described_lights(scene, of), origin)).flag(sky.is_some());
     if let Some(sky) = sky {
         key.key(sky);
+    }
+    for pattern in patterns {
+        key.key(pattern);
     }
     key.finish()
 }
@@ -69,7 +73,7 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
         match object.material.map(|index| &scene.materials[index]) {
             Some(material) if !material.emits() => {}
             Some(material) => {
-                key.index(number).add(&object.shape, of).vec3(material.emission);
+                key.index(number).add(&object.shape, of).add(&material.emission, of);
             }
             // The file's own materials may emit.
             None => {
@@ -119,7 +123,11 @@ mod tests {
     fn keys(text: &str) -> (Key, Key, Key) {
         let scene = loaded_of(text).scene;
         let of = referents(&scene, &[], None);
-        (geometry(&scene, &of, DVec3::ZERO), lights(&scene, &of, DVec3::ZERO, None), world(&scene, &of, &[]))
+        (
+            geometry(&scene, &of, DVec3::ZERO),
+            lights(&scene, &of, DVec3::ZERO, (None, &[])),
+            world(&scene, &of, &[]),
+        )
     }
 
     #[test]

@@ -6,9 +6,9 @@ use super::super::cache::Memo;
 use super::textures::Textures;
 use super::{Staged, keys};
 use crate::lights::{Lights, SkyMap};
-use crate::scene::description::Scene;
-use crate::scene::fingerprint::Referents;
-use crate::world::{self, Geometry};
+use crate::scene::description::{Scene, TextureUse};
+use crate::scene::fingerprint::{Key, Referents};
+use crate::world::{self, Geometry, TextureSource};
 
 /// The distribution over the map of an environment, which stays while the file does, however it is turned.
 pub(in crate::pipeline) type SkyMemo = Memo<Option<Arc<SkyMap>>>;
@@ -22,11 +22,13 @@ pub(in crate::pipeline) fn lights(
     (memo, skies): (&mut Memo<Arc<Lights>>, &mut SkyMemo),
 ) -> Staged<Arc<Lights>> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
-    let key = keys::lights(scene, of, geometry.origin(), map);
+    let declared = patterns(scene).filter_map(|source| textures.key_of.get(&source));
+    let patterns: Vec<&Key> = declared.chain(&textures.of_files).collect();
+    let key = keys::lights(scene, of, geometry.origin(), (map, &patterns));
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
         return Staged::reused(lights.clone(), "no light changed");
     }
-    let lights = world::lights(scene, geometry, sky(textures, skies));
+    let lights = world::lights(scene, geometry, &textures.images, sky(textures, skies));
     memo.set(key, lights.clone());
     match lights.len() {
         0 => Staged::skipped(lights, "the scene has no light"),
@@ -45,6 +47,13 @@ fn picked(lights: &Lights) -> String {
         Lights::PICKS,
         lights.memory_bytes().div_ceil(1000)
     )
+}
+
+/// The images that lamps by materials of the scene file have on them.
+fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
+    let shining = scene.materials.iter().filter(|material| material.emits());
+    let textures = shining.filter_map(|material| material.emission.texture);
+    textures.map(|texture| world::declared_source(scene, texture, TextureUse::Color))
 }
 
 fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<SkyMap>> {

@@ -9,7 +9,7 @@ use super::super::protocol::PreviewSize;
 use super::super::sink::Sink;
 use super::canvas::Canvas;
 use crate::control::CancelToken;
-use crate::film::{Previewer, tone::develop};
+use crate::film::{Previewer, Quantity, tone::develop};
 
 /// The longest that a film is taken up without a look at the orders.
 const PATIENCE: Duration = Duration::from_millis(4);
@@ -33,7 +33,7 @@ impl Screen<'_> {
     /// The whole film, unless that is cancelled. For when no tile is being rendered, as the pool helps.
     pub(in crate::pipeline) fn show(&self, canvas: &mut Canvas, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
-        while !pool.install(|| catch_up(canvas, size)) {
+        while !pool.install(|| catch_up(canvas, self.plan.settings.view.quantity(), size)) {
             if token.is_cancelled() {
                 return;
             }
@@ -45,7 +45,7 @@ impl Screen<'_> {
     /// picture came of it.
     pub(super) fn show_some(&self, canvas: &mut Canvas) -> bool {
         let Some(size) = self.size() else { return false };
-        catch_up(canvas, size);
+        catch_up(canvas, self.plan.settings.view.quantity(), size);
         let is_whole = canvas.previewer.as_ref().is_some_and(Previewer::is_whole);
         if is_whole {
             self.say(canvas);
@@ -55,16 +55,19 @@ impl Screen<'_> {
 
     fn say(&self, canvas: &Canvas) {
         if let Some(previewer) = &canvas.previewer {
-            let image = previewer.picture(canvas.base.as_ref());
-            self.sink.preview(develop(&image, &self.plan.tone.of_picture(&image)));
+            // The first coarse picture has none of the numbers about samples.
+            let base = canvas.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
+            let image = previewer.picture(base);
+            let tone = self.plan.tone.of_picture(&image);
+            self.sink.preview(develop(&image, &tone), tone.stretch.range().map(|range| range.ends()));
         }
     }
 }
 
 /// Take up what changed, for a short time; whether that was all.
-fn catch_up(canvas: &mut Canvas, (width, height): (u32, u32)) -> bool {
-    canvas.previewer.take_if(|previewer| previewer.size() != (width, height));
-    let previewer = canvas.previewer.get_or_insert_with(|| Previewer::new(width, height));
+fn catch_up(canvas: &mut Canvas, quantity: Quantity, (width, height): (u32, u32)) -> bool {
+    canvas.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
+    let previewer = canvas.previewer.get_or_insert_with(|| Previewer::of(quantity, width, height));
     previewer.update(&canvas.film, Some(Instant::now() + PATIENCE))
 }
 

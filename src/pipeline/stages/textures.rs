@@ -12,13 +12,14 @@ use super::super::watch::content::{Content, FileRead};
 use super::meshes::canonical;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
-use crate::assets::image::{ImageEncoding, ImageLimits, load, texel_bytes};
+use crate::assets::image::{ImageEncoding, ImageLimits, load, mipmaps, size};
 use crate::control::{Cancelled, Progress};
+use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
 use crate::scene::description::{Encoding, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
-use crate::world::{NeededTexture, TextureSource, environment_source};
+use crate::world::{Image, Images, NeededTexture, TextureSource, environment_source};
 
 /// Most bytes that the texels of a scene's images may take together.
 const MOST_BYTES: u64 = 2 << 30;
@@ -26,27 +27,51 @@ const MOST_BYTES: u64 = 2 << 30;
 /// A file and the reading of its numbers, however the scene spells it.
 type Name = (PathBuf, ImageEncoding);
 
-/// The cache of textures: one entry per file and reading of its numbers.
-pub(in crate::pipeline) type TextureCache = Pool<Name, Texels>;
+/// The cache of textures: one entry per file and reading of its numbers, and one for its levels where they are asked for.
+#[derive(Debug, Default)]
+pub(in crate::pipeline) struct TextureCache {
+    texels: Pool<Name, Texels>,
+    mipmaps: Pool<Name, Mipmaps>,
+}
+
+impl TextureCache {
+    pub(in crate::pipeline) fn sweep(&mut self, success: bool) {
+        self.texels.sweep(success);
+        self.mipmaps.sweep(success);
+    }
+}
 
 /// The textures that were asked for, without those that failed.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct Textures {
-    pub(in crate::pipeline) texels: HashMap<TextureSource, Arc<Texels>>,
+    pub(in crate::pipeline) images: Images,
+    /// Of what each image was made.
+    pub(in crate::pipeline) key_of: HashMap<TextureSource, Key>,
     /// Of what each was made, in the order asked for.
     pub(in crate::pipeline) keys: Vec<Key>,
+    /// The same of those that materials of mesh files name.
+    pub(in crate::pipeline) of_files: Vec<Key>,
     /// The map of the environment, with its key.
     pub(in crate::pipeline) environment: Option<(Key, Arc<Texels>)>,
     /// Texels read from files by this request.
     pub(in crate::pipeline) texels_loaded: u64,
+    /// Bytes that all images take, with their levels.
+    pub(in crate::pipeline) memory_bytes: u64,
 }
 
 /// One image with all who ask for it.
-struct Image<'a> {
+struct Wanted<'a> {
     name: Name,
     content: Content,
-    kept: Option<Arc<Texels>>,
+    kept: Kept,
     asked_by: Vec<&'a NeededTexture>,
+}
+
+/// What the cache has of an image.
+#[derive(Debug, Default)]
+struct Kept {
+    texels: Option<Arc<Texels>>,
+    mipmaps: Option<Arc<Mipmaps>>,
 }
 
 /// Load these. All files are tried; errors go to the findings.
@@ -74,19 +99,29 @@ pub(in crate::pipeline) fn textures(
             findings.read(FileRead { path: one.source.path.clone(), content: image.content });
         }
         match asset {
-            Ok((texels, was_kept)) => {
+            Ok((loaded_image, was_kept)) => {
+                let Image { texels, mipmaps } = &loaded_image;
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
-                textures.texels_loaded += if was_kept { 0 } else { texels.len() as u64 };
+                textures.texels_loaded += if image.kept.texels.is_some() { 0 } else { texels.len() as u64 };
+                let of_levels = mipmaps.as_ref().map_or(0, |mipmaps| mipmaps.memory_bytes());
+                textures.memory_bytes += (texels.memory_bytes() + of_levels) as u64;
                 textures.keys.push(key);
+                if image.asked_by.iter().any(|one| one.mesh_file.is_some()) {
+                    textures.of_files.push(key);
+                }
                 for one in &image.asked_by {
-                    textures.texels.insert(one.source.clone(), texels.clone());
+                    textures.images.insert(one.source.clone(), loaded_image.clone());
+                    textures.key_of.insert(one.source.clone(), key);
                     if Some(&one.source) == environment.as_ref() {
                         textures.environment = Some((key, texels.clone()));
                     }
                 }
-                warn_of_unusable(loaded, &image, &texels, findings);
-                cache.insert(image.name, key, texels);
+                warn_of_unusable(loaded, &image, texels, findings);
+                if let Some(mipmaps) = mipmaps {
+                    cache.mipmaps.insert(image.name.clone(), key, mipmaps.clone());
+                }
+                cache.texels.insert(image.name, key, texels.clone());
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => {
@@ -106,7 +141,7 @@ pub(in crate::pipeline) fn textures(
 }
 
 /// Says how much of an image cannot be shown.
-fn warn_of_unusable(loaded: &Loaded, image: &Image<'_>, texels: &Texels, findings: &mut Findings) {
+fn warn_of_unusable(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
     let count = match texels.unusable {
         0 => return,
         1 => "1 pixel is".to_owned(),
@@ -123,7 +158,12 @@ fn environment_span(scene: &Scene) -> Option<Range<usize>> {
     scene.environment.as_ref()?.file.as_ref().map(|file| file.span.clone())
 }
 
-impl Image<'_> {
+impl Wanted<'_> {
+    /// Whether its levels are looked up.
+    fn has_mipmaps(&self) -> bool {
+        self.asked_by.iter().any(|one| one.has_mipmaps)
+    }
+
     fn path(&self) -> &Path {
         &self.asked_by[0].source.path
     }
@@ -141,8 +181,8 @@ fn images<'a>(
     needed: &'a [NeededTexture],
     cache: &mut TextureCache,
     reading: &Reading<'_>,
-) -> Result<Vec<Image<'a>>, Cancelled> {
-    let mut images: Vec<Image<'a>> = Vec::new();
+) -> Result<Vec<Wanted<'a>>, Cancelled> {
+    let mut images: Vec<Wanted<'a>> = Vec::new();
     let mut known = HashMap::new();
     for one in needed {
         let name = (canonical(&one.source.path), one.source.encoding);
@@ -152,9 +192,14 @@ fn images<'a>(
             continue;
         }
         let content = reading.contents.read(&one.source.path, reading.token)?;
-        let mut image = Image { name, content, kept: None, asked_by: vec![one] };
-        image.kept = cache.get(&image.name, image.key());
-        images.push(image);
+        images.push(Wanted { name, content, kept: Kept::default(), asked_by: vec![one] });
+    }
+    for image in &mut images {
+        let key = image.key();
+        image.kept.texels = cache.texels.get(&image.name, key);
+        if image.has_mipmaps() {
+            image.kept.mipmaps = cache.mipmaps.get(&image.name, key);
+        }
     }
     Ok(images)
 }
@@ -162,18 +207,21 @@ fn images<'a>(
 /// The texels of each, and whether they were kept from before. What would take more than `most_bytes` together with those
 /// before it is not loaded.
 fn load_all(
-    images: &[Image<'_>],
+    images: &[Wanted<'_>],
     most_bytes: u64,
     reading: &Reading<'_>,
-) -> Vec<Result<(Arc<Texels>, bool), AssetError>> {
-    let size = |image: &Image<'_>| match &image.kept {
-        Some(texels) => texels.memory_bytes() as u64,
-        // One that cannot be read says so when it is loaded.
-        None => texel_bytes(image.path(), ImageLimits::default(), reading.token).unwrap_or(0),
+) -> Vec<Result<(Image, bool), AssetError>> {
+    let size = |image: &Wanted<'_>| {
+        let (width, height, bytes) = match &image.kept.texels {
+            Some(texels) => (texels.width, texels.height, texels.memory_bytes() as u64),
+            // One that cannot be read says so when it is loaded.
+            None => size(image.path(), ImageLimits::default(), reading.token).unwrap_or_default(),
+        };
+        bytes + if image.has_mipmaps() { Mipmaps::memory_bytes_of(width, height) } else { 0 }
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
     let over = over_budget(&sizes, most_bytes);
-    let load = |(image, over): (&Image<'_>, Option<String>)| match over {
+    let load = |(image, over): (&Wanted<'_>, Option<String>)| match over {
         Some(reason) => Err(AssetError::Malformed { path: image.path().to_owned(), line: None, reason }),
         None => load_one(image, reading),
     };
@@ -200,14 +248,27 @@ fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     sizes.iter().map(check).collect()
 }
 
-fn load_one(image: &Image<'_>, reading: &Reading<'_>) -> Result<(Arc<Texels>, bool), AssetError> {
-    if let Some(texels) = &image.kept {
-        return Ok((texels.clone(), true));
-    }
-    let (one, limits) = (image.asked_by[0], ImageLimits::default());
-    let encoding = one.source.encoding;
-    let load = |progress: Progress<'_>| load(image.path(), encoding, limits, progress, reading.token);
-    Ok((Arc::new(reading.sink.asset(&one.name, load)?), false))
+/// An image with its levels, and whether all of that was kept from before.
+fn load_one(image: &Wanted<'_>, reading: &Reading<'_>) -> Result<(Image, bool), AssetError> {
+    let mut was_kept = true;
+    let texels = match &image.kept.texels {
+        Some(texels) => texels.clone(),
+        None => {
+            was_kept = false;
+            let (one, limits) = (image.asked_by[0], ImageLimits::default());
+            let encoding = one.source.encoding;
+            let load = |progress: Progress<'_>| load(image.path(), encoding, limits, progress, reading.token);
+            Arc::new(reading.sink.asset(&one.name, load)?)
+        }
+    };
+    let mipmaps = match &image.kept.mipmaps {
+        None if image.has_mipmaps() => {
+            was_kept = false;
+            Some(Arc::new(mipmaps(&texels, reading.token)?))
+        }
+        kept => kept.clone(),
+    };
+    Ok((Image { texels, mipmaps }, was_kept))
 }
 
 /// For `check`: also the textures of the scene file that no visible material names, and the map of a black environment.
@@ -229,13 +290,21 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
             declared: Some(index),
             mesh_file: None,
             is_environment: false,
+            has_mipmaps: false,
         });
     }
     let environment = loaded.scene.environment.as_ref().and_then(|environment| environment.file.as_ref());
     if let Some(file) = environment.filter(|file| known.insert(file.value.clone())) {
         let source = TextureSource { path: file.value.clone(), encoding: ImageEncoding::Color };
         let name = "environment".to_owned();
-        wanted.push(NeededTexture { source, name, declared: None, mesh_file: None, is_environment: true });
+        wanted.push(NeededTexture {
+            source,
+            name,
+            declared: None,
+            mesh_file: None,
+            is_environment: true,
+            has_mipmaps: false,
+        });
     }
 }
 

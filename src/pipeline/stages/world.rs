@@ -29,7 +29,7 @@ pub(in crate::pipeline) fn world(
     if let Some(world) = memo.get(built_key) {
         return (key, world.clone());
     }
-    let parts = Parts { meshes: built.meshes, textures: textures.texels.clone(), orbiter };
+    let parts = Parts { meshes: built.meshes, images: textures.images.clone(), orbiter };
     let world = Arc::new(World::new(scene, &parts, built.geometry, lights));
     memo.set(built_key, world.clone());
     (key, world)

@@ -15,6 +15,7 @@ use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::SampleStats;
+use crate::film::stretch::Range;
 use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
@@ -128,7 +129,7 @@ pub(in crate::pipeline) fn write(
         {
             continue;
         }
-        let image = radiance.get_or_insert_with(|| canvas.film.radiance());
+        let image = radiance.get_or_insert_with(|| canvas.film.image(plan.settings.view.quantity()));
         token.check()?;
         match write_one(image, canvas, to, path, token) {
             Ok(bytes) => {
@@ -172,18 +173,16 @@ fn write_one(
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let options = EncodeOptions {
-        tone: plan.tone.of_picture(image),
-        bit_depth: BitDepth::try_from(plan.bit_depth)?,
-        metadata: metadata(canvas, plan),
-    };
+    let tone = plan.tone.of_picture(image);
+    let metadata = metadata(canvas, plan, tone.stretch.range());
+    let options = EncodeOptions { tone, bit_depth: BitDepth::try_from(plan.bit_depth)?, metadata };
     let bytes = output::encode(image, &options, Format::of(path)?, token)?;
     guarded(plan, inputs, path, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
 
 /// What a picture says of itself: enough to make it again.
-fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
+fn metadata(canvas: &Canvas, plan: &Plan, range: Option<Range>) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let SampleStats { min, mean, max } = canvas.film.samples();
     let samples = if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
@@ -198,14 +197,15 @@ fn metadata(canvas: &Canvas, plan: &Plan) -> Vec<(String, String)> {
         ("glimt:seed", settings.seed.to_string()),
         ("glimt:exposure", plan.tone.exposure_stops.to_string()),
     ];
-    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    let range = range.map(|range| ("glimt:range", format!("{} to {}", range.least, range.greatest)));
+    pairs.into_iter().chain(range).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
     let SampleStats { min, mean, max } = canvas.film.samples();
     let mut key = Fingerprint::new("write");
     key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());
-    key.f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
+    key.choice(plan.settings.view).f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
     key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());
     key.path(path).finish()
 }

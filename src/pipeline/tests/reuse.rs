@@ -1,6 +1,7 @@
 //! What each edit redoes, and what is said of files.
 
 use super::*;
+use crate::integrators::View;
 use crate::scene::description::{Accel, Shadows};
 
 #[test]
@@ -303,4 +304,59 @@ fn a_map_that_is_no_picture_is_an_error_where_the_scene_names_it() {
     let place = errors[0].place.as_ref().expect("a place");
     assert_eq!(&place.source[place.span.clone()], "\"sky.hdr\"");
     assert!(errors[0].message.contains("sky.hdr"), "{}", errors[0].message);
+}
+
+#[test]
+fn levels_are_built_once_and_no_texel_is_read_for_them() {
+    let mut bench = Bench::new(SCENE);
+    bench.write("skin.ppm", "P6\n2 2\n255\nabcabcabcabc");
+    let report = bench.done().0;
+    assert_eq!((report.counters.texels_loaded, report.counters.texture_memory_bytes), (4, 12));
+    bench.edit("file = \"skin.ppm\"", "file = \"skin.ppm\"\nfilter = \"mipmap\"");
+    let report = bench.done().0;
+    assert_statuses(&report, "drdrrsdd");
+    // The second level is one texel of three floats.
+    assert_eq!((report.counters.texels_loaded, report.counters.texture_memory_bytes), (0, 24));
+    bench.edit("diffuse = [0.5, 0.5, 0.5]", "diffuse = [0.6, 0.5, 0.5]");
+    assert_statuses(&bench.done().0, "drrrrsdd");
+}
+
+#[test]
+fn a_lamp_is_another_one_when_the_picture_on_it_is() {
+    let lamp = "[textures.slide]\nfile = \"slide.ppm\"\n[materials.lamp]\nemission = { texture = \"slide\", scale = 2 }\n\
+                [[sphere]]\ncenter = [0, 4, 0]\nradius = 0.5\nmaterial = \"lamp\"\n";
+    let mut bench = Bench::new(&format!("{SCENE}{lamp}"));
+    bench.write("slide.ppm", "P6\n1 1\n255\nabc");
+    let report = bench.done().0;
+    assert_eq!(report.stages[Stage::Lights as usize].why, "2 lights");
+    let before = bench.picture();
+    assert_statuses(&bench.done().0, "rrrrrsrr");
+    bench.write("slide.ppm", "P6\n1 1\n255\nxyz");
+    assert_statuses(&bench.done().0, "rrdrdsdd");
+    assert_ne!(bench.picture(), before);
+    bench.edit("scale = 2", "scale = 3");
+    assert_statuses(&bench.done().0, "drrrdsdd");
+    // One that is black is no lamp; nor is one that no factor is left of.
+    bench.write("slide.ppm", "P6\n1 1\n255\n\0\0\0");
+    assert_eq!(bench.done().0.stages[Stage::Lights as usize].why, "1 light");
+    bench.edit("scale = 3", "scale = 0");
+    let report = bench.done().0;
+    assert_eq!(report.counters.texture_memory_bytes, 3, "it is not looked up");
+}
+
+#[test]
+fn numbers_about_the_samples_take_none_of_their_own() {
+    let mut bench = Bench::new(SCENE);
+    bench.done();
+    let beauty = bench.picture();
+    for view in [View::Samples, View::Error] {
+        bench.overrides.view = Some(view);
+        let report = bench.done().0;
+        assert_statuses(&report, "rrrrrsrd");
+        assert_eq!(report.counters.camera_rays, 0);
+        assert_ne!(bench.picture(), beauty);
+    }
+    bench.overrides.view = None;
+    assert_statuses(&bench.done().0, "rrrrrsrd");
+    assert_eq!(bench.picture(), beauty);
 }

@@ -46,6 +46,25 @@ pub enum ColorSource {
     Texture(usize),
 }
 
+/// Radiance, the same everywhere or by a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmissionSource {
+    /// The radiance; with a texture, what that is multiplied by.
+    pub scale: Vec3,
+    /// Index into [`Scene::textures`](super::Scene::textures).
+    pub texture: Option<usize>,
+}
+
+impl EmissionSource {
+    /// None.
+    pub const NONE: Self = Self::constant(Vec3::ZERO);
+
+    /// The same everywhere.
+    pub const fn constant(radiance: Vec3) -> Self {
+        Self { scale: radiance, texture: None }
+    }
+}
+
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
@@ -54,7 +73,7 @@ pub struct Material {
     /// What it does with light that arrives.
     pub kind: MaterialKind,
     /// Radiance on the front side.
-    pub emission: Vec3,
+    pub emission: EmissionSource,
     /// What bends the shading normals.
     pub normal_map: Option<NormalMap>,
 }
@@ -118,19 +137,20 @@ impl ColorSource {
 impl Material {
     /// Whether what has it is a light.
     pub fn emits(&self) -> bool {
-        self.emission != Vec3::ZERO
+        self.emission.scale != Vec3::ZERO
     }
 
     /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with what for.
     pub fn textures(&self) -> Vec<(usize, TextureUse)> {
-        let Self { name: _, kind, emission: _, normal_map } = self;
+        let Self { name: _, kind, emission, normal_map } = self;
         let colors: [Option<&ColorSource>; 3] = match kind {
             MaterialKind::Phong { diffuse, specular, shininess: _, ambient } => {
                 [Some(diffuse), Some(specular), ambient.as_ref()]
             }
             MaterialKind::Mirror { reflectance: _ } | MaterialKind::Glass { ior: _, tint: _ } => [None; 3],
         };
-        let colors = colors.into_iter().flatten().filter_map(ColorSource::texture);
+        let shown = emission.texture.filter(|_| self.emits());
+        let colors = colors.into_iter().flatten().filter_map(ColorSource::texture).chain(shown);
         let normals = normal_map.iter().map(|map| (map.texture, TextureUse::Normal));
         colors.map(|index| (index, TextureUse::Color)).chain(normals).collect()
     }
@@ -153,6 +173,16 @@ impl Fingerprinted for ColorSource {
             Self::Texture(index) => {
                 of.textures[*index].add_to(key.index(1), of);
             }
+        }
+    }
+}
+
+impl Fingerprinted for EmissionSource {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        let Self { scale, texture } = *self;
+        key.vec3(scale).flag(texture.is_some());
+        if let Some(texture) = texture {
+            of.textures[texture].add_to(key, of);
         }
     }
 }
@@ -183,6 +213,6 @@ impl Fingerprinted for MaterialKind {
 impl Fingerprinted for Material {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         let Self { name: _, kind, emission, normal_map } = self;
-        key.add(kind, of).vec3(*emission).add(normal_map, of);
+        key.add(kind, of).add(emission, of).add(normal_map, of);
     }
 }

@@ -15,7 +15,8 @@ use std::path::PathBuf;
 pub use camera::Camera;
 pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
-    ColorSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter, TextureUse, Wrap,
+    ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,
+    TextureUse, Wrap,
 };
 pub use render::{Accel, Integrator, MOST_SCATTERINGS, PixelFilter, Render, Shadows, Tonemap};
 pub use shape::{Lowered, Mesh, Object, Shape};

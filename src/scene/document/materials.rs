@@ -1,6 +1,6 @@
 //! `[materials.*]`.
 
-use super::super::description::{ColorSource, Material, MaterialKind, NormalMap};
+use super::super::description::{ColorSource, EmissionSource, Material, MaterialKind, NormalMap};
 use super::context::Issue;
 use super::key::Key;
 use super::limits::Limits;
@@ -61,10 +61,11 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
     let key = table.optional("type");
     // Without knowing the type, no key can be called unknown.
     let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
-    let plain = |kind| (kind, Vec3::ZERO, None);
+    let plain = |kind| (kind, EmissionSource::NONE, None);
     let (kind, emission, normal_map) = match kind {
         Kind::Phong => {
-            (phong(table, textures), emission(&table.optional("emission")), normal_map(table, textures))
+            let emission = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
+            (phong(table, textures), emission, normal_map(table, textures))
         }
         Kind::Mirror => plain(mirror(table)),
         Kind::Glass => plain(glass(table)),
@@ -96,16 +97,6 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
         shininess: table.optional("shininess").number32(Limits::Between(0.0, 1e6)).unwrap_or(32.0),
         ambient: table.optional("ambient").color_or_texture(textures),
     }
-}
-
-fn emission(key: &Key<'_>) -> Vec3 {
-    if let Some(span) = key.span().filter(|_| key.is_table()) {
-        let issue = Issue::error(span, "a texture in `emission` is not supported yet")
-            .help("give it a colour, such as [r, g, b], \"#rrggbb\" or a name");
-        key.context.report(issue);
-        return Vec3::ZERO;
-    }
-    key.color().unwrap_or(Vec3::ZERO)
 }
 
 /// Warns about a material that reflects more light than falls on it.

@@ -26,7 +26,7 @@ fn pictures_of_older_generations_are_dropped() {
     let old = desk.state.generation;
     desk.press('r');
     desk.screen();
-    desk.event(Event::Picture { generation: old, picture: plain_picture(50, 38, BLUE) });
+    desk.event(Event::Picture { generation: old, picture: plain_picture(50, 38, BLUE), range: None });
     desk.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
     desk.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
     assert!(!desk.state.dirty, "nothing is drawn for them");
@@ -45,7 +45,7 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
     assert_eq!(request(&effects).map(|it| it.generation), Some(2));
     desk.event(Event::Shown { generation: 1 });
     assert_eq!(desk.state.first_change, None, "the old picture does not count");
-    desk.event(Event::Picture { generation: 2, picture: plain_picture(50, 38, BLUE) });
+    desk.event(Event::Picture { generation: 2, picture: plain_picture(50, 38, BLUE), range: None });
     desk.now += Duration::from_millis(20);
     desk.event(Event::Shown { generation: 2 });
     assert!(desk.text().contains("first change after 23 ms"), "{}", desk.text());
@@ -59,7 +59,7 @@ fn only_the_first_picture_of_a_request_does_not_wait_for_its_turn() {
     let mut desk = Desk::new();
     let picture = |desk: &mut Desk, generation| {
         desk.state.urgent = false;
-        desk.event(Event::Picture { generation, picture: plain_picture(50, 38, RED) });
+        desk.event(Event::Picture { generation, picture: plain_picture(50, 38, RED), range: None });
         desk.state.urgent
     };
     assert!(picture(&mut desk, 1));
@@ -110,7 +110,7 @@ fn another_window_asks_for_another_preview_once_it_is_quiet() {
         effects[..],
         [Effect::Send(Command::Preview(Some(PreviewSize { width: 153, height: 112 })))]
     ));
-    desk.event(Event::Picture { generation: 1, picture: plain_picture(149, 112, BLUE) });
+    desk.event(Event::Picture { generation: 1, picture: plain_picture(149, 112, BLUE), range: None });
     assert!(cells_of(&mut desk, BLUE) > 0, "the same request shows its picture again");
     desk.finish(RED);
     desk.event(Event::Resize(window(200, 60)));

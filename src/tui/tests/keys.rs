@@ -57,7 +57,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
         }
         Action::NextView | Action::PreviousView => {
             let effects = desk.key(key);
-            let wanted = if action == Action::NextView { View::Normal } else { View::Shadow };
+            let wanted = if action == Action::NextView { View::Normal } else { View::Error };
             let request = request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
             assert!(desk.text().contains(&format!("view {}", wanted.name())));

@@ -7,7 +7,7 @@ use ratatui::style::Color;
 
 use super::{BLUE, RED, cells_of};
 use crate::pipeline::protocol::{self, Failure, Stage, StageReport, Status};
-use crate::pipeline::settings::Overrides;
+use crate::pipeline::settings::{Overrides, View};
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
 use crate::tui::color::ColorDepth;
@@ -38,7 +38,7 @@ fn upper_and_lower_pixels_are_foreground_and_background() {
             *pixel = BLUE;
         }
     }
-    desk.event(Event::Picture { generation, picture: picture.into() });
+    desk.event(Event::Picture { generation, picture: picture.into(), range: None });
     let screen = desk.screen();
     for place in [(0, 1), (50, 20), (17, 9)] {
         assert_eq!((screen[place].fg, screen[place].bg), (Color::Rgb(200, 20, 10), Color::Rgb(10, 20, 200)));
@@ -57,11 +57,28 @@ fn without_colours_the_picture_is_a_ramp_and_nothing_has_a_colour() {
 }
 
 #[test]
+fn what_a_picture_is_stretched_to_stands_beside_its_view() {
+    let base = Overrides { view: Some(View::Depth), ..Overrides::default() };
+    let state = state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
+    let mut desk = Desk::with(state);
+    for (range, words) in [
+        (Some([2.704, 659.24]), "view depth 2.7 to 659 ·"),
+        (Some([0.0, 0.012_34]), "view depth 0 to 0.0123 ·"),
+        (Some([10.04, 1e-5]), "view depth 10 to 1.0e-5 ·"),
+        (None, "view depth ·"),
+    ] {
+        let generation = desk.state.generation;
+        desk.event(Event::Picture { generation, picture: plain_picture(51, 40, RED), range });
+        assert!(desk.text().contains(words), "{words}: {}", desk.text());
+    }
+}
+
+#[test]
 fn a_picture_that_lies_about_its_size_is_not_shown() {
     let mut desk = Desk::new();
     let mut picture = (*plain_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
-    desk.event(Event::Picture { generation: 1, picture: picture.into() });
+    desk.event(Event::Picture { generation: 1, picture: picture.into(), range: None });
     assert!(desk.state.picture.is_none());
 }
 
@@ -344,7 +361,7 @@ proptest! {
                 3 => { desk.worker(protocol::Event::Progress { generation, progress: progress(0.3, Some(9.0)) }); }
                 4 => {
                     let picture = plain_picture(picture.0, picture.1, BLUE);
-                    desk.event(Event::Picture { generation, picture });
+                    desk.event(Event::Picture { generation, picture, range: None });
                 }
                 5 => { desk.event(Event::Resize(window(rows, columns.min(80)))); }
                 6 => { desk.wait(300); }

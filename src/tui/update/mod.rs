@@ -46,7 +46,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
-        Event::Picture { generation, picture } => show(state, Shown { generation, picture }),
+        Event::Picture { generation, picture, range } => show(state, Shown { generation, picture, range }),
         Event::Changed(Changed { noticed }) => {
             state.message = None;
             state.is_settled = false;

@@ -109,7 +109,7 @@ pub(super) fn status(state: &State, layout: &Layout, buffer: &mut Buffer) {
         },
         format!("photons {}", on_off(state.effective.as_ref().is_some_and(|it| it.photons))),
         format!("dof {}", on_off(depth_of_field(state))),
-        format!("view {}", state.view().name()),
+        format!("view {}{}", state.view().name(), range(state)),
     ];
     words.push(state.integrator().name().to_owned());
     if !layout.hidden.is_empty() {
@@ -128,6 +128,26 @@ pub(super) fn status(state: &State, layout: &Layout, buffer: &mut Buffer) {
         room.width -= put_right(buffer, room, &frame, Tone::Faint, state.depth);
     }
     put(buffer, room, &[(&words, Tone::Plain)], state.depth);
+}
+
+/// What a picture is stretched to that is.
+fn range(state: &State) -> String {
+    let shown = state.picture.as_ref().filter(|shown| shown.generation == state.generation);
+    let ends = shown.and_then(|shown| shown.range);
+    ends.map_or(String::new(), |[least, greatest]| format!(" {} to {}", number(least), number(greatest)))
+}
+
+/// Three digits or more.
+fn number(x: f32) -> String {
+    let digits = match x.abs() {
+        x if x >= 100.0 => 0,
+        x if x >= 10.0 => 1,
+        x if x >= 1.0 => 2,
+        x if x >= 1e-3 || x == 0.0 => 4,
+        _ => return format!("{x:.1e}"),
+    };
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// What the last picture took on its way: its size, and how long the terminal takes to answer.

@@ -136,7 +136,7 @@ fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
         let size = 0.004 * 10_f64.powf(2.0 * random.unit().powi(3));
         let place = v(random.signed() * 1.5, 2.0 + 0.3 * random.unit(), random.signed() * 1.5);
         let (a, b) = (random.direction() * size, random.direction() * size);
-        let (a, b) = if (a.cross(b).y < 0.0) == !i.is_multiple_of(5) { (a, b) } else { (b, a) };
+        let (a, b) = if (a.cross(b).y < 0.0) != i.is_multiple_of(5) { (a, b) } else { (b, a) };
         [place, place + a, place + b]
     };
     (0..count).map(triangle).collect()

@@ -6,11 +6,13 @@ mod distant;
 mod facets;
 mod far;
 mod film;
+mod footprints;
 mod glass;
 mod global;
 mod hard;
 mod many_lights;
 mod mirror;
+mod patterns;
 mod robust;
 mod round;
 mod round_lights;
@@ -21,6 +23,7 @@ mod shading;
 mod sky;
 mod speckle;
 mod touching;
+mod views;
 
 use glimt::math::DVec3;
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use glimt::assets::image::mipmaps;
 use glimt::assets::{FileMaterial, LoadedMesh};
 use glimt::control::CancelToken;
 use glimt::film::Rect;
@@ -11,11 +12,11 @@ use glimt::integrators::{RenderSettings, View, render_tile};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, Encoding, Environment, Falloff, Integrator, Light, Located, Material,
-    MaterialKind, Mesh, Object, Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape, Texture,
-    TextureFilter, Tonemap, Wrap,
+    Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, Falloff, Integrator, Light, Located,
+    Material, MaterialKind, Mesh, Object, Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape,
+    Texture, TextureFilter, Tonemap, Wrap,
 };
-use glimt::world::{Geometry, MeshTree, Parts, World, lights, origin, sky, textures_needed};
+use glimt::world::{Geometry, Image, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 
 use super::v;
 
@@ -215,12 +216,14 @@ impl Build {
                 Some(number) => &self.texels[number],
                 None => self.sky.as_ref().expect("a map of the environment"),
             };
-            parts.textures.insert(needed.source, Arc::clone(texels));
+            let levels = || Arc::new(mipmaps(texels, &CancelToken::new()).expect("nobody cancels"));
+            let image = Image { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
+            parts.images.insert(needed.source, image);
         }
         let origin = origin(&self.scene.camera, None);
         let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("nobody cancels"));
-        let lights = lights(&self.scene, &geometry, self.sky.as_ref().and_then(sky));
+        let lights = lights(&self.scene, &geometry, &parts.images, self.sky.as_ref().and_then(sky));
         World::new(&self.scene, &parts, geometry, lights)
     }
 
@@ -263,14 +266,14 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 
 /// A dark material without a normal map.
 pub fn plain(kind: MaterialKind) -> Material {
-    Material { name: String::new(), kind, emission: Vec3::ZERO, normal_map: None }
+    Material { name: String::new(), kind, emission: EmissionSource::NONE, normal_map: None }
 }
 
 pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Material {
     let grey = |x| ColorSource::Constant(Vec3::splat(x));
     let kind =
         MaterialKind::Phong { diffuse: grey(diffuse), specular: grey(specular), shininess, ambient: None };
-    Material { emission: Vec3::splat(emission), ..plain(kind) }
+    Material { emission: EmissionSource::constant(Vec3::splat(emission)), ..plain(kind) }
 }
 
 pub fn matte(reflectance: f32) -> Material {
@@ -301,6 +304,7 @@ pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
         illumination_model: Some(illumination_model),
         diffuse_texture: None,
         specular_texture: None,
+        emission_texture: None,
         normal_texture: None,
     }
 }

@@ -67,16 +67,29 @@ fn views_are_shown_as_they_are_and_written_when_asked() {
     terminal.wait_for("wrote scene.png");
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "normal"]));
 
-    let views =
-        ["depth", "barycentric", "uv", "albedo", "ambient", "diffuse", "specular", "emission", "shadow"];
+    let views = [
+        "depth",
+        "barycentric",
+        "uv",
+        "albedo",
+        "ambient",
+        "diffuse",
+        "specular",
+        "emission",
+        "shadow",
+        "bounds",
+        "cost",
+        "samples",
+        "error",
+    ];
     for (number, view) in views.iter().enumerate() {
         terminal.press("v");
         terminal.wait_for(&format!("· view {view} "));
         terminal.wait_for_render(3 + number);
     }
     terminal.press("V");
-    terminal.wait_for("· view emission ");
-    terminal.wait_for_render(12);
+    terminal.wait_for("· view samples ");
+    terminal.wait_for_render(16);
     terminal.press("vv");
     terminal.wait_for("· view beauty ");
     terminal.wait_for("done");

@@ -2,7 +2,7 @@
 
 use csscolorparser::NAMED_COLORS;
 
-use super::super::super::description::ColorSource;
+use super::super::super::description::{ColorSource, EmissionSource};
 use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
@@ -15,6 +15,8 @@ use crate::math::color::srgb8_to_linear;
 const COLOR: &str = "a colour: [r, g, b], a number, \"#rrggbb\" or a name";
 const COLOR_OR_TEXTURE: &str =
     "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
+const EMISSION: &str =
+    "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
 
 impl Key<'_> {
     /// A colour ≥ 0, decoded to linear.
@@ -35,17 +37,37 @@ impl Key<'_> {
             table.finish();
             return texture.map(ColorSource::Texture);
         }
+        self.is_no_texture(textures, COLOR_OR_TEXTURE)?;
+        self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE).map(ColorSource::Constant)
+    }
+
+    /// Radiance: a colour ≥ 0, or a texture and what that is multiplied by.
+    pub(in super::super) fn emission(&self, textures: &Names) -> Option<EmissionSource> {
+        if self.is_table() {
+            let table = self.inline_table()?;
+            let texture = table.required("texture", "\"name\"").name_in(textures);
+            let scale = table.optional("scale");
+            let scale = if scale.is_given() { scale.color() } else { Some(Vec3::ONE) };
+            table.finish();
+            return Some(EmissionSource { scale: scale?, texture: Some(texture?) });
+        }
+        self.is_no_texture(textures, EMISSION)?;
+        self.color_of(Limits::AtLeast(0.0), EMISSION).map(EmissionSource::constant)
+    }
+
+    /// None, and an error, where a value is the bare name of a texture.
+    fn is_no_texture(&self, textures: &Names, expected: &str) -> Option<()> {
         if let Item::String(text) = self.value?.item()
             && named(text).is_none()
             && textures.find(text).is_some()
         {
-            let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR_OR_TEXTURE}", self.name))
+            let issue = Issue::error(self.span()?, format!("`{}` must be {expected}", self.name))
                 .label("found the name of a texture")
                 .help(format!("write {{ texture = {} }}", self.context.text(&self.span()?)));
             self.context.report(issue);
             return None;
         }
-        self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE).map(ColorSource::Constant)
+        Some(())
     }
 
     fn color_of(&self, limits: Limits, expected: &str) -> Option<Vec3> {

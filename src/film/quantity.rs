@@ -1,0 +1,100 @@
+//! What a picture is made of: the samples' mean, or numbers about the samples.
+
+use super::noise::pixel_variance;
+use super::sums::Tile;
+use crate::math::DVec3;
+
+/// What of its samples a film shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quantity {
+    /// What they make of the picture.
+    #[default]
+    Radiance,
+    /// How many each pixel has.
+    Samples,
+    /// The standard error to expect of each pixel's luminance.
+    Error,
+}
+
+/// Pixels around one, to each side, whose last steps tell its error together with its own: one step has the spread of one number.
+const REACH: usize = 2;
+
+impl Tile {
+    /// A number of a pixel in a tile of so many columns; none where it has no sample.
+    pub(super) fn value(&self, quantity: Quantity, index: usize, columns: usize) -> Option<DVec3> {
+        match quantity {
+            Quantity::Radiance => self.mean(index),
+            Quantity::Samples => (self.count(index) > 0).then(|| DVec3::splat(f64::from(self.count(index)))),
+            Quantity::Error => self.error(index, columns).map(DVec3::splat),
+        }
+    }
+
+    /// 0 where nothing can be told, of single samples.
+    fn error(&self, index: usize, columns: usize) -> Option<f64> {
+        let count = self.count(index);
+        let rows = self.counts.len() / columns.max(1);
+        let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
+        let (mut sum, mut pixels) = (0.0, 0_u32);
+        for y in around(index / columns, rows) {
+            for x in around(index % columns, columns) {
+                let place = y * columns + x;
+                if self.count(place) > 1 {
+                    sum += self.steps.square(place);
+                    pixels += 1;
+                }
+            }
+        }
+        let variance =
+            if count > 1 && pixels > 0 { pixel_variance(sum / f64::from(pixels), count) } else { 0.0 };
+        (count > 0).then(|| variance.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Film, Rect, TileSamples};
+    use crate::math::Vec3;
+    use crate::math::random::unit;
+
+    /// 20 × 20 pixels with so many grey samples each.
+    fn film(count: u32, mut next: impl FnMut(u32) -> f32) -> Film {
+        let film = Film::new(20, 20, None).expect("a film");
+        let rect = Rect { x: 0, y: 0, width: 20, height: 20 };
+        let radiance = (0..400 * count).map(|i| Vec3::splat(next(i / count))).collect();
+        film.add(0, &TileSamples { rect, samples: count, radiance, negative: None });
+        film
+    }
+
+    #[test]
+    fn the_error_of_a_pixel_is_that_of_its_mean() {
+        let mut next = unit(9);
+        for count in [2, 16, 100] {
+            let errors = film(count, |_| next()).image(Quantity::Error).pixels;
+            let exact = (1.0 / 12.0 / f64::from(count)).sqrt();
+            let mean = (errors.iter().map(|error| f64::from(error.x).powi(2)).sum::<f64>() / 400.0).sqrt();
+            // As of the whole film: 0.65 times the truth of independent samples, by the rate that is taken.
+            assert!((0.5..1.0).contains(&(mean / exact)), "{count}: {mean} {exact}");
+            let spread = errors.iter().filter(|error| f64::from(error.x) < 0.25 * exact).count();
+            assert!(spread < 20, "{count}: {spread} pixels are told to be far better than they are");
+        }
+    }
+
+    #[test]
+    fn what_is_certain_has_no_error_and_noise_stays_where_it_is() {
+        let mut next = unit(3);
+        // The right half is noisy.
+        let half = film(16, |pixel| if pixel % 20 < 10 { 0.4 } else { next() });
+        let errors = half.image(Quantity::Error).pixels;
+        for (i, error) in errors.iter().enumerate() {
+            match i % 20 {
+                0..8 => assert!(error.x < 1e-6, "{i}: {error}"),
+                8..12 => {}
+                _ => assert!(error.x > 0.01, "{i}: {error}"),
+            }
+        }
+        assert_eq!(half.image(Quantity::Samples).pixels, [Vec3::splat(16.0); 400]);
+        assert_eq!(film(1, |_| 0.5).image(Quantity::Error).pixels, [Vec3::ZERO; 400]);
+        assert_eq!(Film::new(2, 1, None).expect("a film").image(Quantity::Samples).pixels, [Vec3::ZERO; 2]);
+    }
+}

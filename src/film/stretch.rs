@@ -1,0 +1,183 @@
+//! Numbers that have no brightness of their own, shown by what is seen of them.
+
+use super::RadianceImage;
+use crate::math::Vec3;
+
+/// How numbers become brightnesses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Stretch {
+    /// As they are.
+    #[default]
+    None,
+    /// To be stretched; black until [`Stretch::of_picture`] says to what.
+    Unknown(Kind),
+    /// Stretched to these.
+    To(Kind, Range),
+}
+
+/// What numbers are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Distances: the nearest is white, the farthest dark, 0 stands for nothing and is black.
+    Distances,
+    /// Amounts: 0 is black, the largest white.
+    Amounts,
+}
+
+/// What is seen of numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The least; 0 of amounts.
+    pub least: f32,
+    /// The greatest.
+    pub greatest: f32,
+    /// Of the curve between them, see [`Range::part`].
+    bias: f32,
+}
+
+/// How dark the farthest distance is.
+const DARKEST: f32 = 0.1;
+
+/// Where in the range half of the numbers are at least: what is below is stretched to that.
+const QUARTER: f32 = 0.25;
+
+/// No curve is steeper than this one.
+const LEAST_BIAS: f32 = 1e-3;
+
+impl Stretch {
+    /// To what is seen in a picture.
+    pub fn of_picture(self, image: &RadianceImage) -> Self {
+        match self {
+            Self::None | Self::To(..) => self,
+            Self::Unknown(kind) => Self::To(kind, Range::of(kind, image)),
+        }
+    }
+
+    /// What it stretches to, if it is known.
+    pub fn range(&self) -> Option<Range> {
+        match self {
+            Self::None | Self::Unknown(_) => None,
+            Self::To(_, range) => Some(*range).filter(|range| range.least <= range.greatest),
+        }
+    }
+
+    /// Brightnesses of the numbers of a pixel.
+    pub fn apply(&self, numbers: Vec3) -> Vec3 {
+        let each = |of: &dyn Fn(f32) -> f32| Vec3::from_array(numbers.to_array().map(of));
+        match self {
+            Self::None => numbers,
+            Self::Unknown(_) => Vec3::ZERO,
+            Self::To(Kind::Distances, range) => each(&|x| range.nearness(x)),
+            Self::To(Kind::Amounts, range) => each(&|x| range.part(x)),
+        }
+    }
+}
+
+impl Range {
+    fn of(kind: Kind, image: &RadianceImage) -> Self {
+        let mut seen = match kind {
+            Kind::Distances => distances(image),
+            Kind::Amounts => image.pixels.iter().map(|pixel| pixel.x).filter(|x| *x > 0.0).collect(),
+        };
+        let greatest = seen.iter().copied().fold(0.0, f32::max);
+        let least = match kind {
+            Kind::Distances => seen.iter().copied().fold(f32::INFINITY, f32::min),
+            Kind::Amounts => 0.0,
+        };
+        let linear = Self { least, greatest, bias: 1.0 };
+        if seen.is_empty() {
+            return linear;
+        }
+        let middle = seen.len() / 2;
+        let (_, &mut median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
+        let place = linear.part(median);
+        let bias = (1.0 - QUARTER) / QUARTER * place / (1.0 - place).max(f32::MIN_POSITIVE);
+        Self { bias: bias.clamp(LEAST_BIAS, 1.0), ..linear }
+    }
+
+    /// The least and the greatest.
+    pub fn ends(&self) -> [f32; 2] {
+        [self.least, self.greatest]
+    }
+
+    /// The place of a number in the range, from 0 to 1: straight where at least half of what is seen is beyond the first quarter;
+    /// else by the curve x/(x + b(1 − x)) (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV, 1994)
+    /// that brings half of it there. A plane that goes on to the horizon leaves what stands before it a range of its own.
+    fn part(&self, number: f32) -> f32 {
+        let range = self.greatest - self.least;
+        let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };
+        if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
+    }
+
+    /// Brightness of a distance. What is nearer than all that is seen is a pixel that is filled in part.
+    fn nearness(&self, distance: f32) -> f32 {
+        if distance < self.least {
+            return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
+        }
+        1.0 - (1.0 - DARKEST) * self.part(distance)
+    }
+}
+
+/// The distances that are seen. Pixels at the border of nothing are averages of distances and nothing: they do not count.
+fn distances(image: &RadianceImage) -> Vec<f32> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let at = |x: usize, y: usize| image.pixels[y * width + x].x;
+    let is_whole = |x: usize, y: usize| {
+        let around = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
+        around(y, height).all(|y| around(x, width).all(|x| at(x, y) > 0.0))
+    };
+    let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    places.filter(|&(x, y)| is_whole(x, y)).map(|(x, y)| at(x, y)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(numbers: &[f32]) -> RadianceImage {
+        let pixels = numbers.iter().map(|x| Vec3::splat(*x)).collect();
+        RadianceImage { width: numbers.len() as u32, height: 1, pixels }
+    }
+
+    fn shown(kind: Kind, numbers: &[f32]) -> Vec<f32> {
+        let stretch = Stretch::Unknown(kind).of_picture(&picture(numbers));
+        numbers.iter().map(|x| stretch.apply(Vec3::splat(*x)).x).collect()
+    }
+
+    fn assert_near(values: &[f32], expected: &[f32]) {
+        let off = values.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 1e-6, "{values:?} are not {expected:?}");
+    }
+
+    #[test]
+    fn distances_go_from_white_to_dark() {
+        assert_near(&shown(Kind::Distances, &[2.0, 4.0, 6.0]), &[1.0, 0.55, 0.1]);
+        assert_near(&shown(Kind::Distances, &[3.0; 4]), &[1.0; 4]);
+        assert_near(&shown(Kind::Distances, &[0.0; 4]), &[0.0; 4]);
+        let range = Stretch::Unknown(Kind::Distances).of_picture(&picture(&[2.0, 4.0, 6.0])).range();
+        assert_eq!(range.map(|range| (range.least, range.greatest)), Some((2.0, 6.0)));
+        let nothing = Stretch::Unknown(Kind::Distances).of_picture(&picture(&[0.0; 4]));
+        assert_eq!(nothing.range(), None);
+    }
+
+    #[test]
+    fn a_horizon_leaves_what_is_before_it_its_shades() {
+        // A floor as it is seen from 1 above: rows of 1/row, the last ones far away.
+        let numbers: Vec<f32> = (1..=200).map(|row| 200.0 / row as f32).collect();
+        let shown = shown(Kind::Distances, &numbers);
+        assert!(shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6, "both ends are there");
+        // Half of the rows are at 1 … 2: in a straight stretch over 1 … 200 all of them were white.
+        assert!((shown[99] - (1.0 - 0.9 * 0.25)).abs() < 0.01, "{}", shown[99]);
+        assert!(shown.windows(2).all(|pair| pair[0] < pair[1]), "none is like another");
+    }
+
+    #[test]
+    fn amounts_go_from_black_to_white() {
+        assert_near(&shown(Kind::Amounts, &[0.0, 1.0, 2.0, 4.0]), &[0.0, 0.25, 0.5, 1.0]);
+        assert_near(&shown(Kind::Amounts, &[16.0; 3]), &[1.0; 3]);
+        assert_near(&shown(Kind::Amounts, &[0.0; 3]), &[0.0; 3]);
+        // One pixel that is worth a thousand others does not make them black.
+        let shown = shown(Kind::Amounts, &[1.0, 1.0, 1.0, 1000.0]);
+        assert!((shown[0] - 0.25).abs() < 0.01 && shown[3] == 1.0, "{shown:?}");
+    }
+}

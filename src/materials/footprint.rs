@@ -1,0 +1,93 @@
+//! The part of a texture that one look-up stands for.
+
+use crate::math::{DVec2, Vec2, Vec3};
+
+/// A place in a texture, and how much of it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexturePoint {
+    /// Texture coordinates.
+    pub uv: DVec2,
+    /// What is around them; filters without mip levels ignore it.
+    pub footprint: Footprint,
+}
+
+impl TexturePoint {
+    /// A point without extent.
+    pub fn sharp(uv: DVec2) -> Self {
+        Self { uv, footprint: Footprint::POINT }
+    }
+}
+
+/// An ellipse of texture coordinates, by its axes; both 0: a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    axes: [Vec2; 2],
+}
+
+impl Footprint {
+    /// Without extent.
+    pub const POINT: Self = Self { axes: [Vec2::ZERO; 2] };
+
+    /// What a cone of rays around a unit direction, so wide at a surface, covers there (Akenine-Möller, Crassin, Boksansky,
+    /// Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021, section 5): as wide
+    /// across the direction, and by one over the cosine wider along it. `tangents` are the changes of the point with u and v; a
+    /// point where they span nothing.
+    pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
+        let cosine = normal.dot(direction);
+        let along =
+            (direction - normal * cosine).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let across = normal.cross(along);
+        let [u, v] = tangents;
+        let (uu, uv, vv) = (u.length_squared(), u.dot(v), v.length_squared());
+        let determinant = uu * vv - uv * uv;
+        let coordinates = |vector: Vec3| {
+            let (by_u, by_v) = (vector.dot(u), vector.dot(v));
+            Vec2::new(vv * by_u - uv * by_v, uu * by_v - uv * by_u) / determinant
+        };
+        let long = width / cosine.abs().max(Self::LEAST_COSINE);
+        let axes = [coordinates(along * long), coordinates(across * width)];
+        if axes.iter().all(|axis| axis.is_finite()) { Self { axes } } else { Self::POINT }
+    }
+
+    /// Of surfaces that are seen from the side nobody can tell how far they reach.
+    const LEAST_COSINE: f32 = 1e-4;
+
+    /// The longer axis in texels, where so many of them are to a unit of u and of v.
+    pub fn texels(&self, per_unit: Vec2) -> f32 {
+        let lengths = self.axes.map(|axis| (axis * per_unit).length());
+        lengths[0].max(lengths[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cone_covers_more_along_its_direction() {
+        let tangents = [Vec3::X * 2.0, Vec3::Y * 4.0];
+        let straight = Footprint::of_cone(0.5, Vec3::NEG_Z, Vec3::Z, tangents);
+        // 0.5 units are a quarter of u and an eighth of v.
+        assert!((straight.texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
+        assert!((straight.texels(Vec2::new(0.0, 100.0)) - 12.5).abs() < 1e-4);
+        let steep = Footprint::of_cone(0.5, Vec3::new(0.0, 0.8, -0.6), Vec3::Z, tangents);
+        assert!((steep.texels(Vec2::new(0.0, 60.0)) - 12.5).abs() < 1e-4);
+        assert!((steep.texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn oblique_tangents_are_told_apart() {
+        let tangents = [Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
+        let seen = Footprint::of_cone(1.0, Vec3::new(0.6, 0.0, -0.8), Vec3::Z, tangents);
+        // Along x, 1/0.8 of u alone; along y, one v and one u back.
+        assert!((seen.texels(Vec2::X) - 1.25).abs() < 1e-6);
+        assert!((seen.texels(Vec2::Y) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn where_there_are_no_tangents_it_is_a_point() {
+        for tangents in [[Vec3::ZERO; 2], [Vec3::X, Vec3::X * 2.0], [Vec3::NAN, Vec3::X]] {
+            assert_eq!(Footprint::of_cone(1.0, Vec3::NEG_Z, Vec3::Z, tangents), Footprint::POINT);
+        }
+    }
+}

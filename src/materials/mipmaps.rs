@@ -1,0 +1,167 @@
+//! The levels of a texture, each with half as many columns and rows as the one before (Williams, *Pyramidal Parametrics*, 1983).
+
+use super::texels::{TexelData, Texels};
+use crate::math::Vec3;
+
+/// All levels of an image but the image itself, in linear light; the last has one texel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mipmaps {
+    levels: Vec<Texels>,
+}
+
+impl Mipmaps {
+    /// Made level by level, each of the one before; `halve` may end that.
+    ///
+    /// # Errors
+    /// Those of `halve`.
+    pub fn of<E>(texels: &Texels, halve: impl Fn(&Texels) -> Result<Texels, E>) -> Result<Self, E> {
+        let mut levels: Vec<Texels> = Vec::new();
+        while let last = levels.last().unwrap_or(texels)
+            && last.len() > 1
+        {
+            levels.push(halve(last)?);
+        }
+        Ok(Self { levels })
+    }
+
+    /// Level `number` ≥ 1; the last one beyond.
+    pub fn level(&self, number: usize) -> Option<&Texels> {
+        self.levels.get(number - 1).or(self.levels.last())
+    }
+
+    /// How many there are beside the image.
+    pub fn count(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.levels.iter().map(Texels::memory_bytes).sum()
+    }
+
+    /// The same of an image of so many columns and rows.
+    pub fn memory_bytes_of(width: u32, height: u32) -> u64 {
+        let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
+        while width * height > 1 {
+            (width, height) = ((width / 2).max(1), (height / 2).max(1));
+            bytes += width * height * size_of::<Vec3>() as u64;
+        }
+        bytes
+    }
+}
+
+/// Part of an image that is half as large.
+pub struct Halving<'a> {
+    of: &'a Texels,
+    width: u32,
+    height: u32,
+}
+
+impl<'a> Halving<'a> {
+    /// Of an image.
+    pub fn new(of: &'a Texels) -> Self {
+        Self { of, width: (of.width / 2).max(1), height: (of.height / 2).max(1) }
+    }
+
+    /// Rows of what it makes.
+    pub fn rows(&self) -> u32 {
+        self.height
+    }
+
+    /// Add a row of the smaller image: every texel is the mean over the area of the larger one that it covers, so that the mean of
+    /// the whole stays, also where a side is odd.
+    pub fn row(&self, y: u32, to: &mut Vec<Vec3>) {
+        let rows = Covered::new(y, self.height, self.of.height);
+        for x in 0..self.width {
+            let columns = Covered::new(x, self.width, self.of.width);
+            let row = |y: u32| columns.mean(|x| self.of.get(x, y));
+            to.push(rows.mean(row));
+        }
+    }
+
+    /// The smaller image, whose rows these are.
+    pub fn texels(&self, rows: Vec<Vec3>) -> Texels {
+        Texels { width: self.width, height: self.height, data: TexelData::Float(rows), unusable: 0 }
+    }
+}
+
+/// Up to three texels along a side that one of the smaller image covers.
+struct Covered {
+    first: u32,
+    weights: [f32; 3],
+}
+
+impl Covered {
+    fn new(index: u32, of: u32, from: u32) -> Self {
+        // In units of one over `of`, a texel of the larger image takes `of` and one of the smaller image `from`.
+        let (start, end) = (u64::from(index) * u64::from(from), u64::from(index + 1) * u64::from(from));
+        let first = start / u64::from(of);
+        let weight = |next: u64| {
+            let left = ((first + next) * u64::from(of)).max(start);
+            let right = ((first + next + 1) * u64::from(of)).min(end);
+            right.saturating_sub(left) as f32 / from as f32
+        };
+        Self { first: first as u32, weights: [weight(0), weight(1), weight(2)] }
+    }
+
+    fn mean(&self, of: impl Fn(u32) -> Vec3) -> Vec3 {
+        let covered = self.weights.iter().zip(self.first..).filter(|(weight, _)| **weight > 0.0);
+        covered.map(|(weight, place)| of(place) * *weight).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn halved(of: &Texels) -> Result<Texels, ()> {
+        let (halving, mut rows) = (Halving::new(of), Vec::new());
+        (0..halving.rows()).for_each(|y| halving.row(y, &mut rows));
+        Ok(halving.texels(rows))
+    }
+
+    fn image(width: u32, height: u32) -> Texels {
+        let value = |i: u32| Vec3::new((i * 7 % 11) as f32, (i % 5) as f32, (i * i % 3) as f32);
+        let data = TexelData::Float((0..width * height).map(value).collect());
+        Texels { width, height, data, unusable: 0 }
+    }
+
+    #[test]
+    fn every_level_has_the_mean_of_the_image() {
+        for (width, height) in [(1, 1), (2, 2), (64, 32), (5, 3), (7, 1), (13, 64), (100, 37)] {
+            let image = image(width, height);
+            let mipmaps = Mipmaps::of(&image, halved).expect("nothing ends it");
+            assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::memory_bytes_of(width, height));
+            for number in 1..=mipmaps.count() {
+                let level = mipmaps.level(number).expect("a level");
+                assert_eq!(
+                    (level.width, level.height),
+                    ((width >> number).max(1), (height >> number).max(1))
+                );
+                assert!((level.mean() - image.mean()).length() < 1e-5, "{width}×{height}, level {number}");
+            }
+            let last = mipmaps.level(99).unwrap_or(&image);
+            assert_eq!(last.len(), 1, "{width}×{height}");
+        }
+    }
+
+    #[test]
+    fn an_even_level_is_of_means_of_four_and_an_odd_one_of_parts() {
+        let four = Texels {
+            width: 2,
+            height: 2,
+            data: TexelData::Srgb8(vec![[0; 3], [0; 3], [255; 3], [255; 3]]),
+            unusable: 0,
+        };
+        // In linear light, not of the bytes.
+        assert_eq!(halved(&four).expect("made").get(0, 0), Vec3::splat(0.5));
+        let line = |values: &[f32]| Texels {
+            width: values.len() as u32,
+            height: 1,
+            data: TexelData::Float(values.iter().map(|value| Vec3::splat(*value)).collect()),
+            unusable: 0,
+        };
+        let five = halved(&line(&[10.0, 20.0, 30.0, 40.0, 50.0])).expect("made");
+        assert_eq!([five.get(0, 0).x, five.get(1, 0).x], [18.0, 42.0]);
+    }
+}

@@ -1,0 +1,35 @@
+//! The trees of a scene along a ray.
+
+use super::Geometry;
+use crate::accel::{Cell, Stretch};
+use crate::geometry::Ray;
+
+impl Geometry {
+    /// Visit the nodes of all trees whose boxes a ray meets; `visit` gets the ray in the coordinates of the node's tree, where the
+    /// direction of a unit ray is as long as a unit of the scene is there, and says whether to go on below. Depths are counted
+    /// through both trees: a mesh's root is a step below the leaf that holds the mesh.
+    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &Cell, &Stretch) -> bool) {
+        let mut meshes = Vec::new();
+        self.tree().along(
+            ray,
+            |cell, stretch| visit(ray, cell, stretch),
+            |id, depth| meshes.extend(self.objects()[id as usize].mesh().map(|mesh| (mesh, depth))),
+        );
+        for (mesh, above) in meshes {
+            let local = mesh.local_ray(ray);
+            mesh.tree.along(&local, |cell, stretch| {
+                visit(&local, &Cell { depth: above + cell.depth, ..*cell }, stretch)
+            });
+        }
+    }
+
+    /// Boxes that a ray meets up to its end, and shapes that it is tested against there: those of leaves, and those without an end.
+    pub fn work(&self, ray: &Ray) -> u32 {
+        let mut count = self.unbounded().len() as u32;
+        self.along(ray, |_, cell, _| {
+            count += 1 + cell.shapes;
+            true
+        });
+        count
+    }
+}

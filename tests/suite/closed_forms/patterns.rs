@@ -1,0 +1,163 @@
+//! Lamps with a texture on them.
+
+use std::f64::consts::{PI, TAU};
+
+use glimt::geometry::Ray;
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::materials::TexturePoint;
+use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
+
+use super::direct::{assert_hard, assert_irradiance, at_origin};
+use super::scenes::{AS_IT_IS, Build, emitter, phong};
+use super::{assert_close, lambert, mean_and_error, v};
+
+/// Grey of these values, rows from the top.
+fn greys(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2) -> usize {
+    let rows: Vec<Vec<Vec3>> = rows.iter().map(|row| row.iter().map(|x| Vec3::splat(*x)).collect()).collect();
+    let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
+    build.texture(&rows, filter, Wrap::Repeat, repeat)
+}
+
+fn shining(texture: usize, scale: f32) -> Material {
+    let emission = EmissionSource { scale: Vec3::splat(scale), texture: Some(texture) };
+    Material { emission, ..phong(0.0, 0.0, 1.0, 0.0) }
+}
+
+fn by_paths(build: &Build) -> Build {
+    build.clone().with(|scene| scene.render.integrator = Integrator::Path)
+}
+
+const CHECKER: [&[f32]; 2] = [&[5.0, 0.0], &[1.0, 3.0]];
+
+/// Above the origin, u × v downwards.
+const CORNER: DVec3 = v(-0.7, 1.0, -0.4);
+const U: DVec3 = v(1.5, 0.2, 0.0);
+const V: DVec3 = v(0.0, 0.1, 1.2);
+
+/// E of the checker over a lamp, each square of it by Lambert's formula.
+fn by_squares(scale: f64) -> f64 {
+    let mut irradiance = 0.0;
+    for (row, values) in CHECKER.iter().enumerate() {
+        for (column, value) in values.iter().enumerate() {
+            // Rows are from the top, v is from the bottom.
+            let at = CORNER + U * (0.5 * column as f64) + V * (0.5 - 0.5 * row as f64);
+            let (s, t) = (U * 0.5, V * 0.5);
+            let form = lambert(DVec3::ZERO, DVec3::Y, &[at, at + s, at + s + t, at + t]);
+            irradiance += scale * f64::from(*value) * form;
+        }
+    }
+    irradiance
+}
+
+#[test]
+fn a_checker_on_a_quad_lights_by_the_sum_of_its_squares() {
+    let mut lit = at_origin();
+    let texture = greys(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+    let lit = lit.quad(CORNER, U, V, shining(texture, 2.0));
+    assert_irradiance("whitted", &lit, by_squares(2.0));
+    assert_irradiance("path", &by_paths(&lit), by_squares(2.0));
+    assert_hard("one ray decides", &lit, by_squares(2.0));
+    // Mirrored in a place of its own: no texel of it counts elsewhere.
+    let half = lit.with(|scene| scene.textures[0].repeat = Vec2::new(-1.0, 1.0));
+    let turned = half.values(256, 64);
+    let (mean, error) = mean_and_error(&turned);
+    assert!((mean - 0.7 * by_squares(2.0) / PI).abs() > 20.0 * error, "{mean} ± {error}");
+}
+
+#[test]
+fn the_same_on_a_mesh_whose_corners_have_coordinates() {
+    for (mirror, order) in [(1.0, [0, 1, 2, 3]), (-1.0, [0, 3, 2, 1])] {
+        let corners = [CORNER, CORNER + U, CORNER + U + V, CORNER + V];
+        let uvs = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+        let mesh = TriangleMesh {
+            positions: order.map(|i| (corners[i] * v(mirror, 1.0, 1.0)).as_vec3()).to_vec(),
+            uvs: order.map(|i| uvs[i]).to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..TriangleMesh::default()
+        };
+        let mut lit = at_origin();
+        let texture = greys(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+        let placed = [v(mirror, 1.0, 1.0), AS_IT_IS[1], AS_IT_IS[2]];
+        let lit = lit.mesh(mesh, placed, shining(texture, 1.0));
+        assert_irradiance("whitted", &lit, by_squares(1.0));
+        assert_irradiance("path", &by_paths(&lit), by_squares(1.0));
+    }
+}
+
+/// E at the origin, facing up, over a cosine-weighted hemisphere.
+fn by_directions(build: &Build) -> f64 {
+    const RINGS: u32 = 1500;
+    let world = build.world();
+    let mut sum = 0.0;
+    for i in 0..RINGS {
+        for j in 0..RINGS {
+            let sin2 = (f64::from(i) + 0.5) / f64::from(RINGS);
+            let turn = (f64::from(j) + 0.5) / f64::from(RINGS) + 0.618_033_988_75 * f64::from(i);
+            let (sin, phi) = (sin2.sqrt(), TAU * turn.fract());
+            let ray =
+                Ray::new(Vec3::Y * 1e-4, v(sin * phi.cos(), (1.0 - sin2).sqrt(), sin * phi.sin()).as_vec3());
+            let Some(hit) = world.geometry.closest(&ray) else { continue };
+            let surface = world.geometry.surface(&ray, &hit);
+            if surface.normal.dot(ray.direction) < 0.0 {
+                let emission = &world.materials[world.material_index(&hit)].emission;
+                sum += f64::from(emission.at(&TexturePoint::sharp(surface.uv), &mut 0).x);
+            }
+        }
+    }
+    PI * sum / f64::from(RINGS * RINGS)
+}
+
+#[test]
+fn every_shape_shines_by_the_texture_where_it_is() {
+    let (p, q) = (v(0.4, 1.1, 0.3), v(-0.3, 0.7, -0.2));
+    let shapes = [
+        ("sphere", Shape::Sphere { center: p, radius: 0.5 }),
+        ("quad", Shape::Quad { corner: CORNER, u: v(1.5, 0.0, 0.0), v: v(0.0, 0.0, 1.2) }),
+        ("box", Shape::Box { center: p, size: v(0.5, 0.4, 0.8), rotate: v(20.0, 30.0, 40.0) }),
+        ("triangle", Shape::Triangle { a: v(-1.0, 1.0, -0.5), b: v(1.0, 1.2, 0.0), c: v(-0.2, 0.8, 1.0) }),
+        ("disk", Shape::Disk { center: p, normal: v(0.1, -1.0, -0.2), radius: 0.6 }),
+        ("cylinder", Shape::Cylinder { a: p, b: q, radius: 0.3, caps: true }),
+        ("cone", Shape::Cone { base: p, tip: q, radius: 0.4, cap: true }),
+        ("torus", Shape::Torus { center: p, axis: v(0.5, 1.0, 0.2), radius: 0.5, tube: 0.2 }),
+    ];
+    for (name, shape) in shapes {
+        let mut lit = at_origin();
+        let rows: [&[f32]; 3] = [&[4.0, 0.0, 1.0], &[0.0, 2.0, 0.5], &[3.0, 0.2, 0.0]];
+        let texture = greys(&mut lit, &rows, TextureFilter::Bilinear, Vec2::new(2.0, 3.0));
+        let lit = lit.shape(shape, shining(texture, 1.0));
+        let exact = 0.7 * by_directions(&lit) / PI;
+        assert!(exact > 0.01, "{name} is too dim to tell");
+        for (how, lit) in [("whitted", lit.clone()), ("path", by_paths(&lit))] {
+            let (mean, error) = mean_and_error(&lit.values(256, 64));
+            assert!(error < 0.01 * exact, "{name}, {how}: ± {error} of {exact}");
+            let allowed = 4.9 * error + 1e-3 * exact;
+            assert!((mean - exact).abs() < allowed, "{name}, {how}: {mean} ± {error} is not {exact}");
+        }
+    }
+}
+
+#[test]
+fn a_texture_of_one_colour_is_that_colour() {
+    let plain = at_origin().quad(CORNER, U, V, emitter(3.0));
+    for filter in [TextureFilter::Nearest, TextureFilter::Bilinear, TextureFilter::Mipmap] {
+        let mut lit = at_origin();
+        let texture = greys(&mut lit, &[&[0.75, 0.75, 0.75][..]; 3], filter, Vec2::new(7.0, 0.3));
+        let lit = lit.quad(CORNER, U, V, shining(texture, 4.0));
+        for (lit, plain) in [(lit.clone(), plain.clone()), (by_paths(&lit), by_paths(&plain))] {
+            for (value, exact) in lit.values(16, 8).into_iter().zip(plain.values(16, 8)) {
+                assert_close("as the colour", value, exact);
+            }
+            // And it is seen as bright.
+            let seen = |build: Build| build.seen(v(0.1, 0.0, 0.1), CORNER + U * 0.5 + V * 0.5).value();
+            assert_eq!((seen(lit), seen(plain)), (3.0, 3.0));
+        }
+    }
+}
+
+#[test]
+fn a_black_texture_is_no_lamp() {
+    let mut lit = at_origin();
+    let texture = greys(&mut lit, &[&[0.0]], TextureFilter::Nearest, Vec2::ONE);
+    assert!(lit.quad(CORNER, U, V, shining(texture, 4.0)).world().lights.is_empty());
+}
