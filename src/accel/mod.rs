@@ -14,9 +14,9 @@ mod pathological;
 mod tests;
 
 pub use along::{Cell, Stretch};
-pub use bvh::{AnyTest, Bvh, ClosestTest, traced};
+pub use bvh::{AnyTest, Bvh, ClosestTest};
 pub use kd_tree::KdTree;
-pub use wide_bvh::{Instructions, Loops, WideBvh, bits};
+pub use wide_bvh::{Instructions, Loops, WideBvh};
 
 pub use crate::geometry::rows::{Ends, PACKET};
 

@@ -14,6 +14,16 @@ pub type Row = [f32; PACKET];
 /// Where each ray of a packet ends, in place of its own `t_max`; below 0 where there is none, or where it is not traced.
 pub type Ends = Row;
 
+/// A bit for each ray that has an end.
+#[inline(always)]
+pub fn traced(ends: &Ends) -> u32 {
+    let mut traced = [0; PACKET];
+    for lane in 0..PACKET {
+        traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };
+    }
+    bits(traced)
+}
+
 /// Lanes whose bits are set.
 pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {

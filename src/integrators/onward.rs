@@ -185,7 +185,7 @@ impl Shot<'_> {
     pub fn light_beyond_with(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, density) = (&self.world.lights, path.history.density);
         let samples = self.settings.render.shadow_samples as f32;
-        if !(density > 0.0) {
+        if density.is_nan() || density <= 0.0 {
             return lights.beyond_with(sky, path.ray.direction, |_, _| 1.0);
         }
         let share = |of_light: f32| weight(of_light * samples / density);

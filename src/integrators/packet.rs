@@ -7,7 +7,7 @@ use super::queues::PathRay;
 use super::shot::Shot;
 use super::view::Measure;
 use crate::geometry::ray::offset_origin;
-use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
@@ -131,7 +131,7 @@ impl Loops for Meeting<'_> {
                     set_lane(&mut direction, lane, path.ray.direction);
                     ends[lane] = path.ray.t_max;
                 }
-                traced = crate::accel::traced(&ends);
+                traced = rows::traced(&ends);
                 of_paths = RayRows::of(origin, direction);
                 &of_paths
             }

@@ -45,6 +45,13 @@ impl SourceRow {
         Self { object: [object; LANES], part: [part; LANES], is_any: object != Self::NONE }
     }
 
+    /// Take one of another row.
+    #[inline(always)]
+    fn copy(&mut self, lane: usize, other: &Self) {
+        (self.object[lane], self.part[lane]) = (other.object[lane], other.part[lane]);
+        self.is_any |= other.is_any;
+    }
+
     /// Of one of them.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, source: Source) {
@@ -109,7 +116,7 @@ impl LightRow {
         set_lane(&mut self.directions, i, lane(&other.directions, i));
         set_lane(&mut self.targets, i, lane(&other.targets, i));
         set_lane(&mut self.weights, i, lane(&other.weights, i));
-        (self.sources.object[i], self.sources.part[i]) = (other.sources.object[i], other.sources.part[i]);
+        self.sources.copy(i, &other.sources);
         self.beyond = self.beyond & !(1 << i) | other.beyond & 1 << i;
     }
 

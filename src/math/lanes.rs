@@ -2,7 +2,6 @@
 //! gets the bits that it would get alone.
 
 use super::Vec3;
-pub use crate::accel::bits;
 
 /// Numbers at a time.
 pub const LANES: usize = 16;
@@ -30,6 +29,26 @@ pub type Truths = [u32; LANES];
 
 /// What holds, in [`Truths`].
 pub const TRUE: u32 = u32::MAX;
+
+/// A bit for each lane where something holds. Compilers take sums of single bits apart into a test of one lane after the other:
+/// the hint has them finish the vector first, and then it is folded by halves.
+#[inline(always)]
+pub fn bits(holds: Truths) -> u32 {
+    let mut row = std::hint::black_box(holds);
+    for i in 0..LANES {
+        row[i] &= 1 << i;
+    }
+    for i in 0..8 {
+        row[i] |= row[i + 8];
+    }
+    for i in 0..4 {
+        row[i] |= row[i + 4];
+    }
+    for i in 0..2 {
+        row[i] |= row[i + 2];
+    }
+    row[0] | row[1]
+}
 
 /// The lanes whose bits are set.
 #[inline(always)]
@@ -64,8 +83,9 @@ mod tests {
 
     #[test]
     fn lanes_of_bits_are_taken() {
-        for expected in [0, 1, 0x8000, 0xffff, 0x1234, 0xa5a5] {
+        for expected in 0..1_u32 << LANES {
             let holds = std::array::from_fn(|i| if expected >> i & 1 == 1 { TRUE } else { 0 });
+            assert_eq!(bits(holds), expected);
             assert_eq!(truths(expected), holds);
             let (mut own, mut whole) = ([1.0; LANES], [1; LANES]);
             take(&holds, &[f32::NAN; LANES], &mut own);

@@ -8,8 +8,8 @@ use crate::geometry::Shape;
 use crate::lights::emitter::{Emitter, Part};
 use crate::lights::mesh::MeshEmitter;
 use crate::lights::{
-    AreaLight, Chart, DirectionalLight, Environment, Light, Lights, Patch, Pattern, PointLight, SkyMap,
-    SpotLight, area_light,
+    AreaLight, Chart, DirectionalLight, Environment, Light, LightBounds, Lights, Patch, Pattern, PointLight,
+    SkyMap, SpotLight, area_light,
 };
 use crate::materials::Emission;
 use crate::materials::texels::Texels;
@@ -87,7 +87,12 @@ fn shape_light(shape: &Shape, emission: &Emission, object: u32) -> Option<AreaLi
     let light = area_light(shape, emission.scale, object).filter(|_| emission.shines())?;
     let pattern =
         emission.texture.as_ref().map(|texture| Box::new(Pattern::new(texture, Chart::Shape(*shape))));
-    Some(AreaLight { pattern, ..light })
+    Some(AreaLight { pattern, bounds: of_mean(light.bounds, emission), ..light })
+}
+
+/// Bounds of a lamp as bright as the mean of its texture.
+fn of_mean(bounds: LightBounds, emission: &Emission) -> LightBounds {
+    emission.texture.as_ref().map_or(bounds, |texture| bounds.times(texture.mean()))
 }
 
 /// Of a mesh whose triangles all emit this; none: what their own materials emit.
@@ -108,7 +113,7 @@ fn mesh_lights(
     let light = |(own, emission): (Option<u32>, Emission)| {
         let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
         let emitter = MeshEmitter::new(triangles)?;
-        let bounds = emitter.bounds().times(emission.scale);
+        let bounds = of_mean(emitter.bounds().times(emission.scale), &emission);
         let pattern = emission.texture.as_ref().map(|texture| {
             let patch =
                 |id| Patch { primitive: id, corners: mesh.world_corners(id), uvs: mesh.corner_uvs(id) };

@@ -1,9 +1,9 @@
 //! Up to sixteen rays at once through a scene: what they hit is what each hits alone.
 
 use super::{Geometry, Hit};
-use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET, traced};
+use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
-use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::rows::{HitRows, RayRows, traced};
 use crate::lights::SourceRow;
 use crate::math::lanes::{TRUE, bits, take, take_u32};
 

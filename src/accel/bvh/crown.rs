@@ -192,13 +192,12 @@ impl Bvh {
 
 #[cfg(test)]
 mod tests {
-    use super::super::packet::traced;
     use super::*;
     use crate::accel::{AnyTest, ClosestTest};
     use crate::control::CancelToken;
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
-    use crate::geometry::rows::{RayRows, lanes};
+    use crate::geometry::rows::{RayRows, lanes, traced};
     use crate::math::random::signed as random;
 
     /// Notes which primitives are tested, and for which rays.

@@ -8,7 +8,7 @@ mod traverse;
 use crate::geometry::Aabb;
 
 use crown::Crown;
-pub use packet::{AnyTest, ClosestTest, traced};
+pub use packet::{AnyTest, ClosestTest};
 
 /// Most primitives in a leaf that the surface area heuristic may make.
 const LEAF_SIZE: usize = 4;

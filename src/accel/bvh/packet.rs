@@ -96,16 +96,6 @@ fn met(stretches: &Stretches) -> u32 {
     bits(met)
 }
 
-/// A bit for each ray that has an end.
-#[inline(always)]
-pub fn traced(ends: &Ends) -> u32 {
-    let mut traced = [0; PACKET];
-    for lane in 0..PACKET {
-        traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };
-    }
-    bits(traced)
-}
-
 /// The end of the ray that goes on longest; below 0 where no ray is traced. Bits are ordered as in [`Stretches::first`].
 #[inline(always)]
 fn greatest(ends: &Ends) -> f32 {

@@ -11,7 +11,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-pub use simd::{Instructions, Loops, bits, pages};
+pub use simd::{Instructions, Loops, pages};
 
 use crate::accel::{Cell, Ends, PACKET, Stretch};
 

@@ -161,3 +161,43 @@ fn a_black_texture_is_no_lamp() {
     let texture = greys(&mut lit, &[&[0.0]], TextureFilter::Nearest, Vec2::ONE);
     assert!(lit.quad(CORNER, U, V, shining(texture, 4.0)).world().lights.is_empty());
 }
+
+#[test]
+fn a_lamp_is_as_strong_as_the_mean_of_its_texture() {
+    let strength = |build: &Build| {
+        let world = build.world();
+        let bounds = world.lights.iter().filter_map(|(_, light)| light.bounds());
+        bounds.map(|bounds| bounds.power).sum::<f64>()
+    };
+    let mut patterned = at_origin();
+    let texture = greys(&mut patterned, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+    let patterned = patterned.quad(CORNER, U, V, shining(texture, 2.0));
+    let plain = at_origin().quad(CORNER, U, V, emitter(2.0 * 2.25));
+    assert_close("power", strength(&patterned), strength(&plain));
+}
+
+/// So many that vertices pick some of them.
+#[test]
+fn picked_lamps_have_their_textures() {
+    let mut build = at_origin();
+    let texture = greys(&mut build, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+    let cells = 7_u32;
+    let mut expected = 0.0;
+    for cell in 0..cells * cells {
+        let (x, z) = (f64::from(cell % cells) - 3.0, f64::from(cell / cells) - 3.0);
+        let (corner, u, w) = (v(x - 0.2, 2.0, z - 0.2), v(0.4, 0.0, 0.0), v(0.0, 0.0, 0.4));
+        build = build.quad(corner, u, w, shining(texture, 1.0));
+        for (row, values) in CHECKER.iter().enumerate() {
+            for (column, value) in values.iter().enumerate() {
+                let at = corner + u * (0.5 * column as f64) + w * (0.5 - 0.5 * row as f64);
+                let (s, t) = (u * 0.5, w * 0.5);
+                let form = lambert(DVec3::ZERO, DVec3::Y, &[at, at + s, at + s + t, at + t]);
+                expected += f64::from(*value) * form;
+            }
+        }
+    }
+    assert!(build.world().lights.tree().is_some());
+    for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
+        assert_irradiance(name, &build, expected);
+    }
+}

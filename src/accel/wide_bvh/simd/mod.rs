@@ -4,8 +4,6 @@
 
 #[allow(unsafe_code)]
 pub mod binning;
-#[allow(unsafe_code)]
-mod bits;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod lanes;
@@ -31,7 +29,6 @@ mod triangle;
 
 use std::sync::LazyLock;
 
-pub use bits::bits;
 pub use loops::Loops;
 
 use super::WideBvh;
