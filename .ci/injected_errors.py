@@ -74,7 +74,7 @@ FAULTS = [
      "0.0", "lights::tree::tests::what_can_arrive_can_be_picked"),
     ("paths weighed as if all lights were sampled", "integrators/onward.rs",
      "light.pdf(ray.origin, normal, &met) * ⟦lights.samples_at(ray.origin, normal).of(number)⟧", "1.0",
-     MANY + "a_lamp_that_is_cut_into_a_thousand_lights_as_before"),
+     MANY + "a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before"),
     ("chosen rays count for themselves alone", "integrators/picking.rs", "let times = ⟦(place - first) as f32 * step / one.importance[i]⟧;",
      "2.0", MANY + "picks_among_lights_of_every_kind_bring_what_all_of_them_do"),
 ]

@@ -129,6 +129,18 @@ fn a_lamp_that_is_cut_into_a_thousand_lights_as_before() {
     }
 }
 
+/// The lobes find most of the light; each of the thousand is picked once in thirty vertices.
+#[test]
+fn a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before() {
+    let floor = phong(0.0, 0.8, 300.0, 0.0);
+    let seen = scene()
+        .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
+        .seen(v(0.0, 1.5, 1.0), v(0.0, 0.0, 0.4));
+    let [whole, cut] = [1, 32].map(|parts| cut_lamp(seen.clone(), parts));
+    assert_same("whitted", &cut, &whole, (64, 16), 6e-3);
+    assert_same("path", &by_paths(cut, 1), &by_paths(whole, 1), (64, 16), 6e-3);
+}
+
 /// Triangles of sizes from 1 to 100 over the floor, most of them with their fronts down, some sideways.
 fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
     let mut random = Random(4);
