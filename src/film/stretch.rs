@@ -38,7 +38,7 @@ pub struct Range {
 /// How dark the farthest distance is.
 const DARKEST: f32 = 0.1;
 
-/// Where in the range half of the numbers are at least: what is below is stretched to that.
+/// The median number is shown at this brightness at least.
 const QUARTER: f32 = 0.25;
 
 /// No curve is steeper than this one.

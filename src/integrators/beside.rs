@@ -32,7 +32,7 @@ impl Others {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
 
-    /// How many of their rays come on each of so many samples of a light.
+    /// Rays by the BSDF for each of so many samples of a light.
     #[inline(always)]
     pub(super) fn to_each(self, count: u32) -> f32 {
         match self {
@@ -42,8 +42,8 @@ impl Others {
         }
     }
 
-    /// What they leave of `values`, what samples of lights bring to the vertices of a row, by one over the densities of these;
-    /// `others` of their rays come on each.
+    /// Multiply `values`, which samples of lights bring to the vertices of a row, by their power-heuristic weights, of which one
+    /// over the densities of these is known; `others` rays by the BSDF come on each.
     #[inline(always)]
     pub(super) fn left(
         self,
@@ -102,8 +102,8 @@ fn glossy_lobe(row: &LitRow, i: usize) -> Lobes {
     Lobes { diffuse: 0.0, specular: 1.0, ..row.lobes(i) }
 }
 
-/// What is left of the light that a vertex reflects where the glossy part of it counts so much: rays in a lobe bring no other,
-/// so that the parts of a picture add up to it.
+/// What is left of the reflected light where its glossy part is weighted so: the weight applies to that part alone, as rays in a
+/// lobe bring no diffuse light. So the parts of a picture add up to it.
 #[inline(always)]
 fn left_of_gloss(row: &LitRow, i: usize, gloss: f32, weight: f32) -> Vec3 {
     let (diffuse, glossy) = (lane(&row.diffuse, i), lane(&row.specular, i) * gloss);

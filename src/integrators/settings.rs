@@ -1,5 +1,6 @@
 //! How a world is rendered.
 
+use super::view::Measure;
 use super::{Shown, View};
 use crate::math::DVec2;
 use crate::scene::description::Render;
@@ -31,9 +32,12 @@ impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         let Self { render, dof, view } = *self;
         key.add(&render, of).flag(dof).choice(view.sampled());
-        // Lines over a picture are as bright as the exposure leaves them to be.
-        if view.shown() == Shown::Bounds {
-            key.f32(render.exposure);
-        }
+        // All trees give the same hits; these two show the trees themselves.
+        match view.shown() {
+            // Lines over a picture are as bright as the exposure leaves them to be.
+            Shown::Bounds => key.choice(render.accel).f32(render.exposure),
+            Shown::Light(Measure::Work) => key.choice(render.accel),
+            Shown::Light(_) | Shown::FirstHit(_) | Shown::Film(_) => &mut *key,
+        };
     }
 }

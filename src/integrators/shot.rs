@@ -105,7 +105,7 @@ impl SampleBlock {
     }
 }
 
-/// Divides whole numbers by one, without the instruction for that, which there is for one number at a time alone.
+/// Division of whole numbers by a constant one, in `f64`, as no vector instruction divides integers.
 #[derive(Clone, Copy)]
 struct Divisor {
     inverse: f64,
@@ -117,8 +117,7 @@ impl Divisor {
         Self { inverse: 1.0 / f64::from(divisor) }
     }
 
-    /// Of what a half more gives, which lies off all whole numbers, the part before the point: rounded by the last digits of a
-    /// large number. For all quotients with divisors of up to 2¹⁹, and all below 2³¹: the half is then further off than rounding.
+    /// ⌊n/d⌋ as (n + ½)/d − ½, rounded by adding 3·2⁵¹: exact for d ≤ 2¹⁹ and n < 2³¹, where rounding errors are less than ½/d.
     #[inline(always)]
     fn quotient(self, number: u32) -> u32 {
         const LARGE: f64 = (3_u64 << 51) as f64;

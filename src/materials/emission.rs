@@ -9,7 +9,7 @@ use crate::math::Vec3;
 /// Radiance of a front side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
-    /// The radiance; where there is a texture, what that is multiplied by.
+    /// Radiance; where there is a texture, the factor on it.
     pub scale: Vec3,
     /// What it is multiplied by from point to point.
     pub texture: Option<Arc<Texture>>,
@@ -29,7 +29,7 @@ impl Emission {
         self.scale != Vec3::ZERO
     }
 
-    /// The radiance at texture coordinates, and how many texture look-ups that took.
+    /// The radiance at texture coordinates; adds to `lookups`.
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         let Some(texture) = self.texture.as_ref().filter(|_| self.shines()) else { return self.scale };
         *lookups += 1;

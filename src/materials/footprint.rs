@@ -49,7 +49,7 @@ impl Footprint {
         if axes.iter().all(|axis| axis.is_finite()) { Self { axes } } else { Self::POINT }
     }
 
-    /// Of surfaces that are seen from the side nobody can tell how far they reach.
+    /// Least cosine: footprints at grazing angles are cut off here.
     const LEAST_COSINE: f32 = 1e-4;
 
     /// The longer axis in texels, where so many of them are to a unit of u and of v.

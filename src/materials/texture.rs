@@ -74,7 +74,7 @@ impl Color {
         }
     }
 
-    /// The colour at texture coordinates, and how many texture look-ups that took.
+    /// The colour at texture coordinates; adds to `lookups`.
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Constant(color) => *color,

@@ -303,7 +303,7 @@ pub struct Report {
     pub image: ImageReport,
     /// The settings it was made with.
     pub settings: Effective,
-    /// The lights, and how surfaces look at them.
+    /// The lights, and how vertices sample them.
     pub lights: LightsReport,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
@@ -333,8 +333,8 @@ pub struct ImageReport {
     pub error: Option<f64>,
     /// Whether every pixel got the samples that were asked for.
     pub complete: bool,
-    /// Of a view that is stretched to what is seen, such as `depth`: the least and the greatest number. Near is white in `depth`,
-    /// the greatest number in others.
+    /// Of a view that is stretched to what is seen: the numbers at both ends. In `depth` the least, which is white, and the greatest
+    /// distance; in others 0 and the greatest number, which is white.
     pub range: Option<[f32; 2]>,
 }
 
@@ -356,7 +356,7 @@ pub struct LightsReport {
     pub count: u64,
     /// How many of them a surface samples where light falls on it.
     pub sampled: LightsSampled,
-    /// Samples of lights that a surface takes where light falls on it, where it picks: 32 for each of `shadow_samples`; else 0.
+    /// Lights that a vertex picks: 32 × `shadow_samples`; 0 without a tree.
     pub picks: u64,
     /// Nodes of the tree that it picks from.
     pub tree_nodes: u64,
@@ -421,6 +421,6 @@ pub struct LatestPreview {
     pub generation: u64,
     /// The picture, at most as large as was asked for.
     pub picture: Arc<Picture>,
-    /// The least and the greatest number that it shows, where it is stretched to them: near and far of distances.
+    /// The numbers at both ends of the range that it is stretched to: near and far of distances, else 0 and the greatest.
     pub range: Option<[f32; 2]>,
 }

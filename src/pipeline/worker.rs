@@ -180,8 +180,7 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Leave an order to write to the request that waits, if one does: not to one that came after the order and shows something
-    /// else.
+    /// Keep an order to write for the request that waits, unless that came later and shows another view.
     fn postpone_write(&self) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;

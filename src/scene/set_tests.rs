@@ -70,12 +70,15 @@ fn mistakes_in_what_the_call_sets_are_answered_like_those_of_the_file() {
         ("camera.position=3", "`position` must be three numbers, [x, y, z]", "3"),
         ("sphere.1=3", "[[sphere]] must be a table", "3"),
         ("samples=3", "this does not say what to set", "samples=3"),
+        ("render.samples 3", "this does not say what to set", "render.samples 3"),
     ] {
         let errors = with_sets(&format!("{BALLS}\n{two}"), &[set]).expect_err("an error");
         let [error] = errors.as_slice() else { panic!("{set}: {errors:?}") };
         let place = error.place.as_ref().expect("a place");
         assert_eq!((&*error.message, &place.source[place.span.clone()]), (message, written), "{set}");
         assert_eq!(error.path, Path::new("--set"), "{set}");
+        let help = error.help.as_deref().unwrap_or_default();
+        assert!(set.contains('=') || help.contains("there is no `=`"), "{set}: {help}");
     }
 }
 

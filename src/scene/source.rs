@@ -124,8 +124,10 @@ fn malformed(set: &str) -> Diagnostic {
     let place =
         Place { source: set.into(), span: 0..set.len(), label: "this is not TABLE.KEY=VALUE".to_owned() };
     let key = set.split('=').next().unwrap_or_default();
-    let help = if key.contains(|c: char| c.is_whitespace() || !c.is_ascii()) {
-        "a name of more than letters, digits, - and _ stands in quotes, as in sphere.\"back wall\".radius=.3"
+    let help = if !set.contains('=') {
+        "there is no `=` between what to set and its value, as in render.samples=3"
+    } else if key.contains(|c: char| c.is_whitespace() || !c.is_ascii()) {
+        "a name of more than letters, digits, - and _ stands in quotes, as in --set 'sphere.\"back wall\".radius=.3'"
     } else {
         "such as render.samples=3, materials.wall.diffuse=0.5, sphere.2.radius=.3 or sphere.ball.radius=.3"
     };

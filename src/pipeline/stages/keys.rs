@@ -84,7 +84,7 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Everything that a world is made of but the kind of its trees: all kinds give the same picture bit for bit.
+/// Everything that a world is made of but the kind of its trees, which all have the same hits: views that show the trees add it.
 pub(in crate::pipeline) fn world(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
     let mut key = Fingerprint::new("world");
     key.key(&shapes(scene, of)).key(&described_lights(scene, of)).add(&scene.camera, of);
@@ -241,6 +241,11 @@ mod tests {
             Render { accel: Accel::KdTree, ..render_settings },
         ] {
             assert_eq!(of(&with(same)), of(&settings), "{same:?}");
+        }
+        // The views that show the trees are other pictures by another tree.
+        for view in [View::Bounds, View::Cost] {
+            let by = |accel| RenderSettings { view, ..with(Render { accel, ..render_settings }) };
+            assert_ne!(of(&by(Accel::Bvh)), of(&by(Accel::KdTree)), "{view:?}");
         }
         // What path ignores, and whitted.
         for same in

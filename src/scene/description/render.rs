@@ -108,7 +108,7 @@ impl Fingerprinted for Render {
             // For files and screens only.
             exposure: _,
             tonemap: _,
-            // All trees give the same hits.
+            // All trees give the same hits; views that show the trees add it.
             accel: _,
             seed,
         } = self.heeded();
