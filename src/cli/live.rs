@@ -7,14 +7,14 @@ use std::time::Duration;
 use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
-use crate::pipeline::protocol::{Command, Event, Failure};
+use crate::pipeline::protocol::{Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
 use crate::pipeline::watch::Watcher;
 use crate::scene::NO_SUCH_FILE;
 use crate::scene::diagnostic::Diagnostic;
-use crate::tui::{self, Options, TuiError};
+use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
-/// How long a file that is being written may take at the end.
+/// How long the end waits for a picture that is being written, after a signal; after a key until a person is told what it waits for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(order: Order, console: &Console) -> Exit {
@@ -48,8 +48,10 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         preview: order.preview,
         cell_aspect: None,
         commands: Box::new(move |command| {
-            if matches!(command, Command::Write) {
-                asked.lines().clear();
+            match command {
+                Command::Write => asked.order(),
+                Command::Quit => asked.leave(),
+                Command::Render(_) | Command::Preview(_) | Command::Cancel | Command::Pause(_) => {}
             }
             remote.send(command);
         }),
@@ -57,13 +59,21 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         previews: worker.previews.clone(),
         news,
     });
-    let has_ended = worker.finish(PATIENCE);
-    if outcome.as_ref().is_ok_and(|ended| ended.is_write_unanswered) {
-        if has_ended {
-            // It ends with the worker; a panic of it has nothing more to say.
-            let _ = tap.join();
-        }
-        writes.said().iter().for_each(|line| console.say(line));
+    let waits = |ended: &Ended| {
+        ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_last_stage())
+    };
+    let has_ended = if worker.end_within(PATIENCE) || !outcome.as_ref().is_ok_and(waits) {
+        worker.finish(Duration::ZERO)
+    } else {
+        console.say("waiting for the image that is being written; ctrl-c ends it without");
+        worker.finish(Duration::MAX)
+    };
+    if has_ended {
+        // It ends with the worker; a panic of it has nothing more to say.
+        let _ = tap.join();
+    }
+    if let Ok(ended) = &outcome {
+        writes.said(ended.is_write_unanswered, has_ended).iter().for_each(|line| console.say(line));
     }
     outcome.map(|ended| Exit(ended.status.0)).map_err(|error| {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
@@ -71,46 +81,76 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// What came of the last order to write.
+/// What became of pictures.
 #[derive(Clone, Debug, Default)]
-struct Writes(Arc<Mutex<Vec<String>>>);
+struct Writes(Arc<Mutex<Heard>>);
+
+#[derive(Debug, Default)]
+struct Heard {
+    /// A line for each picture since the last order to write, and whether it came after the front end was left.
+    lines: Vec<(bool, String)>,
+    has_left: bool,
+    /// Whether a request is at its last stage.
+    is_last_stage: bool,
+}
 
 impl Writes {
-    fn lines(&self) -> MutexGuard<'_, Vec<String>> {
+    fn heard(&self) -> MutexGuard<'_, Heard> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// A person asks for the picture.
+    fn order(&self) {
+        self.heard().lines.clear();
+    }
+
+    /// The front end is left.
+    fn leave(&self) {
+        self.heard().has_left = true;
+    }
+
+    fn is_last_stage(&self) -> bool {
+        self.heard().is_last_stage
+    }
+
     fn hear(&self, event: &Event) {
+        let mut heard = self.heard();
+        let has_left = heard.has_left;
         match event {
-            Event::Written { path, .. } => self.lines().push(format!("wrote {}", path.display())),
-            Event::WriteFailed { message, .. } => self.lines().push(format!("error: {message}")),
+            Event::Written { path, .. } => heard.lines.push((has_left, format!("wrote {}", path.display()))),
+            Event::WriteFailed { message, .. } => heard.lines.push((has_left, format!("error: {message}"))),
             Event::Refused { conflicts, .. } => {
-                let lines = conflicts.iter().map(|conflict| format!("error: {}", conflict.message));
-                self.lines().extend(lines);
+                let lines =
+                    conflicts.iter().map(|conflict| (has_left, format!("error: {}", conflict.message)));
+                heard.lines.extend(lines);
+            }
+            Event::Stage { stage, .. } => {
+                heard.is_last_stage = stage.name == Stage::Write && stage.status == Status::Running;
+            }
+            Event::Done { .. } | Event::Failed { .. } | Event::Cancelled { .. } => {
+                heard.is_last_stage = false
             }
             Event::Started { .. }
-            | Event::Stage { .. }
             | Event::Asset { .. }
             | Event::Settings { .. }
             | Event::Warnings { .. }
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
-            | Event::Files { .. }
-            | Event::Done { .. }
-            | Event::Failed { .. }
-            | Event::Cancelled { .. } => {}
+            | Event::Files { .. } => {}
         }
     }
 
-    /// A line for each picture.
-    fn said(&self) -> Vec<String> {
-        let lines = self.lines();
-        if lines.is_empty() {
-            vec!["the image was not written: glimt was ended first".to_owned()]
-        } else {
-            lines.clone()
+    /// A line for each picture that a person does not know of: those after the front end was left; of an order that is
+    /// unanswered all since then.
+    fn said(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
+        let heard = self.heard();
+        let unknown = heard.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);
+        let mut lines: Vec<String> = unknown.map(|(_, line)| line.clone()).collect();
+        if !has_ended && (is_unanswered || heard.is_last_stage) || is_unanswered && lines.is_empty() {
+            lines.push("the image was not written: glimt was ended first".to_owned());
         }
+        lines
     }
 }
 

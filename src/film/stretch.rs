@@ -118,7 +118,8 @@ impl Range {
     }
 }
 
-/// The distances that are seen. Pixels at the border of nothing are averages of distances and nothing: they do not count.
+/// The distances that are seen. Pixels at the border of nothing are averages of distances and nothing: they do not count where
+/// there are others.
 fn distances(image: &RadianceImage) -> Vec<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let at = |x: usize, y: usize| image.pixels[y * width + x].x;
@@ -126,8 +127,9 @@ fn distances(image: &RadianceImage) -> Vec<f32> {
         let around = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
         around(y, height).all(|y| around(x, width).all(|x| at(x, y) > 0.0))
     };
-    let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-    places.filter(|&(x, y)| is_whole(x, y)).map(|(x, y)| at(x, y)).collect()
+    let places = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let whole: Vec<f32> = places().filter(|&(x, y)| is_whole(x, y)).map(|(x, y)| at(x, y)).collect();
+    if whole.is_empty() { places().map(|(x, y)| at(x, y)).filter(|x| *x > 0.0).collect() } else { whole }
 }
 
 #[cfg(test)]
@@ -158,6 +160,13 @@ mod tests {
         assert_eq!(range.map(|range| (range.least, range.greatest)), Some((2.0, 6.0)));
         let nothing = Stretch::Unknown(Kind::Distances).of_picture(&picture(&[0.0; 4]));
         assert_eq!(nothing.range(), None);
+    }
+
+    #[test]
+    fn things_that_are_thinner_than_pixels_have_a_range_too() {
+        let range =
+            Stretch::Unknown(Kind::Distances).of_picture(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0])).range();
+        assert_eq!(range.map(|range| range.ends()), Some([2.0, 6.0]));
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl Onward {
     pub fn spared(self, shot: &Shot<'_>, mut path: PathRay) -> Option<PathRay> {
         let chance = self.chance(path.history.carried);
         if chance < 1.0 {
-            if !(shot.sampler(path.slot).pair(path.path, Decision::Roulette).x < chance) {
+            if !(shot.sampler(path.slot).pair(path.path, Decision::Spared).x < chance) {
                 return None;
             }
             path.throughput /= chance;

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::engine::{Engine, Means, Meanwhile, Orders};
-use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request};
+use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
 use super::settings::View;
 use super::sink::Sink;
 use super::watch::content::Contents;
@@ -65,19 +65,27 @@ impl Handle {
         Arc::clone(&self.contents)
     }
 
-    /// End the worker and wait for it at most this long; true: it has ended.
-    pub fn finish(mut self, patience: Duration) -> bool {
+    /// Tell the worker to end and wait for it at most this long; true: it has ended. A picture that is being written is written.
+    pub fn end_within(&self, patience: Duration) -> bool {
         self.send(Command::Quit);
-        let deadline = Instant::now() + patience;
-        let ended = |thread: &Option<JoinHandle<()>>| thread.as_ref().is_none_or(JoinHandle::is_finished);
-        while !ended(&self.thread) && Instant::now() < deadline {
+        let deadline = Instant::now().checked_add(patience);
+        while !self.has_ended() && deadline.is_none_or(|deadline| Instant::now() < deadline) {
             std::thread::sleep(Duration::from_millis(2));
         }
-        let has_ended = ended(&self.thread);
+        self.has_ended()
+    }
+
+    /// The same for the last time: a worker that does not end is left to the end of the process.
+    pub fn finish(mut self, patience: Duration) -> bool {
+        let has_ended = self.end_within(patience);
         if !has_ended {
             self.thread = None;
         }
         has_ended
+    }
+
+    fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 }
 
@@ -115,13 +123,17 @@ struct Mailbox {
     quit: bool,
     /// Of the request under way.
     token: CancelToken,
+    /// Of the writing at its end: a picture that is whole is not lost to a pause, to the end of the program or to a request that
+    /// writes nothing.
+    writing: CancelToken,
     /// Generation of the newest request.
     newest: u64,
 }
 
 /// What the worker does next.
 enum Task {
-    Render(Box<Request>, CancelToken),
+    /// With the tokens of the work and of the writing at its end.
+    Render(Box<Request>, CancelToken, CancelToken),
     Write,
     Preview(Option<PreviewSize>, CancelToken),
     Quit,
@@ -140,6 +152,7 @@ impl Remote {
             Command::Preview(size) => mailbox.preview = Some(size),
             Command::Cancel => {
                 mailbox.token.cancel();
+                mailbox.writing.cancel();
                 let dropped = mailbox.request.take();
                 self.say_cancelled(dropped);
             }
@@ -164,6 +177,9 @@ impl Remote {
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
+        if request.write != Writing::No {
+            mailbox.writing.cancel();
+        }
         (mailbox.paused, mailbox.preview) = (false, None);
         let replaced = mailbox.request.replace(request);
         self.say_cancelled(replaced);
@@ -180,12 +196,15 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keep an order to write for the request that waits, unless that came later and shows another view.
-    fn postpone_write(&self) -> bool {
+    /// Keep an order to write for the request that waits where it is meant, or where it shows the same view as the picture at hand
+    /// and that has holes; true: it is kept.
+    fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
-        let postponed =
-            mailbox.request.as_ref().is_some_and(|one| is_meant || one.overrides.view == mailbox.view);
+        let postponed = mailbox
+            .request
+            .as_ref()
+            .is_some_and(|one| is_meant || !can_write && one.overrides.view == mailbox.view);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -203,11 +222,11 @@ impl Remote {
             }
             mailbox.is_write_postponed = false;
             if let Some(request) = mailbox.request.take() {
-                mailbox.token = CancelToken::new();
+                (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
                 mailbox.view = request.overrides.view;
                 mailbox.token.set_paused(mailbox.paused);
-                return Task::Render(request, mailbox.token.clone());
+                return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }
             if let Some(size) = mailbox.preview.take() {
                 mailbox.token = CancelToken::new();
@@ -220,11 +239,15 @@ impl Remote {
 
 impl Orders for Remote {
     fn wants_write(&self) -> bool {
-        self.lock().write
+        let mailbox = self.lock();
+        mailbox.write && !mailbox.is_write_of_waiting
     }
 
     fn take_write(&self) -> bool {
-        std::mem::take(&mut self.lock().write)
+        let mut mailbox = self.lock();
+        let is_taken = mailbox.write && !mailbox.is_write_of_waiting;
+        mailbox.write &= !is_taken;
+        is_taken
     }
 
     fn take_preview(&self) -> Option<Option<PreviewSize>> {
@@ -247,14 +270,14 @@ impl Worker {
         loop {
             let outcome = match self.remote.next() {
                 Task::Quit => break,
-                Task::Write if !engine.can_write() && self.remote.postpone_write() => continue,
+                Task::Write if self.remote.postpone_write(engine.can_write()) => continue,
                 Task::Write => catch_unwind(AssertUnwindSafe(|| engine.write_now(&sink))),
                 Task::Preview(size, token) => {
                     catch_unwind(AssertUnwindSafe(|| engine.show_now(size, &sink, &token)))
                 }
-                Task::Render(request, token) => {
+                Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
-                    let meanwhile = Meanwhile { token: &token, orders: &self.remote };
+                    let meanwhile = Meanwhile { token: &token, writing: &writing, orders: &self.remote };
                     catch_unwind(AssertUnwindSafe(|| engine.request(&request, &sink, &meanwhile)))
                 }
             };
@@ -276,7 +299,6 @@ fn reason(payload: &(dyn Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::protocol::Writing;
     use crate::pipeline::settings::Overrides;
 
     fn render(generation: u64) -> Command {
@@ -292,7 +314,7 @@ mod tests {
 
     fn token(remote: &Remote) -> CancelToken {
         match remote.next() {
-            Task::Render(_, token) => token,
+            Task::Render(_, token, _) => token,
             _ => panic!("a request waits"),
         }
     }
@@ -325,8 +347,31 @@ mod tests {
         remote.send(Command::Quit);
         assert!(token.is_cancelled());
         assert!(matches!(remote.next(), Task::Write));
-        assert!(!remote.postpone_write(), "there is no request left that it could wait for");
+        assert!(!remote.postpone_write(false), "there is no request left that it could wait for");
         assert!(matches!(remote.next(), Task::Quit));
+    }
+
+    #[test]
+    fn the_writing_at_the_end_outlives_a_hold_the_end_and_a_view_but_no_newer_picture() {
+        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let begin = |number| {
+            remote.send(render(number));
+            match remote.next() {
+                Task::Render(_, token, writing) => (token, writing),
+                _ => panic!("a request waits"),
+            }
+        };
+        let (token, writing) = begin(1);
+        remote.send(Command::Pause(true));
+        assert!(token.is_paused() && !writing.is_paused());
+        remote.send(render(2));
+        assert!(token.is_cancelled() && !writing.is_cancelled(), "the second is for looking at alone");
+        let Command::Render(request) = render(3) else { panic!("a request") };
+        remote.send(Command::Render(Box::new(Request { write: Writing::Try, ..*request })));
+        assert!(writing.is_cancelled());
+        let (token, writing) = begin(4);
+        remote.send(Command::Quit);
+        assert!(token.is_cancelled() && !writing.is_cancelled());
     }
 
     #[test]
@@ -339,11 +384,12 @@ mod tests {
         let overrides = Overrides { view: Some(View::Normal), ..view.overrides.clone() };
         remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
         assert!(matches!(remote.next(), Task::Write));
-        assert!(!remote.postpone_write(), "the first picture is lost, and the person is told");
-        // Asked for when the view waits, it is the view that is meant.
+        assert!(!remote.postpone_write(false), "the first picture is lost, and the person is told");
+        // Asked for when the view waits, it is the view that is meant, also where the first picture has no holes.
         remote.send(Command::Write);
+        assert!(!remote.wants_write() && !remote.take_write(), "the request that is ending leaves it alone");
         assert!(matches!(remote.next(), Task::Write));
-        assert!(remote.postpone_write());
+        assert!(remote.postpone_write(true));
     }
 
     #[test]
@@ -353,11 +399,11 @@ mod tests {
         remote.send(Command::Write);
         remote.send(Command::Preview(None));
         assert!(matches!(remote.next(), Task::Write), "the picture that the person sees");
-        assert!(remote.postpone_write(), "it had holes");
+        assert!(remote.postpone_write(false), "it had holes");
         assert!(matches!(remote.next(), Task::Render(..)));
         assert!(remote.take_write(), "the request does it");
         assert!(!remote.take_write());
         assert!(matches!(remote.next(), Task::Preview(None, _)));
-        assert!(!remote.postpone_write(), "no request waits that could do it");
+        assert!(!remote.postpone_write(false), "no request waits that could do it");
     }
 }

@@ -25,8 +25,10 @@ pub enum Decision {
     Lobe,
     /// Where to in a lobe.
     Direction,
-    /// Whether to go on at all.
+    /// Whether to go on at all from where a path is scattered by a lobe.
     Roulette,
+    /// Whether to go on at all from a mirror or glass: another decision than that of the vertex after it, which has the same path.
+    Spared,
 }
 
 impl Decision {
@@ -44,6 +46,7 @@ impl Decision {
             Self::Pick => u32::MAX - 6,
             Self::Picked => u32::MAX - 7,
             Self::Trace => u32::MAX - 8,
+            Self::Spared => u32::MAX - 9,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }

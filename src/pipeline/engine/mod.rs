@@ -96,6 +96,8 @@ pub(super) trait Orders {
 /// What a request goes by while it is under way.
 pub(super) struct Meanwhile<'a> {
     pub(super) token: &'a CancelToken,
+    /// Of the last stage, which writes.
+    pub(super) writing: &'a CancelToken,
     pub(super) orders: &'a dyn Orders,
 }
 
@@ -193,11 +195,10 @@ impl Engine {
         })?;
         self.plan = Some(ready.plan.clone());
         let rays = table.run(Stage::Render, || self.render(request, &ready, sink, meanwhile))?;
-        let token = meanwhile.token;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
-        let is_written =
-            table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, token))?;
+        let is_written = table
+            .run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing))?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let finished = Finished {
             scene: &ready.parsed.loaded.path,

@@ -62,7 +62,7 @@ impl Desk {
             force: false,
         };
         let token = CancelToken::new();
-        self.engine.request(&request, &sink, &Meanwhile { token: &token, orders: &Silence });
+        self.engine.request(&request, &sink, &Meanwhile { token: &token, writing: &token, orders: &Silence });
         let events: Vec<_> = received.try_iter().collect();
         assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
         let geometry = self.engine.accel.latest().expect("it was built").clone();

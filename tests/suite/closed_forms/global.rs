@@ -82,6 +82,19 @@ fn concentric_spheres_exchange_their_light() {
 }
 
 #[test]
+fn a_glowing_ball_in_a_mirror_sees_itself() {
+    // A ball of E = 1, ρ = .8 inside of a sphere that reflects .6: all that leaves the ball comes back to it, after two
+    // scatterings. L = Σ .48ᵏ, 2k ≤ depth. Roulette is asked after each of both kinds of scatterings.
+    let ball = scene().sphere(DVec3::ZERO, 1.0, phong(0.8, 0.0, 1.0, 1.0));
+    let inside = ball.sphere(DVec3::ZERO, 2.0, mirror(0.6)).seen(v(1.5, 0.2, 0.0), DVec3::ZERO);
+    for (depth, turns) in [(2, 1), (5, 2), (9, 4), (40, 20)] {
+        let exact = (1.0 - 0.48_f64.powi(turns + 1)) / (1.0 - 0.48);
+        let values = by_paths(inside.clone(), depth).values(1024, 32);
+        assert_near(&format!("depth {depth}"), &values, exact, 2e-3);
+    }
+}
+
+#[test]
 fn two_plates_exchange_their_light() {
     // Infinite: L₁ = (E + ρ₁·…): 5/3 and 4/3 for E₁ = 1, ρ = .5 and .8. As quads 1e4 times as wide as their distance.
     let half = 5e3;

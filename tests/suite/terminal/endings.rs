@@ -60,6 +60,39 @@ fn a_picture_that_was_asked_for_is_written_at_the_end_or_the_person_is_told() {
     assert!(!folder.path("scene.png").exists());
 }
 
+/// Whether it is being written already hangs on the machine; it is lost in no case.
+#[test]
+fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
+    let folder = Folder::new();
+    let large = SCENE
+        .replace("samples = 4", "samples = 1")
+        .replace("width = 64", "width = 3000")
+        .replace("height = 48", "height = 2000");
+    folder.write("scene.toml", &large);
+    for key in ["q", "v", " "] {
+        let mut terminal = folder.terminal();
+        terminal.wait("the last stage", |screen| {
+            let text = screen.contents();
+            text.contains("> write")
+                || text.lines().next().is_some_and(|line| line.trim_end().ends_with("done"))
+        });
+        terminal.press(key);
+        if key != "q" {
+            terminal.wait("the picture", |_| folder.path("scene.png").is_file());
+            terminal.press("q");
+        }
+        assert_eq!(terminal.end(), 0, "{key:?}");
+        std::fs::remove_file(folder.path("scene.png")).expect(key);
+    }
+    // Asked for, and left at once.
+    folder.write("scene.toml", &large.replace("samples = 1", "samples = 100000"));
+    let mut terminal = folder.terminal();
+    terminal.wait_for("ETA");
+    terminal.press("w");
+    terminal.press("q");
+    assert_eq!(terminal.end_saying("wrote scene.png|nothing is written|there is no picture yet"), 0);
+}
+
 #[test]
 fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
     let folder = Folder::new();
