@@ -184,6 +184,7 @@ impl Loops for Meeting<'_> {
                 }
             }
         }
+        row.seen = seen;
         let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface) };
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {

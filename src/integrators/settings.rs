@@ -1,8 +1,8 @@
 //! How a world is rendered.
 
-use super::{Shown, View};
-use crate::math::DVec2;
-use crate::scene::description::Render;
+use super::{Measure, PhotonSettings, Shown, View};
+use crate::math::{DVec2, Vec3};
+use crate::scene::description::{Integrator, Render};
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
 
 /// How a world is rendered.
@@ -14,9 +14,33 @@ pub struct RenderSettings {
     pub dof: bool,
     /// What is shown.
     pub view: View,
+    /// Photon maps, where whitted gathers any.
+    pub photons: Option<PhotonSettings>,
 }
 
 impl RenderSettings {
+    /// With the defaults in place of what is ignored.
+    pub fn heeded(&self) -> Self {
+        let mut render = self.render.heeded();
+        let photons = match render.integrator {
+            Integrator::Whitted => self.photons,
+            Integrator::Path => None,
+        };
+        if photons.is_some() {
+            render.ambient = Vec3::ZERO;
+        }
+        Self { render, photons, ..*self }
+    }
+
+    /// Whether pictures by these settings show anything of photons.
+    pub fn gathers(&self) -> bool {
+        let shows = match self.view.shown() {
+            Shown::Light(Measure::ArrivingShare) | Shown::FirstHit(_) => false,
+            Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Film(_) | Shown::Bounds => true,
+        };
+        shows && self.heeded().photons.is_some()
+    }
+
     /// A place in the picture, in pixels from its top left corner, as the camera takes it: from its middle to the right
     /// and up, in halves of its height.
     #[inline(always)]
@@ -29,11 +53,15 @@ impl RenderSettings {
 
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { render, dof, view } = *self;
+        let Self { render, dof, view, photons } = self.heeded();
         key.add(&render, of).flag(dof).choice(view.sampled());
         // Lines over a picture are as bright as the exposure leaves them to be.
         if view.shown() == Shown::Bounds {
             key.f32(render.exposure);
+        }
+        key.flag(photons.is_some());
+        if let Some(PhotonSettings { count, radius, bounces }) = photons {
+            key.u64(count.into()).f32(radius).u64(bounces.into());
         }
     }
 }

@@ -8,10 +8,10 @@ use super::targets::NamedBy;
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
-use crate::integrators::{FirstHit, Measure, RenderSettings, Shown};
+use crate::integrators::{FirstHit, Measure, PhotonSettings, RenderSettings, Shown};
 use crate::math::Vec3;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Integrator, MaterialKind, Render, Scene, Tonemap};
+use crate::scene::description::{Accel, Integrator, MaterialKind, Photons, Render, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -49,6 +49,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         render,
         dof: overrides.dof != Some(false) && aperture > 0.0,
         view: overrides.view.unwrap_or(View::Beauty),
+        photons: overrides.photons.unwrap_or(scene.photons.enabled).then(|| photons(&scene.photons)),
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
@@ -68,6 +69,15 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         report: overrides.report.clone(),
         scene: with_accel(scene, render.accel),
     })
+}
+
+/// Photons that a pass may send: what it stores must have room.
+const MOST_PHOTONS: u64 = 4_000_000;
+
+/// How photons are sent and gathered.
+fn photons(asked: &Photons) -> PhotonSettings {
+    let Photons { enabled: _, count, radius, bounces } = *asked;
+    PhotonSettings { count: count.clamp(1, MOST_PHOTONS) as u32, radius: radius as f32, bounces }
 }
 
 /// What a person should know of the integrator that was asked for.

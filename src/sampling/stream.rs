@@ -27,6 +27,14 @@ pub enum Decision {
     Direction,
     /// Whether to go on at all.
     Roulette,
+    /// Which light a photon starts at, and which piece of it.
+    Lamp,
+    /// Whether a photon is aimed, and at what.
+    Aim,
+    /// Where on its light a photon starts.
+    Start,
+    /// Where to a photon is sent.
+    Sent,
 }
 
 impl Decision {
@@ -44,6 +52,10 @@ impl Decision {
             Self::Pick => u32::MAX - 6,
             Self::Picked => u32::MAX - 7,
             Self::Trace => u32::MAX - 8,
+            Self::Lamp => u32::MAX - 9,
+            Self::Aim => u32::MAX - 10,
+            Self::Start => u32::MAX - 11,
+            Self::Sent => u32::MAX - 12,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }

@@ -42,8 +42,6 @@ fn settings_change_and_go_back() {
     assert_eq!(folder.bytes("scene.png"), own);
     terminal.press("0");
     terminal.wait_for("the keys have changed nothing");
-    terminal.press("p");
-    terminal.wait_for("photons come with a later version");
     terminal.press("r");
     terminal.wait_for_render(renders + 3);
     assert_eq!(folder.bytes("scene.png"), own);
