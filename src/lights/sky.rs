@@ -4,10 +4,10 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use crate::materials::texels::Texels;
-use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::elementary::{atan2, sin_cos};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
 
 /// A map, top row at +y, the middle of it towards −z, its right quarter towards +x, with the distribution that its directions
@@ -71,6 +71,23 @@ impl SkyMap {
     /// The mean of the luminance over all directions.
     pub fn mean_luminance(&self) -> f64 {
         self.mean_luminance
+    }
+
+    /// The mean of the colours over all directions.
+    pub fn mean(&self) -> Vec3 {
+        let sum_of_row = |row: usize| -> DVec3 {
+            (0..self.texels.width).map(|x| self.texels.get(x, row as u32).as_dvec3()).sum()
+        };
+        let rows = self.texels.height as usize;
+        let mut upper = sum_of_row(0);
+        let mut sum = DVec3::ZERO;
+        for row in 0..=rows {
+            let lower = if row < rows { sum_of_row(row) } else { upper };
+            sum += (upper + lower) * (self.heights[row] - self.heights[row + 1]);
+            upper = lower;
+        }
+        // Of both rows of texels around each of cells, and of heights from 1 to −1.
+        (sum / (4.0 * f64::from(self.texels.width))).as_vec3()
     }
 
     /// The colour in a unit direction, and the density in sr⁻¹ with which samples have it. `turn` are the turns of the map
