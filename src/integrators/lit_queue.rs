@@ -13,7 +13,7 @@ use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
 use super::vertices::LitVertex;
-use super::view::Measure;
+use super::view::{Measure, Ways};
 use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::lights::{Source, SourceRow};
@@ -156,7 +156,7 @@ impl LitQueue {
             let asked = Asked { shot, row, measure, media };
             let mut arrived = match shot.photons {
                 Some(maps) => asked.lit_and_gathered(maps, (depth, onward)),
-                None => asked.lit(row.used, onward.is_some()),
+                None => asked.lit(row.used & shown(row, measure), onward.is_some()),
             };
             rays += arrived.rays;
             arrived.light = match measure {
@@ -184,6 +184,13 @@ impl LitQueue {
         self.clear();
         Ok(rays)
     }
+}
+
+/// A bit for each vertex of which light that comes straight to it is shown.
+fn shown(row: &LitRow, measure: Measure) -> u32 {
+    let Ways { direct, indirect, .. } = measure.ways();
+    let hidden = |bits: u32, is_shown: bool| if is_shown { 0 } else { bits };
+    !(hidden(row.seen, direct) | hidden(!row.seen, indirect))
 }
 
 /// The vertices of a row and what is asked of them.
@@ -222,7 +229,8 @@ impl Asked<'_> {
     /// The same and what photons bring. Paths go on from vertices that the eye sees alone: one step, to where light is looked up.
     fn lit_and_gathered(self, maps: &PhotonMaps, (depth, onward): (u32, Option<Onward>)) -> Arrived {
         let Self { shot, row, measure, .. } = self;
-        let (first, second) = (row.used & row.seen, row.used & !row.seen);
+        let shown = row.used & shown(row, measure);
+        let (first, second) = (shown & row.seen, shown & !row.seen);
         let is_shared = onward.is_some() && shot.settings.render.shadows == Shadows::Soft;
         let mut arrived = self.lit(first, is_shared);
         if second != 0 {

@@ -36,6 +36,8 @@ pub struct LitRow {
     pub(super) apart: u32,
     /// A bit for each vertex that the eye sees, be it by mirrors and glass.
     pub(super) seen: u32,
+    /// A bit for each whose path comes from a surface with a glossy lobe.
+    pub(super) from_gloss: u32,
     /// Normals that the cosines are of.
     pub normal: Lanes3,
     /// Those before a normal map bent them, and the cosine between; [`UNBENT`] where none did.
@@ -116,6 +118,7 @@ impl LitRow {
         facet: [[0.0; LANES]; 3],
         apart: 0,
         seen: 0,
+        from_gloss: 0,
         normal: [[0.0; LANES]; 3],
         smooth_normal: [[0.0; LANES]; 3],
         bend: [UNBENT; LANES],
@@ -138,7 +141,7 @@ impl LitRow {
     #[inline(always)]
     pub fn reset(&mut self) {
         (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
-        (self.apart, self.seen) = (0, 0);
+        (self.apart, self.seen, self.from_gloss) = (0, 0, 0);
         (self.is_glossy, self.is_bent) = (false, false);
         self.bend = [UNBENT; LANES];
     }
@@ -173,6 +176,7 @@ impl LitRow {
         self.may_lift |= (other.may_lift >> from & 1) << i;
         self.apart |= (other.apart >> from & 1) << i;
         self.seen |= (other.seen >> from & 1) << i;
+        self.from_gloss |= (other.from_gloss >> from & 1) << i;
         self.used |= 1 << i;
     }
 
@@ -198,6 +202,7 @@ impl LitRow {
         set_lane(&mut self.facet, i, vertex.normal);
         self.apart |= 1 << i;
         self.seen |= u32::from(path.history.is_seen) << i;
+        self.from_gloss |= u32::from(path.history.is_from_gloss) << i;
         set_lane(&mut self.normal, i, shading.normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);

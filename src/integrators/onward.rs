@@ -105,6 +105,8 @@ impl Scattering<'_> {
                     normal: lane(&row.normal, i),
                     carried: ways.carried[i],
                     is_seen: false,
+                    is_step: row.seen & 1 << i != 0,
+                    is_from_gloss: row.albedos[1][i] > 0.0,
                 },
                 cone: cones.get(row.place[i] as usize).map_or(Cone::default(), of_lobe(ways.densities[i])),
             };

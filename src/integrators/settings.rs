@@ -1,6 +1,6 @@
 //! How a world is rendered.
 
-use super::{Measure, PhotonSettings, Shown, View};
+use super::{FirstHit, Measure, PhotonSettings, Shown, View};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::{Integrator, Render};
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
@@ -35,7 +35,8 @@ impl RenderSettings {
     /// Whether pictures by these settings show anything of photons.
     pub fn gathers(&self) -> bool {
         let shows = match self.view.shown() {
-            Shown::Light(Measure::ArrivingShare) | Shown::FirstHit(_) => false,
+            Shown::FirstHit(number) => number == FirstHit::Photons,
+            Shown::Light(Measure::ArrivingShare) => false,
             Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Film(_) | Shown::Bounds => true,
         };
         shows && self.heeded().photons.is_some()

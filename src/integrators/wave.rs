@@ -205,7 +205,7 @@ impl Wave<'_, '_> {
         if path.history.is_seen {
             self.sink.add(path.slot, Part::Emitted, path.throughput * radiance);
         } else {
-            self.sink.add_met(path.slot, path.throughput * radiance * weight);
+            self.sink.add_met(path, path.throughput * radiance * weight);
         }
     }
 
@@ -226,7 +226,7 @@ impl Wave<'_, '_> {
             let background = self.shot.settings.render.background;
             self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
         } else if beyond != Vec3::ZERO && !self.is_gathered(path) {
-            self.sink.add_met(path.slot, path.throughput * beyond);
+            self.sink.add_met(path, path.throughput * beyond);
         }
     }
 

@@ -169,7 +169,9 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
         Shown::FirstHit(FirstHit::Depth) => {
             ToneMapping { stretch: Stretch::Unknown(Kind::Distances), ..ToneMapping::DATA }
         }
-        Shown::Light(Measure::Work) | Shown::Film(Quantity::Samples | Quantity::Error) => {
+        Shown::Light(Measure::Work)
+        | Shown::FirstHit(FirstHit::Photons)
+        | Shown::Film(Quantity::Samples | Quantity::Error) => {
             ToneMapping { stretch: Stretch::Unknown(Kind::Amounts), ..ToneMapping::DATA }
         }
         Shown::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {

@@ -16,8 +16,19 @@ pub struct Photon {
     pub normal: Vec3,
     /// Scatterings on its way.
     pub depth: u32,
-    /// Whether all of them were at mirrors and glass.
-    pub is_caustic: bool,
+    /// How it came.
+    pub way: Way,
+}
+
+/// How a photon came, by the mirrors and glass S and other surfaces D on its way from the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// `L S+`.
+    Caustic,
+    /// `L S+ D S*`: thrown back from a caustic.
+    Bounced,
+    /// Any other.
+    Other,
 }
 
 /// Photons that are looked up together.
@@ -119,6 +130,7 @@ impl PhotonMap {
         let radius_squared = self.radius * self.radius;
         let reach = REACH * self.radius;
         let scale = 2.0 / (std::f32::consts::PI * radius_squared);
+        debug_assert!(self.x.len() == self.photons.len() + LANES);
         let corner = point - Vec3::splat(self.radius);
         let first = cell_of(corner, self.cells);
         // Cells are as long as the kernel is wide: it reaches over two of them.
@@ -130,8 +142,11 @@ impl PhotonMap {
                 for start in range.clone().step_by(LANES) {
                     let mut near = [0_u32; LANES];
                     let mut squares = [0.0; LANES];
-                    let (xs, ys, zs) =
-                        (&self.x[start..start + LANES], &self.y[start..start + LANES], &self.z[start..start + LANES]);
+                    let (Some(xs), Some(ys), Some(zs)) =
+                        (row(&self.x, start), row(&self.y, start), row(&self.z, start))
+                    else {
+                        continue;
+                    };
                     for i in 0..LANES {
                         let (dx, dy, dz) = (xs[i] - point.x, ys[i] - point.y, zs[i] - point.z);
                         let above = dx * normal.x + dy * normal.y + dz * normal.z;
@@ -159,6 +174,12 @@ impl PhotonMap {
             }
         }
     }
+}
+
+/// Numbers from a place on; there are some more behind the last.
+#[inline(always)]
+fn row(of: &[f32], start: usize) -> Option<&[f32; LANES]> {
+    of.get(start..)?.first_chunk()
 }
 
 /// The cell of a point.

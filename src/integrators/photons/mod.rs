@@ -10,14 +10,15 @@
 //! | `L S* E` | the path from the eye meets the light |
 //! | `L D S* E` | light samples at the first D, and the step from there that meets the light at once, weighed against each other |
 //! | `L S+ D S* E` | caustic photons at the first D |
+//! | `L S+ D S* D S* E`, the last D without a glossy lobe | photons thrown back from a caustic, there |
 //! | `L D S* D S* E` | one step from the first D, by its lobes, to the next: light samples there |
-//! | `L S+ D S* D S* E`, `L (S\|D)* D (S\|D)* D S* D S* E` | the same step: all photons there |
+//! | `L S+ D S* D S* E`, the last D with a glossy lobe | the same step: caustic photons there |
+//! | `L (S\|D)* D (S\|D)* D S* D S* E` | the same step: all other photons there |
 //!
 //! So what the step meets of lights behind mirrors and glass counts nothing, and photons that come straight from a light are not
 //! kept. Scatterings of the eye's path, the vertex at which photons are gathered among them, and those of the photon are at most
 //! `max_depth` together.
 
-mod emission;
 pub(super) mod gather;
 mod map;
 mod shoot;
@@ -33,12 +34,12 @@ use super::shot::{SampleBlock, Shot};
 use crate::control::{CancelToken, Cancelled};
 use crate::film::Rect;
 use crate::geometry::{Aabb, Shape, ShapeHit};
+use crate::lights::{Ball, Emission, Outline};
 use crate::materials::Bsdf;
 use crate::math::DVec3;
 use crate::scene::description::{Render, Shadows};
 use crate::world::{Hit, Object, World};
-use emission::{Ball, Emission, Outline};
-pub use map::{Photon, PhotonMap};
+pub use map::{Photon, PhotonMap, Way};
 use shoot::{Shooting, Shots};
 
 /// How photons are sent and gathered.
@@ -58,8 +59,8 @@ const CHUNK: u32 = 2048;
 /// α: how many of the photons of a pass the shrinking kernel keeps.
 const KEPT: f64 = 2.0 / 3.0;
 
-/// Photons that the first kernels are to hold, in the middle of the caustic ones and of all.
-const WANTED: [f32; 2] = [24.0, 16.0];
+/// Photons that the first kernels are to hold, in the middle of the caustic ones, of those thrown back from caustics, and of all.
+const WANTED: [f32; 3] = [24.0, 48.0, 16.0];
 
 /// The part of the photons that are aimed at mirrors and glass, where there are any.
 const AIMED: f32 = 0.5;
@@ -70,8 +71,8 @@ pub struct Photons {
     settings: PhotonSettings,
     emission: Option<Emission>,
     glasses: Vec<Inside>,
-    /// Of the first pass: of the kernel for caustics, and of that for all photons.
-    radii: [f32; 2],
+    /// Of the first pass: of the kernel for caustics, of that for what is thrown back from them, and of that for all photons.
+    radii: [f32; 3],
 }
 
 /// The photons of a pass.
@@ -79,6 +80,8 @@ pub struct Photons {
 pub struct PhotonPass {
     /// Those that came by mirrors and glass alone.
     pub caustic: PhotonMap,
+    /// Those that were thrown back from such places and came to others.
+    pub bounced: PhotonMap,
     /// All.
     pub all: PhotonMap,
     /// How many were sent out.
@@ -95,7 +98,7 @@ impl PhotonPass {
 
     /// Bytes that it takes.
     pub fn memory_bytes(&self) -> usize {
-        self.caustic.memory_bytes() + self.all.memory_bytes()
+        self.caustic.memory_bytes() + self.bounced.memory_bytes() + self.all.memory_bytes()
     }
 }
 
@@ -116,7 +119,7 @@ impl PhotonMaps {
 }
 
 impl Photons {
-    /// For a world; the radii of the first pass are those for the photons of pass 0, which are sent for it.
+    /// For a world, and pass 0, by whose photons the radii are chosen.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -125,7 +128,7 @@ impl Photons {
         settings: &RenderSettings,
         photons: PhotonSettings,
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<(Self, PhotonPass), Cancelled> {
         let outline = |object: u32| {
             Some(match world.geometry.objects().get(object as usize)? {
                 Object::Shape(shape) => Outline::Shape(*shape),
@@ -135,17 +138,21 @@ impl Photons {
         let emission = Emission::new(&world.lights, outline, around(world));
         let emission = emission.map(|emission| emission.aimed_at(&targets(world), AIMED));
         let glasses = world.closed_glasses().map(|(object, material)| Inside { object, material }).collect();
-        let mut own = Self { settings: photons, emission, glasses, radii: [photons.radius; 2] };
+        let mut own = Self { settings: photons, emission, glasses, radii: [photons.radius; 3] };
+        let sent = own.shoot(world, settings, 0, token)?;
         if photons.radius == 0.0 {
-            let (all, _) = own.shoot(world, settings, 0, token)?;
-            let caustic: Vec<Photon> = all.iter().filter(|photon| photon.is_caustic).copied().collect();
-            own.radii = [radius_to_hold(&caustic, WANTED[0]), radius_to_hold(&all, WANTED[1])];
+            let kinds = [&sent.caustic, &sent.bounced, &sent.all];
+            let radii = kinds.into_par_iter().zip(WANTED).map(|(of, wanted)| radius_to_hold(of, wanted));
+            own.radii.iter_mut().zip(radii.collect::<Vec<_>>()).for_each(|(own, radius)| *own = radius);
         }
-        Ok(own)
+        token.check()?;
+        let first = own.mapped(&sent, 0);
+        Ok((own, first))
     }
 
-    /// Radii of the first pass's kernels: of that for caustics, and of that for all photons.
-    pub fn radii(&self) -> [f32; 2] {
+    /// Radii of the first pass's kernels: of that for caustics, of that for what is thrown back from them, and of that for
+    /// all photons.
+    pub fn radii(&self) -> [f32; 3] {
         self.radii
     }
 
@@ -160,16 +167,18 @@ impl Photons {
         number: u32,
         token: &CancelToken,
     ) -> Result<PhotonPass, Cancelled> {
-        let (all, lookups) = self.shoot(world, settings, number, token)?;
-        let caustic: Vec<Photon> = all.iter().filter(|photon| photon.is_caustic).copied().collect();
+        let sent = self.shoot(world, settings, number, token)?;
+        token.check()?;
+        Ok(self.mapped(&sent, number))
+    }
+
+    /// The maps of a pass.
+    fn mapped(&self, sent: &Sent, number: u32) -> PhotonPass {
         let shrunk = shrunk(number);
-        let [of_caustic, of_all] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
-        Ok(PhotonPass {
-            caustic: PhotonMap::new(&caustic, of_caustic),
-            all: PhotonMap::new(&all, of_all),
-            emitted: self.settings.count.into(),
-            lookups,
-        })
+        let [of_caustic, of_bounced, of_all] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
+        let few = || (PhotonMap::new(&sent.caustic, of_caustic), PhotonMap::new(&sent.bounced, of_bounced));
+        let ((caustic, bounced), all) = rayon::join(few, || PhotonMap::new(&sent.all, of_all));
+        PhotonPass { caustic, bounced, all, emitted: self.settings.count.into(), lookups: sent.lookups }
     }
 
     /// The passes of some samples.
@@ -195,11 +204,11 @@ impl Photons {
         settings: &RenderSettings,
         number: u32,
         token: &CancelToken,
-    ) -> Result<(Vec<Photon>, u64), Cancelled> {
-        let Some(emission) = &self.emission else { return Ok((Vec::new(), 0)) };
+    ) -> Result<Sent, Cancelled> {
+        let Some(emission) = &self.emission else { return Ok(Sent::default()) };
         let most_depth = self.settings.bounces.min(settings.render.max_depth.saturating_sub(1));
         if most_depth == 0 {
-            return Ok((Vec::new(), 0));
+            return Ok(Sent::default());
         }
         // Photons come to the facets, from where they go on in every picture alike.
         let settings = RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
@@ -220,8 +229,21 @@ impl Photons {
             .map(|number| chunk(number * CHUNK))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        Ok((chunks.into_iter().flat_map(|chunk| chunk.photons).collect(), lookups))
+        let all: Vec<Photon> = chunks.into_iter().flat_map(|chunk| chunk.photons).collect();
+        let of = |way: Way| all.iter().filter(|photon| photon.way == way).copied().collect();
+        Ok(Sent { caustic: of(Way::Caustic), bounced: of(Way::Bounced), all, lookups })
     }
+}
+
+/// What was stored of a pass.
+#[derive(Default)]
+struct Sent {
+    all: Vec<Photon>,
+    /// Those that came by mirrors and glass alone.
+    caustic: Vec<Photon>,
+    /// Those that were thrown back from such places.
+    bounced: Vec<Photon>,
+    lookups: u64,
 }
 
 /// By how much smaller the radius of a pass is than that of the first: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).

@@ -17,11 +17,11 @@ use super::super::specular::{Interface, interface, reflected};
 use super::super::vertices::{LitVertex, Vertex};
 use super::super::view::Measure;
 use super::super::{PACKET, RayCounters};
-use super::emission::{Emitted, Emission, Numbers, Start};
-use super::map::Photon;
+use super::map::{Photon, Way};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
+use crate::lights::{Emission, Emitted, Numbers, Start};
 use crate::materials::Bsdf;
 use crate::math::Vec3;
 use crate::math::lanes::set_lane;
@@ -145,7 +145,7 @@ impl Flight<'_> {
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
                     medium: shooting.medium_at(ray.origin),
-                    history: History { density: 0.0, normal: Vec3::ZERO, carried: 1.0, is_seen: true },
+                    history: History::CAMERA,
                     cone: Cone::default(),
                 });
             }
@@ -161,7 +161,10 @@ impl Flight<'_> {
     fn meet(&mut self, rays: &[PathRay], row: &mut LitRow) {
         let shot = self.shooting.shot;
         let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, row);
-        if self.depth > 0 {
+        if self.depth == 0 {
+            // What comes straight throws no caustic.
+            row.seen = 0;
+        } else {
             for i in lanes(row.used) {
                 let (point, normal) = row.place_of(i);
                 self.store(&rays[i], point, normal);
@@ -186,7 +189,11 @@ impl Flight<'_> {
             flux: path.throughput,
             normal,
             depth: self.depth,
-            is_caustic: path.history.is_seen,
+            way: match path.history {
+                History { is_seen: true, .. } => Way::Caustic,
+                History { is_step: true, .. } => Way::Bounced,
+                History { .. } => Way::Other,
+            },
         });
     }
 
@@ -237,8 +244,10 @@ impl Flight<'_> {
                 if self.open.used == ALL {
                     self.scatter_open();
                 }
-                // Light samples find what comes straight.
-                if !is_direct {
+                // Light samples find what comes straight, and it throws no caustic.
+                if is_direct {
+                    path.history.is_seen = false;
+                } else {
                     self.store(&path, vertex.surface.point, vertex.normal);
                 }
                 let i = self.open.used.trailing_ones() as usize;

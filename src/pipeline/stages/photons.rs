@@ -109,7 +109,7 @@ impl PhotonStore {
     /// What was sent since the stage began, and what is kept.
     pub(in crate::pipeline) fn report(&self) -> PhotonsReport {
         let Sent { passes, emitted, stored, seconds, most_alive_bytes } = self.sent.get();
-        let [caustic, all] = self.photons.radii();
+        let [caustic, _, all] = self.photons.radii();
         PhotonsReport {
             passes,
             emitted,
@@ -152,9 +152,12 @@ pub(in crate::pipeline) fn photons(
         return Ok(Staged::reused((), "nothing that they meet changed"));
     }
     let Sending { world, pool, token, .. } = sending;
-    let photons = pool.install(|| Photons::new(world, &settings, of_photons, token))?;
-    let store = PhotonStore { photons, kept: RefCell::default(), sent: Cell::default() };
-    store.pass(0, sending)?;
+    let begin = Instant::now();
+    let (photons, first) = pool.install(|| Photons::new(world, &settings, of_photons, token))?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let sent = Sent { passes: 1, emitted: first.emitted, stored: first.stored(), seconds, most_alive_bytes: 0 };
+    let kept = RefCell::new(vec![Arc::new(first)]);
+    let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
     Ok(Staged::done((), ""))
 }

@@ -267,7 +267,8 @@ impl Build {
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
     let token = CancelToken::new();
     let maps = settings.heeded().photons.filter(|_| settings.gathers()).map(|of_photons| {
-        let photons = integrators::Photons::new(world, settings, of_photons, &token).expect("nobody cancels");
+        let photons = integrators::Photons::new(world, settings, of_photons, &token);
+        let (photons, _) = photons.expect("nobody cancels");
         photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")
     });
     let (tile, _) = render_tile_by(maps.as_ref(), world, settings, rect, 0..samples, &token).expect("nobody cancels");
