@@ -25,13 +25,14 @@ mod shoot;
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
 use super::medium::Inside;
 use super::settings::RenderSettings;
 use super::shot::{SampleBlock, Shot};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Cancelled, Progress, unwatched};
 use crate::film::Rect;
 use crate::geometry::{Aabb, Shape, ShapeHit};
 use crate::lights::{Ball, Emission, Outline};
@@ -119,7 +120,8 @@ impl PhotonMaps {
 }
 
 impl Photons {
-    /// For a world, and pass 0, by whose photons the radii are chosen.
+    /// For a world, and pass 0, by whose photons the radii are chosen; `progress` is told how many of them were sent, and of how
+    /// many.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -127,6 +129,7 @@ impl Photons {
         world: &World,
         settings: &RenderSettings,
         photons: PhotonSettings,
+        progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Cancelled> {
         let outline = |object: u32| {
@@ -139,7 +142,7 @@ impl Photons {
         let emission = emission.map(|emission| emission.aimed_at(&targets(world), AIMED));
         let glasses = world.closed_glasses().map(|(object, material)| Inside { object, material }).collect();
         let mut own = Self { settings: photons, emission, glasses, radii: [photons.radius; 3] };
-        let sent = own.shoot(world, settings, 0, token)?;
+        let sent = own.shoot((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced, &sent.all];
             let radii = kinds.into_par_iter().zip(WANTED).map(|(of, wanted)| radius_to_hold(of, wanted));
@@ -167,7 +170,7 @@ impl Photons {
         number: u32,
         token: &CancelToken,
     ) -> Result<PhotonPass, Cancelled> {
-        let sent = self.shoot(world, settings, number, token)?;
+        let sent = self.shoot((world, settings), number, &unwatched, token)?;
         token.check()?;
         Ok(self.mapped(&sent, number))
     }
@@ -200,9 +203,9 @@ impl Photons {
     /// The photons of a pass in the order of their numbers.
     fn shoot(
         &self,
-        world: &World,
-        settings: &RenderSettings,
+        (world, settings): (&World, &RenderSettings),
         number: u32,
+        progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<Sent, Cancelled> {
         let Some(emission) = &self.emission else { return Ok(Sent::default()) };
@@ -212,6 +215,7 @@ impl Photons {
         }
         // Photons come to the facets, from where they go on in every picture alike.
         let settings = RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
+        let done = AtomicU64::new(0);
         let chunk = |first: u32| {
             // All photons of a number of passes are samples of one sequence.
             let count = self.settings.count;
@@ -222,7 +226,10 @@ impl Photons {
             let block = SampleBlock { tile, samples };
             let shot = Shot { pixel_spread: 0.0, ..Shot::new(world, &settings, &block, token) };
             let (glasses, share) = (&*self.glasses, 1.0 / count as f32);
-            Shooting { shot: &shot, emission, glasses, share, most_depth }.shoot()
+            let shots = Shooting { shot: &shot, emission, glasses, share, most_depth }.shoot()?;
+            let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
+            progress(done, count.into());
+            Ok(shots)
         };
         let chunks: Vec<Shots> = (0..self.settings.count.div_ceil(CHUNK))
             .into_par_iter()

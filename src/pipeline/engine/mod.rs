@@ -197,7 +197,7 @@ impl Engine {
         let ready = self.prepare(request, &mut table, reading, findings)?;
         let pool = self.pool(ready.plan.threads)?;
         let (plan, world) = (&ready.plan, &ready.world.1);
-        let sending = Sending { world, plan, pool: &pool, token: meanwhile.token };
+        let sending = Sending { world, plan, pool: &pool, token: meanwhile.token, sink };
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
         let key = |of_photons| {
             keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons)

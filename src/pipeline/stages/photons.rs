@@ -12,8 +12,9 @@ use rayon::ThreadPool;
 use super::super::cache::Memo;
 use super::super::plan::Plan;
 use super::super::protocol::PhotonsReport;
+use super::super::sink::Sink;
 use super::Staged;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Cancelled, Progress};
 use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons};
 use crate::scene::fingerprint::Key;
 use crate::world::World;
@@ -35,6 +36,7 @@ pub(in crate::pipeline) struct Sending<'a> {
     pub(in crate::pipeline) plan: &'a Plan,
     pub(in crate::pipeline) pool: &'a ThreadPool,
     pub(in crate::pipeline) token: &'a CancelToken,
+    pub(in crate::pipeline) sink: &'a Sink,
 }
 
 /// The photons of a scene.
@@ -81,7 +83,7 @@ impl PhotonStore {
         if let Some(pass) = self.kept.borrow().get(number as usize) {
             return Ok(Arc::clone(pass));
         }
-        let Sending { world, plan, pool, token } = sending;
+        let Sending { world, plan, pool, token, .. } = sending;
         let begin = Instant::now();
         let photons = &self.photons;
         let pass = pool.install(|| photons.pass(world, &plan.settings, number, token))?;
@@ -153,7 +155,10 @@ pub(in crate::pipeline) fn photons(
     }
     let Sending { world, pool, token, .. } = sending;
     let begin = Instant::now();
-    let (photons, first) = pool.install(|| Photons::new(world, &settings, of_photons, token))?;
+    let send = |progress: Progress<'_>| {
+        pool.install(|| Photons::new(world, &settings, of_photons, progress, token))
+    };
+    let (photons, first) = sending.sink.asset("photons", send)?;
     let seconds = begin.elapsed().as_secs_f64();
     let sent = Sent { passes: 1, emitted: first.emitted, stored: first.stored(), seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);

@@ -152,7 +152,8 @@ impl<'a> Painter<'a> {
         while !self.canvas.is_complete(target) && !self.is_over_time {
             let samples = self.canvas.samples();
             let part = target.min(samples.saturating_add(photons.at_once()));
-            let sending = Sending { world, plan: self.rendering.plan, pool, token };
+            let Rendering { plan, sink, .. } = *self.rendering;
+            let sending = Sending { world, plan, pool, token, sink };
             let maps = photons.maps(samples..part, sending)?;
             self.pass_by(part, Some(&maps))?;
         }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use glimt::control::CancelToken;
+use glimt::control::{CancelToken, unwatched};
 use glimt::integrators::{PhotonSettings, Photons};
 use glimt::math::DVec3;
 use glimt::scene::description::Falloff;
@@ -35,7 +35,7 @@ fn what_is_stored_in_a_closed_room_is_the_power_and_how_often_photons_arrive_is_
         let (world, token) = (build.world(), CancelToken::new());
         let of_photons = PhotonSettings { count, radius: 0.1, bounces: 10_000 };
         let settings = build.photons(count.into(), 0.1).settings(3);
-        let (_, pass) = Photons::new(&world, &settings, of_photons, &token).expect("nobody cancels");
+        let (_, pass) = Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
         let stored = pass.all.photons();
         let flux: f64 = stored.iter().map(|photon| f64::from(photon.flux.x)).sum();
         let (power, often) = (4.0 * PI, reflectance / (1.0 - reflectance));

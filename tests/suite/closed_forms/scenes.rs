@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glimt::assets::image::mipmaps;
 use glimt::assets::{FileMaterial, LoadedMesh};
-use glimt::control::CancelToken;
+use glimt::control::{CancelToken, unwatched};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{self, PhotonSettings, RenderSettings, View, render_tile_by};
@@ -267,7 +267,7 @@ impl Build {
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
     let token = CancelToken::new();
     let maps = settings.heeded().photons.filter(|_| settings.gathers()).map(|of_photons| {
-        let photons = integrators::Photons::new(world, settings, of_photons, &token);
+        let photons = integrators::Photons::new(world, settings, of_photons, &unwatched, &token);
         let (photons, _) = photons.expect("nobody cancels");
         photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")
     });

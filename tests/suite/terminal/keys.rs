@@ -74,6 +74,9 @@ fn views_are_shown_as_they_are_and_written_when_asked() {
         "diffuse",
         "specular",
         "emission",
+        "indirect",
+        "caustic",
+        "photons",
         "shadow",
         "bounds",
         "cost",
@@ -87,7 +90,7 @@ fn views_are_shown_as_they_are_and_written_when_asked() {
     }
     terminal.press("V");
     terminal.wait_for("· view samples ");
-    terminal.wait_for_render(16);
+    terminal.wait_for_render(19);
     terminal.press("vv");
     terminal.wait_for("· view beauty ");
     terminal.wait_for("done");
