@@ -24,7 +24,7 @@ pub mod tree;
 pub mod triangle;
 
 pub use directional::DirectionalLight;
-pub use emission::{Ball, Emission, Emitted, Numbers, Outline, Start};
+pub use emission::{Ball, Emitted, Numbers, Outline, PhotonSource, Start};
 pub use emitter::{AreaLight, Part, area_light};
 pub use environment::Environment;
 pub use pattern::{Chart, Patch, Pattern};

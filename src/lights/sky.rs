@@ -73,21 +73,22 @@ impl SkyMap {
         self.mean_luminance
     }
 
-    /// The mean of the colours over all directions.
+    /// The mean of the colours over all directions: between the middles of rows they are linear in the angle from the top.
     pub fn mean(&self) -> Vec3 {
-        let sum_of_row = |row: usize| -> DVec3 {
-            (0..self.texels.width).map(|x| self.texels.get(x, row as u32).as_dvec3()).sum()
+        let rows = self.texels.height;
+        let step = std::f64::consts::PI / f64::from(rows);
+        let (sin, cos) = (|row: f64| libm::sin((row + 0.5) * step), |row: f64| libm::cos((row + 0.5) * step));
+        let of_row = |row: u32| {
+            let sum: DVec3 = (0..self.texels.width).map(|x| self.texels.get(x, row).as_dvec3()).sum();
+            let at = f64::from(row);
+            // ∫ sin θ dθ of what it is above it, and below it.
+            let above = if row == 0 { 1.0 - cos(at) } else { (sin(at) - sin(at - 1.0)) / step - cos(at) };
+            let is_last = row + 1 == rows;
+            let below = if is_last { 1.0 + cos(at) } else { cos(at) - (sin(at + 1.0) - sin(at)) / step };
+            sum * (above + below)
         };
-        let rows = self.texels.height as usize;
-        let mut upper = sum_of_row(0);
-        let mut sum = DVec3::ZERO;
-        for row in 0..=rows {
-            let lower = if row < rows { sum_of_row(row) } else { upper };
-            sum += (upper + lower) * (self.heights[row] - self.heights[row + 1]);
-            upper = lower;
-        }
-        // Of both rows of texels around each of cells, and of heights from 1 to −1.
-        (sum / (4.0 * f64::from(self.texels.width))).as_vec3()
+        let sum: DVec3 = (0..rows).map(of_row).sum();
+        (sum / (2.0 * f64::from(self.texels.width))).as_vec3()
     }
 
     /// The colour in a unit direction, and the density in sr⁻¹ with which samples have it. `turn` are the turns of the map

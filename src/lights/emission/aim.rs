@@ -39,7 +39,7 @@ pub enum Sends<'a> {
 
 impl Sends<'_> {
     /// Power over that into the brightest direction, in sr.
-    fn spread(&self) -> f64 {
+    pub fn spread(&self) -> f64 {
         match self {
             Self::Everywhere => 4.0 * PI,
             Self::Cone { spread, .. } => *spread,
@@ -48,7 +48,7 @@ impl Sends<'_> {
     }
 
     /// What goes into a direction over what goes into the brightest one.
-    fn share(&self, direction: Vec3) -> f64 {
+    pub fn share(&self, direction: Vec3) -> f64 {
         match self {
             Self::Everywhere => 1.0,
             Self::Cone { light, .. } => f64::from(light.share(direction)),
@@ -83,6 +83,12 @@ impl Targets {
         let balls = together(balls);
         let by_disc = Discrete::new(balls.iter().map(|ball| ball.radius * ball.radius))?;
         Some(Self { balls, by_disc })
+    }
+
+    /// All of them.
+    #[cfg(test)]
+    pub fn balls(&self) -> &[Ball] {
+        &self.balls
     }
 
     /// A target by a number in [0, 1), for light from beyond the scene.
@@ -209,7 +215,7 @@ fn together(balls: Vec<Ball>) -> Vec<Ball> {
     }
     let mut groups = vec![balls];
     while groups.len() < MOST_TARGETS {
-        let size = |group: &Vec<Ball>| if group.len() > 1 { around(group).radius } else { 0.0 };
+        let size = |group: &Vec<Ball>| if group.len() > 1 { Ball::around(group).radius } else { 0.0 };
         let sizes = groups.iter().map(size).enumerate();
         let Some((largest, _)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
         let mut group = groups.swap_remove(largest);
@@ -221,16 +227,5 @@ fn together(balls: Vec<Ball>) -> Vec<Ball> {
         let rest = group.split_off(group.len() / 2);
         groups.extend([group, rest]);
     }
-    groups.iter().map(|group| around(group)).collect()
-}
-
-/// A ball around balls.
-fn around(balls: &[Ball]) -> Ball {
-    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for Ball { center, radius } in balls {
-        (min, max) = (min.min(*center - *radius), max.max(*center + *radius));
-    }
-    let center = (min + max) * 0.5;
-    let reach = |ball: &Ball| (ball.center - center).length() + ball.radius;
-    Ball { center, radius: balls.iter().map(reach).fold(0.0, f64::max) }
+    groups.iter().map(|group| Ball::around(group)).collect()
 }

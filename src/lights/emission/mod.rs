@@ -1,4 +1,4 @@
-//! Emission: rays that start at lights, each with its share of their power.
+//! PhotonSource: rays that start at lights, each with its share of their power.
 //!
 //! A photon of light ℓ is a ray y. Its flux is the power per measure of rays, Φ′(y), over the density with which such photons are
 //! made, so that the mean of the flux over photons is the power of all lights. There are two ways to make one, and a photon
@@ -35,6 +35,19 @@ pub struct Ball {
     pub center: DVec3,
     /// Radius.
     pub radius: f64,
+}
+
+impl Ball {
+    /// Around balls: in the middle of the box around them.
+    pub fn around(balls: &[Self]) -> Self {
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for Self { center, radius } in balls {
+            (min, max) = (min.min(*center - *radius), max.max(*center + *radius));
+        }
+        let center = if balls.is_empty() { DVec3::ZERO } else { (min + max) * 0.5 };
+        let reach = |ball: &Self| (ball.center - center).length() + ball.radius;
+        Self { center, radius: balls.iter().map(reach).fold(0.0, f64::max) }
+    }
 }
 
 /// The object that a light is.
@@ -109,9 +122,9 @@ impl Emitted {
 
 /// What all lights send.
 #[derive(Clone, Debug)]
-pub struct Emission {
+pub struct PhotonSource {
     lights: Arc<Lights>,
-    sources: Vec<Source>,
+    sources: Vec<OfLight>,
     /// Around all that has an end: light from beyond the scene is sent over it.
     around: Ball,
     by_power: Discrete,
@@ -120,7 +133,7 @@ pub struct Emission {
 
 /// What a light sends.
 #[derive(Clone, Debug)]
-struct Source {
+struct OfLight {
     /// In W.
     power: Vec3,
     /// Of a light without extent: its power over its intensity on the axis, in sr.
@@ -142,12 +155,12 @@ struct Aim {
 /// The part of aimed photons whose light is chosen as that of others is: what is estimated as nothing may be something.
 const BY_POWER: f64 = 0.1;
 
-impl Emission {
+impl PhotonSource {
     /// Of all lights; `outline` tells the object of a number, and `around` is a ball around all that has an end. None where
     /// nothing is sent. Lights without fall-off and the background send nothing.
     pub fn new(lights: &Arc<Lights>, outline: impl Fn(u32) -> Option<Outline>, around: Ball) -> Option<Self> {
-        let source = |(_, light): (u32, &Light)| Source::new(light, &outline, around);
-        let sources: Vec<Source> = lights.iter().map(source).collect();
+        let source = |(_, light): (u32, &Light)| OfLight::new(light, &outline, around);
+        let sources: Vec<OfLight> = lights.iter().map(source).collect();
         let by_power = Discrete::new(sources.iter().map(|source| strength(source.power)))?;
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
@@ -251,7 +264,7 @@ struct Made {
     ratio: f64,
 }
 
-impl Emission {
+impl PhotonSource {
     /// A direction from a point, and the density of aimed ones over that of others.
     #[inline(always)]
     fn directed(
@@ -348,7 +361,7 @@ fn places(i: u32) -> Vec2 {
     Vec2::new(along(0.754_877_666_246_693), along(0.569_840_290_998_053_3))
 }
 
-impl Source {
+impl OfLight {
     fn new(light: &Light, outline: &impl Fn(u32) -> Option<Outline>, around: Ball) -> Self {
         let disc = PI * around.radius * around.radius;
         let of = |factor: f64, color: Vec3| (color.as_dvec3() * factor).as_vec3();
