@@ -207,8 +207,7 @@ impl Asked<'_> {
     /// What comes straight from lights to the vertices whose bits are set; rays of paths that go on from there bring their share.
     fn lit(self, used: u32, by_paths: bool) -> Arrived {
         let Self { shot, row, measure, media } = self;
-        let others =
-            if by_paths { Others::Paths } else { Others::lobes(row.sharp(shot, measure) & used) };
+        let others = if by_paths { Others::Paths } else { Others::lobes(row.sharp(shot, measure) & used) };
         let instructions = shot.world.geometry.instructions();
         let plain = Lighting::<false> { shot, row, used, measure, others, media };
         let weighed = Lighting::<true> { shot, row, used, measure, others, media };

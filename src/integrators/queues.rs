@@ -51,7 +51,14 @@ pub struct History {
 
 impl History {
     /// Of rays of the camera.
-    pub const CAMERA: Self = Self { density: 0.0, normal: Vec3::ZERO, carried: 1.0, is_seen: true, is_step: false, is_from_gloss: false };
+    pub const CAMERA: Self = Self {
+        density: 0.0,
+        normal: Vec3::ZERO,
+        carried: 1.0,
+        is_seen: true,
+        is_step: false,
+        is_from_gloss: false,
+    };
 
     /// After a δ lobe with this part of the radiance.
     pub fn mirrored(self, part: f32) -> Self {

@@ -173,10 +173,10 @@ impl Ways {
 
 impl Parts {
     /// All of it.
-    pub const ALL: Self = 
+    pub const ALL: Self =
         Self { emitted: true, ambient: true, diffuse: true, specular: true, ways: Ways::ALL };
     /// Nothing; what is added to it comes by all ways.
-    pub const NONE: Self = 
+    pub const NONE: Self =
         Self { emitted: false, ambient: false, diffuse: false, specular: false, ways: Ways::ALL };
 }
 

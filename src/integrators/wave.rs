@@ -52,8 +52,19 @@ pub fn trace(
         // What arrives of the lamps' light is asked at what the eye sees.
         Integrator::Path => sink.measure != Measure::ArrivingShare,
     };
-    let mut wave =
-        Wave { depth: 0, is_path, has_steps: is_path || shot.photons.is_some(), onward: None, shot, lit, sink, next, crossing, place: 0, counters };
+    let mut wave = Wave {
+        depth: 0,
+        is_path,
+        has_steps: is_path || shot.photons.is_some(),
+        onward: None,
+        shot,
+        lit,
+        sink,
+        next,
+        crossing,
+        place: 0,
+        counters,
+    };
     wave.begin_round();
     wave.lit.expect(slots.len(), shot.pixel_spread > 0.0);
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {

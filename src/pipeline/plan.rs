@@ -11,7 +11,7 @@ use crate::film::{Quantity, Rect};
 use crate::integrators::{FirstHit, Measure, PhotonSettings, RenderSettings, Shown};
 use crate::math::Vec3;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Integrator, MaterialKind, Photons, Render, Scene, Tonemap};
+use crate::scene::description::{Accel, Falloff, Integrator, Light, MaterialKind, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -81,7 +81,8 @@ fn photons(asked: &Photons) -> PhotonSettings {
 }
 
 /// What a person should know of the integrator that was asked for.
-pub(super) fn warnings(scene: &Scene, render: &Render) -> Vec<String> {
+pub(super) fn warnings(scene: &Scene, settings: &RenderSettings) -> Vec<String> {
+    let RenderSettings { render, photons, .. } = &settings.heeded();
     let is_path = match render.integrator {
         Integrator::Path => true,
         Integrator::Whitted => false,
@@ -99,13 +100,33 @@ pub(super) fn warnings(scene: &Scene, render: &Render) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if render.heeded().clamp > 0.0 {
+    if photons.is_some() && scene.lights.iter().any(is_steady) {
+        warnings.push(
+            "photons carry no light of `falloff = \"none\"`: it bounces no further than to the next surface"
+                .to_owned(),
+        );
+    }
+    if photons.is_some() && scene.photons.count > MOST_PHOTONS {
+        warnings.push(format!(
+            "a pass sends {MOST_PHOTONS} photons at most, for their memory: `count` is larger"
+        ));
+    }
+    if render.clamp > 0.0 {
         warnings.push(format!(
             "`clamp` {} makes the picture less noisy, but too dark: it is biased",
             render.clamp
         ));
     }
     warnings
+}
+
+/// Whether distance does not weaken a light.
+fn is_steady(light: &Light) -> bool {
+    match light {
+        Light::Point(light) => light.falloff == Falloff::None,
+        Light::Spot(light) => light.point.falloff == Falloff::None,
+        Light::Directional(_) => false,
+    }
 }
 
 /// A scene may be large: it is copied only where it has to be another one.

@@ -88,8 +88,7 @@ impl PhotonMap {
         }
         let photons: Vec<Photon> = order.iter().map(|&number| photons[number as usize]).collect();
         let nowhere = std::iter::repeat_n(f32::INFINITY, LANES);
-        let along =
-            |axis: usize| photons.iter().map(move |photon| photon.point[axis]).chain(nowhere.clone());
+        let along = |axis: usize| photons.iter().map(move |photon| photon.point[axis]).chain(nowhere.clone());
         let (x, y, z) = (along(0).collect(), along(1).collect(), along(2).collect());
         Self { radius, cells, mask, starts, x, y, z, photons }
     }
@@ -135,9 +134,12 @@ impl PhotonMap {
         let first = cell_of(corner, self.cells);
         // Cells are as long as the kernel is wide: it reaches over two of them.
         for number in 0..4_u32 {
-            let (y, z) = (first[1].wrapping_add((number & 1) as i32), first[2].wrapping_add((number >> 1) as i32));
+            let (y, z) =
+                (first[1].wrapping_add((number & 1) as i32), first[2].wrapping_add((number >> 1) as i32));
             let begin = bucket(first[0], y, z, self.mask);
-            for bucket in [begin, begin.wrapping_add(1) & self.mask].into_iter().take(self.mask.min(1) as usize + 1) {
+            for bucket in
+                [begin, begin.wrapping_add(1) & self.mask].into_iter().take(self.mask.min(1) as usize + 1)
+            {
                 let range = self.starts[bucket as usize] as usize..self.starts[bucket as usize + 1] as usize;
                 for start in range.clone().step_by(LANES) {
                     let mut near = [0_u32; LANES];
@@ -164,7 +166,8 @@ impl PhotonMap {
                         if own_y != y || own_z != z {
                             continue;
                         }
-                        let faces = photon.normal.dot(normal) > LEAST_COSINE && photon.direction.dot(normal) > 0.0;
+                        let faces =
+                            photon.normal.dot(normal) > LEAST_COSINE && photon.direction.dot(normal) > 0.0;
                         if faces && photon.depth <= most_depth {
                             let share = 1.0 - squares[i].max(0.0) / radius_squared;
                             visit(photon, scale * share);

@@ -34,12 +34,11 @@ use super::settings::RenderSettings;
 use super::shot::{SampleBlock, Shot};
 use crate::control::{CancelToken, Cancelled, Progress, unwatched};
 use crate::film::Rect;
-use crate::geometry::{Aabb, Shape, ShapeHit};
-use crate::lights::{Ball, Emission, Outline};
+use crate::geometry::{Aabb, ShapeHit};
+use crate::lights::{Ball, PhotonSource};
 use crate::materials::Bsdf;
-use crate::math::DVec3;
 use crate::scene::description::{Render, Shadows};
-use crate::world::{Hit, Object, World};
+use crate::world::{Hit, Object, World, photon_source};
 pub use map::{Photon, PhotonMap, Way};
 use shoot::{Shooting, Shots};
 
@@ -70,7 +69,7 @@ const AIMED: f32 = 0.5;
 #[derive(Debug)]
 pub struct Photons {
     settings: PhotonSettings,
-    emission: Option<Emission>,
+    emission: Option<PhotonSource>,
     glasses: Vec<Inside>,
     /// Of the first pass: of the kernel for caustics, of that for what is thrown back from them, and of that for all photons.
     radii: [f32; 3],
@@ -132,13 +131,7 @@ impl Photons {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Cancelled> {
-        let outline = |object: u32| {
-            Some(match world.geometry.objects().get(object as usize)? {
-                Object::Shape(shape) => Outline::Shape(*shape),
-                Object::Mesh(_) => Outline::Mesh { rounding: 0.0 },
-            })
-        };
-        let emission = Emission::new(&world.lights, outline, around(world));
+        let emission = photon_source(&world.geometry, &world.lights);
         let emission = emission.map(|emission| emission.aimed_at(&targets(world), AIMED));
         let glasses = world.closed_glasses().map(|(object, material)| Inside { object, material }).collect();
         let mut own = Self { settings: photons, emission, glasses, radii: [photons.radius; 3] };
@@ -214,7 +207,8 @@ impl Photons {
             return Ok(Sent::default());
         }
         // Photons come to the facets, from where they go on in every picture alike.
-        let settings = RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
+        let settings =
+            RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {
             // All photons of a number of passes are samples of one sequence.
@@ -291,32 +285,13 @@ fn radius_to_hold(photons: &[Photon], wanted: f32) -> f32 {
     radius * (wanted / (NEAR * step as f32)).sqrt()
 }
 
-/// A ball around all that has an end.
-fn around(world: &World) -> Ball {
-    let bounds = world.geometry.objects().iter().filter_map(Object::bounds);
-    ball(bounds.fold(Aabb::EMPTY, Aabb::union))
-}
-
-fn ball(bounds: Aabb) -> Ball {
-    let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
-    if !(max - min).is_finite() || min.cmpgt(max).any() {
-        return Ball { center: DVec3::ZERO, radius: 0.0 };
-    }
-    Ball { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 }
-}
-
 /// Balls around mirrors and glass.
 fn targets(world: &World) -> Vec<Ball> {
     let specular = |(id, object): (u32, &Object)| {
         let material = world.material_index(&Hit { shape: ShapeHit::at(0.0), object: id });
         match &world.materials[material].bsdf {
             Bsdf::Phong(_) => None,
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => match object {
-                Object::Shape(Shape::Sphere(sphere)) => {
-                    Some(Ball { center: sphere.center, radius: sphere.radius })
-                }
-                Object::Shape(_) | Object::Mesh(_) => object.bounds().map(ball),
-            },
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => object.ball(),
         }
     };
     (0..).zip(world.geometry.objects()).filter_map(specular).collect()

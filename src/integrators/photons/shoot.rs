@@ -21,7 +21,7 @@ use super::map::{Photon, Way};
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
-use crate::lights::{Emission, Emitted, Numbers, Start};
+use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::Bsdf;
 use crate::math::Vec3;
 use crate::math::lanes::set_lane;
@@ -39,7 +39,7 @@ pub struct Shooting<'a> {
     /// The world, and the numbers of the photons as the samples of a single pixel; their slots count from 0.
     pub shot: &'a Shot<'a>,
     /// What the lights send.
-    pub emission: &'a Emission,
+    pub emission: &'a PhotonSource,
     /// The closed shapes of glass, with their materials.
     pub glasses: &'a [Inside],
     /// One over the number of photons.
@@ -272,7 +272,8 @@ impl Flight<'_> {
         let shot = self.shooting.shot;
         let shading = vertex.shading(&mut self.counters);
         let Interface { reflectance, refracted } = interface(shot.world, path, vertex, &shading, far);
-        let is_reflected = |reflectance| shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance;
+        let is_reflected =
+            |reflectance| shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance;
         match refracted {
             Some(mut ray) if !is_reflected(reflectance) => {
                 let eta = ior(shot.world, far) / ior(shot.world, path.medium);
@@ -331,7 +332,8 @@ impl Flight<'_> {
         let mut kept = 0;
         for begin in (0..self.next.len()).step_by(PACKET) {
             let end = self.next.len().min(begin + PACKET);
-            let risks = shot.world.geometry.instructions().run(Risking { shot, rays: &self.next[begin..end] });
+            let risks =
+                shot.world.geometry.instructions().run(Risking { shot, rays: &self.next[begin..end] });
             for (place, risk) in (begin..end).zip(risks) {
                 let mut ray = self.next[place];
                 let flux = ray.throughput.max_element();

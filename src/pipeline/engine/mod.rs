@@ -25,12 +25,12 @@ use super::stages::films::Films;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
+use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::preview::Screen;
 use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::world::{Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
-use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::{Findings, Reading, Staged, Stop, keys};
 use super::table::StageTable;
 use super::targets::{NamedBy, conflicts};
@@ -199,9 +199,8 @@ impl Engine {
         let (plan, world) = (&ready.plan, &ready.world.1);
         let sending = Sending { world, plan, pool: &pool, token: meanwhile.token, sink };
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
-        let key = |of_photons| {
-            keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons)
-        };
+        let key =
+            |of_photons| keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
         let store = &mut self.photons;
         table.run(Stage::Photons, || Ok(photons(asked, key, store, sending)?))?;
         let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
@@ -241,7 +240,7 @@ impl Engine {
         })?;
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-        for warning in warnings(&plan.scene, &plan.settings.render) {
+        for warning in warnings(&plan.scene, &plan.settings) {
             findings.warn(&parsed.loaded, 0..0, warning);
         }
         let settings = Box::new(plan.effective.clone());

@@ -155,12 +155,12 @@ pub(in crate::pipeline) fn photons(
     }
     let Sending { world, pool, token, .. } = sending;
     let begin = Instant::now();
-    let send = |progress: Progress<'_>| {
-        pool.install(|| Photons::new(world, &settings, of_photons, progress, token))
-    };
+    let send =
+        |progress: Progress<'_>| pool.install(|| Photons::new(world, &settings, of_photons, progress, token));
     let (photons, first) = sending.sink.asset("photons", send)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let sent = Sent { passes: 1, emitted: first.emitted, stored: first.stored(), seconds, most_alive_bytes: 0 };
+    let sent =
+        Sent { passes: 1, emitted: first.emitted, stored: first.stored(), seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);

@@ -271,7 +271,8 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
         let (photons, _) = photons.expect("nobody cancels");
         photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")
     });
-    let (tile, _) = render_tile_by(maps.as_ref(), world, settings, rect, 0..samples, &token).expect("nobody cancels");
+    let (tile, _) =
+        render_tile_by(maps.as_ref(), world, settings, rect, 0..samples, &token).expect("nobody cancels");
     let sums = tile.radiance.chunks(samples as usize);
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }
