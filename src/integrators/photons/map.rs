@@ -1,6 +1,7 @@
 //! A photon map: photons by the cells of a grid, of which only a hash is kept, so that the grid may be as fine as the radius asks for
 //! wherever photons are.
 
+use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
 /// Light that arrived at a surface.
@@ -31,6 +32,9 @@ pub enum Way {
     Other,
 }
 
+/// Photons that are put into their places between two looks at the token.
+const POLL_INTERVAL: usize = 1 << 16;
+
 /// Photons that are looked up together.
 const LANES: usize = 16;
 
@@ -58,27 +62,28 @@ const LEAST_COSINE: f32 = 0.7;
 const REACH: f32 = 0.3;
 
 impl PhotonMap {
-    /// No photon.
-    pub fn empty() -> Self {
-        Self::new(&[], 1.0)
-    }
-
-    /// Of some photons, for a kernel of this radius.
-    pub fn new(photons: &[Photon], radius: f32) -> Self {
+    /// Of some photons, for a kernel of this radius; those of a cell in the order given.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
         let cells = 0.5 / radius;
         let mask = (photons.len().max(1).next_power_of_two() - 1) as u32;
-        let bucket = |photon: &Photon| {
-            let [x, y, z] = cell_of(photon.point, cells);
-            bucket(x, y, z, mask)
-        };
         let mut starts = vec![0_u32; mask as usize + 2];
-        let buckets: Vec<u32> = photons.iter().map(bucket).collect();
-        for &bucket in &buckets {
-            starts[bucket as usize + 1] += 1;
+        let mut buckets = Vec::with_capacity(photons.len());
+        for photons in photons.chunks(POLL_INTERVAL) {
+            token.check()?;
+            for photon in photons {
+                let [x, y, z] = cell_of(photon.point, cells);
+                let bucket = bucket(x, y, z, mask);
+                starts[bucket as usize + 1] += 1;
+                buckets.push(bucket);
+            }
         }
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
         }
+        token.check()?;
         let mut next = starts.clone();
         let mut order = vec![0_u32; photons.len()];
         for (number, &bucket) in (0..).zip(&buckets) {
@@ -86,11 +91,18 @@ impl PhotonMap {
             order[*place as usize] = number;
             *place += 1;
         }
-        let photons: Vec<Photon> = order.iter().map(|&number| photons[number as usize]).collect();
+        let mut sorted = Vec::with_capacity(photons.len());
+        for order in order.chunks(POLL_INTERVAL) {
+            token.check()?;
+            sorted.extend(order.iter().map(|&number| photons[number as usize]));
+        }
+        let photons = sorted;
         let nowhere = std::iter::repeat_n(f32::INFINITY, LANES);
-        let along = |axis: usize| photons.iter().map(move |photon| photon.point[axis]).chain(nowhere.clone());
-        let (x, y, z) = (along(0).collect(), along(1).collect(), along(2).collect());
-        Self { radius, cells, mask, starts, x, y, z, photons }
+        let along = |axis: usize| {
+            photons.iter().map(move |photon| photon.point[axis]).chain(nowhere.clone()).collect::<Vec<f32>>()
+        };
+        let (x, y, z) = (along(0), along(1), along(2));
+        Ok(Self { radius, cells, mask, starts, x, y, z, photons })
     }
 
     /// All photons, by their cells.

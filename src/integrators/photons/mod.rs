@@ -60,7 +60,7 @@ const CHUNK: u32 = 2048;
 const KEPT: f64 = 2.0 / 3.0;
 
 /// Photons that the first kernels are to hold, in the middle of the caustic ones, of those thrown back from caustics, and of all.
-const WANTED: [f32; 3] = [24.0, 48.0, 16.0];
+const WANTED: [f32; 3] = [12.0, 48.0, 12.0];
 
 /// The part of the photons that are aimed at mirrors and glass, where there are any.
 const AIMED: f32 = 0.5;
@@ -138,11 +138,12 @@ impl Photons {
         let sent = own.shoot((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced, &sent.all];
-            let radii = kinds.into_par_iter().zip(WANTED).map(|(of, wanted)| radius_to_hold(of, wanted));
-            own.radii.iter_mut().zip(radii.collect::<Vec<_>>()).for_each(|(own, radius)| *own = radius);
+            let radii = kinds.into_par_iter().zip(WANTED);
+            let radii = radii.map(|(of, wanted)| radius_to_hold(of, wanted, token));
+            let radii = radii.collect::<Result<Vec<_>, _>>()?;
+            own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
         }
-        token.check()?;
-        let first = own.mapped(&sent, 0);
+        let first = own.mapped(&sent, 0, token)?;
         Ok((own, first))
     }
 
@@ -164,17 +165,18 @@ impl Photons {
         token: &CancelToken,
     ) -> Result<PhotonPass, Cancelled> {
         let sent = self.shoot((world, settings), number, &unwatched, token)?;
-        token.check()?;
-        Ok(self.mapped(&sent, number))
+        self.mapped(&sent, number, token)
     }
 
     /// The maps of a pass.
-    fn mapped(&self, sent: &Sent, number: u32) -> PhotonPass {
+    fn mapped(&self, sent: &Sent, number: u32, token: &CancelToken) -> Result<PhotonPass, Cancelled> {
         let shrunk = shrunk(number);
         let [of_caustic, of_bounced, of_all] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
-        let few = || (PhotonMap::new(&sent.caustic, of_caustic), PhotonMap::new(&sent.bounced, of_bounced));
-        let ((caustic, bounced), all) = rayon::join(few, || PhotonMap::new(&sent.all, of_all));
-        PhotonPass { caustic, bounced, all, emitted: self.settings.count.into(), lookups: sent.lookups }
+        let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
+        let few = || (map(&sent.caustic, of_caustic), map(&sent.bounced, of_bounced));
+        let ((caustic, bounced), all) = rayon::join(few, || map(&sent.all, of_all));
+        let (emitted, lookups) = (self.settings.count.into(), sent.lookups);
+        Ok(PhotonPass { caustic: caustic?, bounced: bounced?, all: all?, emitted, lookups })
     }
 
     /// The passes of some samples.
@@ -253,7 +255,7 @@ fn shrunk(pass: u32) -> f64 {
 }
 
 /// A radius within which the photon in the middle, by how many there are, has so many others.
-fn radius_to_hold(photons: &[Photon], wanted: f32) -> f32 {
+fn radius_to_hold(photons: &[Photon], wanted: f32, token: &CancelToken) -> Result<f32, Cancelled> {
     /// Photons that are looked at, from each of so many of them.
     const MOST: usize = 1 << 14;
     const LOOKS: usize = 256;
@@ -264,10 +266,10 @@ fn radius_to_hold(photons: &[Photon], wanted: f32) -> f32 {
     let bounds = some.iter().fold(Aabb::EMPTY, |all, one| all.union(Aabb { min: one.point, max: one.point }));
     let mut radius = 0.05 * (bounds.max - bounds.min).length();
     if some.is_empty() || !(radius > 0.0) {
-        return 1.0;
+        return Ok(1.0);
     }
     for _ in 0..12 {
-        let map = PhotonMap::new(&some, radius);
+        let map = PhotonMap::new(&some, radius, token)?;
         let count = |photon: &Photon| {
             let mut count = -1.0_f32;
             map.visit((photon.point, photon.normal), u32::MAX, |_, _| count += 1.0);
@@ -282,7 +284,7 @@ fn radius_to_hold(photons: &[Photon], wanted: f32) -> f32 {
             break;
         }
     }
-    radius * (wanted / (NEAR * step as f32)).sqrt()
+    Ok(radius * (wanted / (NEAR * step as f32)).sqrt())
 }
 
 /// Balls around mirrors and glass.

@@ -400,7 +400,7 @@ impl Engine {
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             let plan = plan(&loaded.scene, path, &Overrides::default())
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-            for warning in warnings(&plan.scene, &plan.settings.render) {
+            for warning in warnings(&plan.scene, &plan.settings) {
                 findings.warn(loaded, 0..0, warning);
             }
             if plan.named_by == NamedBy::Scene {
