@@ -27,6 +27,7 @@ pub fn injected(fault: &str) -> bool {
 """
 GLOBAL = "closed_forms::global::"
 MANY = "closed_forms::many_lights::"
+PHOTONS = "closed_forms::photons::"
 
 # Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
 FAULTS = [
@@ -77,6 +78,19 @@ FAULTS = [
      MANY + "a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before"),
     ("chosen rays count for themselves alone", "integrators/picking.rs", "let times = ⟦(place - first) as f32 * step / one.importance[i]⟧;",
      "2.0", MANY + "picks_among_lights_of_every_kind_bring_what_all_of_them_do"),
+    ("a kernel without its normaliser", "integrators/photons/map.rs", "let scale = ⟦2.0 / (std::f32::consts::PI * radius_squared)⟧;",
+     "1.0 / (std::f32::consts::PI * radius_squared)", PHOTONS + "an_integrating_sphere_is_lit_everywhere_alike_by_photons"),
+    ("a photon counted twice", "integrators/photons/gather.rs", "&|way| ⟦!(without_caustics && way == Way::Caustic)⟧",
+     "true", PHOTONS + "photons_and_paths_see_the_same_light_to_every_depth"),
+    ("flux not divided by the chance to go on", "integrators/photons/shoot.rs", "ray.throughput /= ⟦chance⟧;",
+     "1.0", PHOTONS + "what_is_stored_in_a_closed_room_is_the_power_and_how_often_photons_arrive_is_known"),
+    ("photons from the wrong side of a wall", "integrators/photons/map.rs",
+     "let faces =\n                            ⟦photon.normal.dot(normal) > LEAST_COSINE && photon.direction.dot(normal) > 0.0⟧;", "true",
+     PHOTONS + "no_light_comes_through_a_wall_without_thickness"),
+    ("lamps behind glass met by the step too", "integrators/wave.rs", "if ⟦self.is_gathered(path)⟧ {", "false",
+     PHOTONS + "photons_and_paths_see_the_same_light_to_every_depth"),
+    ("photons go one scattering too far", "integrators/photons/gather.rs", "max_depth.checked_sub(⟦depth + 1⟧)", "depth",
+     PHOTONS + "photons_and_paths_see_the_same_light_to_every_depth"),
 ]
 
 

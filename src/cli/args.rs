@@ -171,7 +171,7 @@ pub struct RenderArgs {
     /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection: less noise, but too dark; 0: none
     #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = clamp, help_heading = "Method")]
     pub clamp: Option<f32>,
-    /// Photon maps; accepted, but not rendered by this version
+    /// Indirect light and caustics from photon maps, in whitted
     #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "Method")]
     pub photons: Option<Switch>,
     /// Depth of field, where the camera has an aperture

@@ -140,8 +140,8 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
         warning("--dof on has no effect: the scene's camera is a pinhole", help)
     });
     let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
-        let help = "`ambient` in [render] stands for the light that bounces between surfaces";
-        warning("--photons on has no effect: this version does not render photons", help)
+        let help = "`--integrator whitted` gathers photons; path finds the same light without";
+        warning("--photons on has no effect: path gathers none", help)
     });
     dof.into_iter().chain(photons).collect()
 }

@@ -39,6 +39,14 @@ pub struct LightRays {
     pub lookups: u64,
 }
 
+impl std::ops::AddAssign for LightRays {
+    fn add_assign(&mut self, other: Self) {
+        self.shadow += other.shadow;
+        self.scattered += other.scattered;
+        self.lookups += other.lookups;
+    }
+}
+
 /// What of the light that arrives at the vertices of a row gets to the eye.
 pub(super) struct Arrived {
     /// Before the throughput of the paths.

@@ -2,21 +2,24 @@
 
 use super::beside::{LobeRays, Others};
 use super::cone::Cone;
-use super::light::{LightRays, Lighting};
+use super::light::{Arrived, LightRays, Lighting, add_where};
 use super::lit_row::{ALL, LitRow};
 use super::medium::Medium;
 use super::onward::{Onward, Scattering};
+use super::photons::PhotonMaps;
+use super::photons::gather::Gathering;
 use super::picking::Picking;
 use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
 use super::vertices::LitVertex;
-use super::view::Measure;
+use super::view::{Measure, Ways};
 use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::lights::{Source, SourceRow};
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, lane};
+use crate::scene::description::Shadows;
 use crate::world::{Geometry, Loops};
 
 /// Vertices that wait to be lit, side by side; each is lit alone, whatever it shares its row with.
@@ -139,7 +142,7 @@ impl LitQueue {
         &mut self,
         shot: &Shot<'_>,
         measure: Measure,
-        onward: Option<Onward>,
+        (depth, onward): (u32, Option<Onward>),
         next: &mut Vec<PathRay>,
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
@@ -150,28 +153,12 @@ impl LitQueue {
             }
             let row = &*row;
             let media = (self.media.len() > 1 && row.is_inside()).then_some(&*self.media);
-            let others = match onward {
-                Some(_) => Others::Paths,
-                None => Others::lobes(row.sharp(shot, measure)),
+            let asked = Asked { shot, row, measure, media };
+            let mut arrived = match shot.photons {
+                Some(maps) => asked.lit_and_gathered(maps, (depth, onward)),
+                None => asked.lit(row.used & shown(row, measure), onward.is_some()),
             };
-            let instructions = shot.world.geometry.instructions();
-            let used = row.used;
-            let plain = Lighting::<false> { shot, row, used, measure, others, media };
-            let weighed = Lighting::<true> { shot, row, used, measure, others, media };
-            let mut arrived = match (others, shot.world.lights.tree()) {
-                (Others::Nothing, None) => instructions.run(plain),
-                (Others::Nothing, Some(tree)) => instructions.run(Picking { lighting: plain, tree }),
-                (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
-                (Others::Paths | Others::Lobes(_), Some(tree)) => {
-                    instructions.run(Picking { lighting: weighed, tree })
-                }
-            };
-            if let Others::Lobes(sharp) = others {
-                arrived = instructions.run(LobeRays { shot, row, sharp, measure, media, arrived });
-            }
-            rays.shadow += arrived.rays.shadow;
-            rays.scattered += arrived.rays.scattered;
-            rays.lookups += arrived.rays.lookups;
+            rays += arrived.rays;
             arrived.light = match measure {
                 Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(&arrived.light),
                 Measure::Work => arrived.light,
@@ -190,11 +177,69 @@ impl LitQueue {
                 }
             }
             if let Some(onward) = onward.filter(|onward| onward.leads_on) {
-                Scattering { shot, row, onward }.scatter(&self.media, &self.cones, next);
+                let used = if shot.photons.is_some() { row.used & row.seen } else { row.used };
+                Scattering { shot, row, used, onward }.scatter(&self.media, &self.cones, next);
             }
         }
         self.clear();
         Ok(rays)
+    }
+}
+
+/// A bit for each vertex of which light that comes straight to it is shown.
+fn shown(row: &LitRow, measure: Measure) -> u32 {
+    let Ways { direct, indirect, .. } = measure.ways();
+    let hidden = |bits: u32, is_shown: bool| if is_shown { 0 } else { bits };
+    !(hidden(row.seen, direct) | hidden(!row.seen, indirect))
+}
+
+/// The vertices of a row and what is asked of them.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    shot: &'a Shot<'a>,
+    row: &'a LitRow,
+    measure: Measure,
+    /// Those that the vertices are in; none where all are in air.
+    media: Option<&'a [Medium]>,
+}
+
+impl Asked<'_> {
+    /// What comes straight from lights to the vertices whose bits are set; rays of paths that go on from there bring their share.
+    fn lit(self, used: u32, by_paths: bool) -> Arrived {
+        let Self { shot, row, measure, media } = self;
+        let others = if by_paths { Others::Paths } else { Others::lobes(row.sharp(shot, measure) & used) };
+        let instructions = shot.world.geometry.instructions();
+        let plain = Lighting::<false> { shot, row, used, measure, others, media };
+        let weighed = Lighting::<true> { shot, row, used, measure, others, media };
+        let mut arrived = match (others, shot.world.lights.tree()) {
+            (Others::Nothing, None) => instructions.run(plain),
+            (Others::Nothing, Some(tree)) => instructions.run(Picking { lighting: plain, tree }),
+            (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
+            (Others::Paths | Others::Lobes(_), Some(tree)) => {
+                instructions.run(Picking { lighting: weighed, tree })
+            }
+        };
+        if let Others::Lobes(sharp) = others {
+            arrived = instructions.run(LobeRays { shot, row, sharp, measure, media, arrived });
+        }
+        arrived
+    }
+
+    /// The same and what photons bring. Paths go on from vertices that the eye sees alone: one step, to where light is looked up.
+    fn lit_and_gathered(self, maps: &PhotonMaps, (depth, onward): (u32, Option<Onward>)) -> Arrived {
+        let Self { shot, row, measure, .. } = self;
+        let shown = row.used & shown(row, measure);
+        let (first, second) = (shown & row.seen, shown & !row.seen);
+        let is_shared = onward.is_some() && shot.settings.render.shadows == Shadows::Soft;
+        let mut arrived = self.lit(first, is_shared);
+        if second != 0 {
+            let Arrived { light, rays } = self.lit(second, false);
+            add_where(second, &light, &mut arrived.light);
+            arrived.rays += rays;
+        }
+        let gathering = Gathering { shot, row, maps, depth, measure };
+        add_where(row.used, &shot.world.geometry.instructions().run(gathering), &mut arrived.light);
+        arrived
     }
 }
 

@@ -27,6 +27,17 @@ pub struct LitRow {
     pub(super) lifted: Lanes3,
     pub(super) lift_end: Lanes,
     pub(super) may_lift: u32,
+    /// Points of the surfaces and normals of their facets on the eye's side, of the lanes whose bits are set; of the others these are
+    /// `from` and `normal`.
+    pub(super) point: Lanes3,
+    /// [`LitRow::point`].
+    pub(super) facet: Lanes3,
+    /// [`LitRow::point`].
+    pub(super) apart: u32,
+    /// A bit for each vertex that the eye sees, be it by mirrors and glass.
+    pub(super) seen: u32,
+    /// A bit for each whose path comes from a surface with a glossy lobe.
+    pub(super) from_gloss: u32,
     /// Normals that the cosines are of.
     pub normal: Lanes3,
     /// Those before a normal map bent them, and the cosine between; [`UNBENT`] where none did.
@@ -103,6 +114,11 @@ impl LitRow {
         lifted: [[0.0; LANES]; 3],
         lift_end: [0.0; LANES],
         may_lift: 0,
+        point: [[0.0; LANES]; 3],
+        facet: [[0.0; LANES]; 3],
+        apart: 0,
+        seen: 0,
+        from_gloss: 0,
         normal: [[0.0; LANES]; 3],
         smooth_normal: [[0.0; LANES]; 3],
         bend: [UNBENT; LANES],
@@ -125,6 +141,7 @@ impl LitRow {
     #[inline(always)]
     pub fn reset(&mut self) {
         (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
+        (self.apart, self.seen, self.from_gloss) = (0, 0, 0);
         (self.is_glossy, self.is_bent) = (false, false);
         self.bend = [UNBENT; LANES];
     }
@@ -135,6 +152,8 @@ impl LitRow {
             (&mut self.from, &other.from),
             (&mut self.horizon, &other.horizon),
             (&mut self.lifted, &other.lifted),
+            (&mut self.point, &other.point),
+            (&mut self.facet, &other.facet),
             (&mut self.normal, &other.normal),
             (&mut self.smooth_normal, &other.smooth_normal),
             (&mut self.mirrored_eye, &other.mirrored_eye),
@@ -155,6 +174,9 @@ impl LitRow {
         self.is_bounded |= (other.is_bounded >> from & 1) << i;
         self.lift_end[i] = other.lift_end[from];
         self.may_lift |= (other.may_lift >> from & 1) << i;
+        self.apart |= (other.apart >> from & 1) << i;
+        self.seen |= (other.seen >> from & 1) << i;
+        self.from_gloss |= (other.from_gloss >> from & 1) << i;
         self.used |= 1 << i;
     }
 
@@ -176,6 +198,11 @@ impl LitRow {
             self.lift_end[i] = end;
             self.may_lift |= 1 << i;
         }
+        set_lane(&mut self.point, i, vertex.surface.point);
+        set_lane(&mut self.facet, i, vertex.normal);
+        self.apart |= 1 << i;
+        self.seen |= u32::from(path.history.is_seen) << i;
+        self.from_gloss |= u32::from(path.history.is_from_gloss) << i;
         set_lane(&mut self.normal, i, shading.normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
@@ -228,6 +255,30 @@ impl LitRow {
             }
         }
         Response { f, cosines, glosses }
+    }
+
+    /// Where the surface of a vertex is, and the normal of its facet on the eye's side.
+    #[inline(always)]
+    pub(super) fn place_of(&self, i: usize) -> (Vec3, Vec3) {
+        if self.apart & 1 << i != 0 {
+            (lane(&self.point, i), lane(&self.facet, i))
+        } else {
+            (lane(&self.from, i), lane(&self.normal, i))
+        }
+    }
+
+    /// The cosine of light from a direction that a vertex is lit by, times what is left of it at the terminator, over that by which
+    /// the light comes to the facet: what photons that land there count.
+    #[inline(always)]
+    pub(super) fn landed(&self, i: usize, direction: Vec3) -> f32 {
+        if self.apart & 1 << i == 0 {
+            return 1.0;
+        }
+        let cosine = lane(&self.normal, i).dot(direction);
+        let smooth = lane(&self.smooth_normal, i).dot(direction);
+        let left = cosine * terminator(cosine, smooth, self.bend[i]);
+        let arriving = lane(&self.facet, i).dot(direction);
+        if (left > 0.0) & (arriving > 0.0) { left / arriving } else { 0.0 }
     }
 
     /// What the paths carry of light from the vertices.

@@ -20,6 +20,7 @@ mod lit_row;
 mod medium;
 mod onward;
 mod packet;
+mod photons;
 mod picking;
 mod queues;
 mod settings;
@@ -39,6 +40,7 @@ use crate::film::{NegativeLobes, Rect, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
+pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, PhotonSettings, Photons};
 use queues::Queues;
 pub use settings::RenderSettings;
 use shot::{SampleBlock, Shot};
@@ -60,13 +62,29 @@ pub fn render_tile(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
+    render_tile_by(None, world, settings, tile, samples, token)
+}
+
+/// The same with photons, of which there are the maps of the samples; without, nothing is gathered.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn render_tile_by(
+    photons: Option<&PhotonMaps>,
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
     let block = SampleBlock { tile, samples };
     let weight = settings.render.filter.negative_weight();
     let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
-    let settings = &RenderSettings { render: settings.render.heeded(), ..*settings };
-    let shot = Shot::new(world, settings, &block, token);
+    let settings = &settings.heeded();
+    let photons = photons.filter(|_| settings.gathers());
+    let shot = Shot { photons, ..Shot::new(world, settings, &block, token) };
     let clamp = if settings.view.shown().measure() == Measure::Work { 0.0 } else { settings.render.clamp };
     let mut queues = Queues::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {

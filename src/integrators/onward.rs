@@ -66,6 +66,8 @@ pub struct Scattering<'a> {
     pub shot: &'a Shot<'a>,
     /// The vertices.
     pub row: &'a LitRow,
+    /// A bit for each from which they go on.
+    pub used: u32,
     /// How.
     pub onward: Onward,
 }
@@ -103,6 +105,8 @@ impl Scattering<'_> {
                     normal: lane(&row.normal, i),
                     carried: ways.carried[i],
                     is_seen: false,
+                    is_step: row.seen & 1 << i != 0,
+                    is_from_gloss: row.albedos[1][i] > 0.0,
                 },
                 cone: cones.get(row.place[i] as usize).map_or(Cone::default(), of_lobe(ways.densities[i])),
             };
@@ -117,7 +121,7 @@ impl Loops for Scattering<'_> {
 
     #[inline(always)]
     fn run(self) -> Ways {
-        let Self { shot, row, onward } = self;
+        let Self { shot, row, used, onward } = self;
         let sampler = row.sampler(shot);
         let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
         let [lobe, _] =
@@ -147,7 +151,7 @@ impl Loops for Scattering<'_> {
             let bit = 1 << i;
             alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
         }
-        alive &= row.used & !row.hidden(&directions);
+        alive &= used & !row.hidden(&directions);
         if onward.is_risked {
             let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
             for i in 0..LANES {

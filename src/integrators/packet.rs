@@ -152,7 +152,7 @@ impl Loops for Meeting<'_> {
         let mut surface = SurfaceRow::EMPTY;
         let any = hits.any();
         let (mut left, mut plain, mut shining) = (any, 0, 0);
-        let mut seen = !0;
+        let (mut seen, mut from_gloss) = (!0, 0);
         match rays {
             Rays::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
             Rays::Paths(..) | Rays::Traced(..) => {
@@ -160,6 +160,7 @@ impl Loops for Meeting<'_> {
                     let Some(path) = rays.of_queue(lane) else { break };
                     left &= if path.medium.is_air() { !0 } else { !(1 << lane) };
                     seen &= if path.history.is_seen { !0 } else { !(1 << lane) };
+                    from_gloss |= u32::from(path.history.is_from_gloss) << lane;
                 }
             }
         }
@@ -184,6 +185,7 @@ impl Loops for Meeting<'_> {
                 }
             }
         }
+        (row.seen, row.from_gloss) = (seen, from_gloss);
         let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface) };
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {

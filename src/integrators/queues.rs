@@ -7,6 +7,7 @@ use super::cone::Cone;
 use super::crossing::CrossingMemory;
 use super::lit_queue::LitQueue;
 use super::medium::Medium;
+use super::view::Ways;
 use crate::geometry::Ray;
 use crate::math::Vec3;
 use crate::world::Hit;
@@ -42,15 +43,35 @@ pub struct History {
     pub carried: f32,
     /// Whether there are but the camera, mirrors and glass before.
     pub is_seen: bool,
+    /// Whether there is one diffuse or glossy surface before.
+    pub is_step: bool,
+    /// Whether the last such surface had a glossy lobe.
+    pub is_from_gloss: bool,
 }
 
 impl History {
     /// Of rays of the camera.
-    pub const CAMERA: Self = Self { density: 0.0, normal: Vec3::ZERO, carried: 1.0, is_seen: true };
+    pub const CAMERA: Self = Self {
+        density: 0.0,
+        normal: Vec3::ZERO,
+        carried: 1.0,
+        is_seen: true,
+        is_step: false,
+        is_from_gloss: false,
+    };
 
     /// After a δ lobe with this part of the radiance.
     pub fn mirrored(self, part: f32) -> Self {
         Self { density: 0.0, carried: self.carried * part, ..self }
+    }
+
+    /// How light that the path meets comes to the first diffuse or glossy surface: whether that way is shown.
+    pub fn shows(&self, ways: Ways) -> bool {
+        match (self.is_step, self.density > 0.0) {
+            (true, true) => ways.direct,
+            (true, false) => ways.caustic,
+            (false, _) => ways.indirect,
+        }
     }
 
     /// After passing surfaces that change nothing but hide what is behind from light samples.

@@ -1,9 +1,8 @@
 //! How a world is rendered.
 
-use super::view::Measure;
-use super::{Shown, View};
-use crate::math::DVec2;
-use crate::scene::description::Render;
+use super::{FirstHit, Measure, PhotonSettings, Shown, View};
+use crate::math::{DVec2, Vec3};
+use crate::scene::description::{Integrator, Render};
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
 
 /// How a world is rendered.
@@ -15,9 +14,34 @@ pub struct RenderSettings {
     pub dof: bool,
     /// What is shown.
     pub view: View,
+    /// Photon maps, where whitted gathers any.
+    pub photons: Option<PhotonSettings>,
 }
 
 impl RenderSettings {
+    /// With the defaults in place of what is ignored.
+    pub fn heeded(&self) -> Self {
+        let mut render = self.render.heeded();
+        let photons = match render.integrator {
+            Integrator::Whitted => self.photons,
+            Integrator::Path => None,
+        };
+        if photons.is_some() {
+            render.ambient = Vec3::ZERO;
+        }
+        Self { render, photons, ..*self }
+    }
+
+    /// Whether pictures by these settings show anything of photons.
+    pub fn gathers(&self) -> bool {
+        let shows = match self.view.shown() {
+            Shown::FirstHit(number) => number == FirstHit::Photons,
+            Shown::Light(Measure::ArrivingShare) => false,
+            Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Film(_) | Shown::Bounds => true,
+        };
+        shows && self.heeded().photons.is_some()
+    }
+
     /// A place in the picture, in pixels from its top left corner, as the camera takes it: from its middle to the right
     /// and up, in halves of its height.
     #[inline(always)]
@@ -30,7 +54,7 @@ impl RenderSettings {
 
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { render, dof, view } = *self;
+        let Self { render, dof, view, photons } = self.heeded();
         key.add(&render, of).flag(dof).choice(view.sampled());
         // All trees give the same hits; these two show the trees themselves.
         match view.shown() {
@@ -39,5 +63,9 @@ impl Fingerprinted for RenderSettings {
             Shown::Light(Measure::Work) => key.choice(render.accel),
             Shown::Light(_) | Shown::FirstHit(_) | Shown::Film(_) => &mut *key,
         };
+        key.flag(photons.is_some());
+        if let Some(PhotonSettings { count, radius, bounces }) = photons {
+            key.u64(count.into()).f32(radius).u64(bounces.into());
+        }
     }
 }

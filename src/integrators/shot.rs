@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::RenderSettings;
+use super::photons::PhotonMaps;
 use crate::control::CancelToken;
 use crate::film::Rect;
 use crate::sampling::PixelSampler;
@@ -20,6 +21,8 @@ pub struct Shot<'a> {
     pub token: &'a CancelToken,
     /// By how much the beam of a pixel grows with the distance; 0 where nothing asks for it, which are textures with levels.
     pub pixel_spread: f32,
+    /// The photons of the samples, where they are gathered.
+    pub photons: Option<&'a PhotonMaps>,
 }
 
 impl<'a> Shot<'a> {
@@ -32,7 +35,7 @@ impl<'a> Shot<'a> {
     ) -> Self {
         let pixel_spread =
             if world.is_mipmapped() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
-        Self { world, settings, block, token, pixel_spread }
+        Self { world, settings, block, token, pixel_spread, photons: None }
     }
 
     /// The random numbers of a slot.

@@ -1,5 +1,6 @@
 //! What becomes of the light that is found: a view takes its parts of it.
 
+use super::queues::PathRay;
 use super::view::{Measure, Parts};
 use crate::math::Vec3;
 
@@ -37,10 +38,12 @@ impl Sink<'_> {
     }
 
     /// Light of a lamp that a path meets after a surface which the eye sees.
-    pub fn add_met(&mut self, slot: u32, radiance: Vec3) {
+    pub fn add_met(&mut self, path: &PathRay, radiance: Vec3) {
         match self.measure {
-            Measure::Radiance(_) => self.add_arrived(slot, radiance, false),
-            Measure::ArrivingShare | Measure::Work => {}
+            Measure::Radiance(parts) if path.history.shows(parts.ways) => {
+                self.add_arrived(path.slot, radiance, false);
+            }
+            Measure::Radiance(_) | Measure::ArrivingShare | Measure::Work => {}
         }
     }
 

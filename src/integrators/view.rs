@@ -26,6 +26,12 @@ choice! {
         Specular = "specular",
         /// What surfaces send out, and what is behind everything.
         Emission = "emission",
+        /// Light that comes to the first diffuse or glossy surface by others.
+        Indirect = "indirect",
+        /// Light that comes there by mirrors and glass alone.
+        Caustic = "caustic",
+        /// How many photons the first pass has around a point, where photons are on.
+        Photons = "photons",
         /// Fraction of the lights' radiance that arrives.
         Shadow = "shadow",
         /// The boxes of the trees over the picture, a colour for each level; faint behind surfaces.
@@ -43,12 +49,16 @@ impl View {
     /// What its numbers are.
     pub fn shown(self) -> Shown {
         let of = |parts: Parts| Shown::Light(Measure::Radiance(parts));
+        let by = |ways: Ways| of(Parts { diffuse: true, specular: true, ways, ..Parts::NONE });
         match self {
             Self::Beauty => of(Parts::ALL),
             Self::Ambient => of(Parts { ambient: true, ..Parts::NONE }),
             Self::Diffuse => of(Parts { diffuse: true, ..Parts::NONE }),
             Self::Specular => of(Parts { specular: true, ..Parts::NONE }),
             Self::Emission => of(Parts { emitted: true, ..Parts::NONE }),
+            Self::Indirect => by(Ways { indirect: true, ..Ways::NONE }),
+            Self::Caustic => by(Ways { caustic: true, ..Ways::NONE }),
+            Self::Photons => Shown::FirstHit(FirstHit::Photons),
             Self::Shadow => Shown::Light(Measure::ArrivingShare),
             Self::Bounds => Shown::Bounds,
             Self::Cost => Shown::Light(Measure::Work),
@@ -118,6 +128,14 @@ pub enum Measure {
 impl Measure {
     /// All radiance.
     pub const ALL: Self = Self::Radiance(Parts::ALL);
+
+    /// How light may come to the first diffuse or glossy surface.
+    pub fn ways(self) -> Ways {
+        match self {
+            Self::Radiance(parts) => parts.ways,
+            Self::ArrivingShare | Self::Work => Ways::ALL,
+        }
+    }
 }
 
 /// Parts of the light that a sample sees.
@@ -131,13 +149,35 @@ pub struct Parts {
     pub diffuse: bool,
     /// The glossy part of it.
     pub specular: bool,
+    /// How it may come to the first diffuse or glossy surface.
+    pub ways: Ways,
+}
+
+/// Ways of light from the lights to the first diffuse or glossy surface that the eye sees, be it by mirrors and glass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ways {
+    /// Straight.
+    pub direct: bool,
+    /// By mirrors and glass alone.
+    pub caustic: bool,
+    /// By others.
+    pub indirect: bool,
+}
+
+impl Ways {
+    /// Any.
+    pub const ALL: Self = Self { direct: true, caustic: true, indirect: true };
+    /// None.
+    pub const NONE: Self = Self { direct: false, caustic: false, indirect: false };
 }
 
 impl Parts {
     /// All of it.
-    pub const ALL: Self = Self { emitted: true, ambient: true, diffuse: true, specular: true };
-    /// Nothing.
-    pub const NONE: Self = Self { emitted: false, ambient: false, diffuse: false, specular: false };
+    pub const ALL: Self =
+        Self { emitted: true, ambient: true, diffuse: true, specular: true, ways: Ways::ALL };
+    /// Nothing; what is added to it comes by all ways.
+    pub const NONE: Self =
+        Self { emitted: false, ambient: false, diffuse: false, specular: false, ways: Ways::ALL };
 }
 
 /// A number about the first hit.
@@ -153,4 +193,6 @@ pub enum FirstHit {
     Uv,
     /// [`View::Albedo`].
     Albedo,
+    /// [`View::Photons`].
+    Photons,
 }

@@ -23,7 +23,7 @@ use crate::geometry::{Ray, ShapeHit};
 use crate::materials::{Bsdf, Mirror, Phong};
 use crate::math::Vec3;
 use crate::sampling::Decision;
-use crate::scene::description::Integrator;
+use crate::scene::description::{Integrator, Shadows};
 use crate::world::{Hit, PACKET};
 
 /// A ray is split in two while the weaker part counts at least this much of its sample; below, chance takes one of them.
@@ -52,8 +52,19 @@ pub fn trace(
         // What arrives of the lamps' light is asked at what the eye sees.
         Integrator::Path => sink.measure != Measure::ArrivingShare,
     };
-    let mut wave =
-        Wave { depth: 0, is_path, onward: None, shot, lit, sink, next, crossing, place: 0, counters };
+    let mut wave = Wave {
+        depth: 0,
+        is_path,
+        has_steps: is_path || shot.photons.is_some(),
+        onward: None,
+        shot,
+        lit,
+        sink,
+        next,
+        crossing,
+        place: 0,
+        counters,
+    };
     wave.begin_round();
     wave.lit.expect(slots.len(), shot.pixel_spread > 0.0);
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
@@ -69,7 +80,7 @@ pub fn trace(
     wave.next_round(rays);
     while !rays.is_empty() {
         wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
-        if wave.is_path {
+        if wave.has_steps {
             shot.closest_hits(rays, hits)?;
             by_object.sort(hits);
             for places in by_object.places().chunks(PACKET) {
@@ -93,6 +104,8 @@ struct Wave<'a, 's> {
     /// Scatterings before the hits of this round.
     depth: u32,
     is_path: bool,
+    /// Whether rays go on from diffuse and glossy surfaces: paths, or one step to where photons are gathered.
+    has_steps: bool,
     /// How paths go on from Phong surfaces; none: they end there.
     onward: Option<Onward>,
     shot: &'a Shot<'a>,
@@ -110,7 +123,7 @@ struct Wave<'a, 's> {
 impl Wave<'_, '_> {
     fn light(&mut self) -> Result<(), Cancelled> {
         let before = self.next.len();
-        let rays = self.lit.light(self.shot, self.sink.measure, self.onward, self.next)?;
+        let rays = self.lit.light(self.shot, self.sink.measure, (self.depth, self.onward), self.next)?;
         self.counters.shadow_rays += rays.shadow;
         self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
@@ -118,7 +131,7 @@ impl Wave<'_, '_> {
     }
 
     fn begin_round(&mut self) {
-        self.onward = self.is_path.then(|| Onward::new(self.shot, self.depth));
+        self.onward = self.has_steps.then(|| Onward::new(self.shot, self.depth));
     }
 
     /// The rays of the next round are those that were found; what is in their place is memory.
@@ -197,11 +210,21 @@ impl Wave<'_, '_> {
 
     /// What a path meets of radiance that is sent out; light samples find the rest of it.
     fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
+        if self.is_gathered(path) {
+            return;
+        }
         if path.history.is_seen {
             self.sink.add(path.slot, Part::Emitted, path.throughput * radiance);
         } else {
-            self.sink.add_met(path.slot, path.throughput * radiance * weight);
+            self.sink.add_met(path, path.throughput * radiance * weight);
         }
+    }
+
+    /// Whether the light that a step meets is found in another way: by photons behind mirrors and glass, and by light samples alone
+    /// where these make hard shadows.
+    fn is_gathered(&self, path: &PathRay) -> bool {
+        let is_step = self.shot.photons.is_some() && !path.history.is_seen;
+        is_step && !(path.history.density > 0.0 && self.shot.settings.render.shadows == Shadows::Soft)
     }
 
     fn leave(&mut self, path: &PathRay) {
@@ -213,8 +236,8 @@ impl Wave<'_, '_> {
         if path.history.is_seen {
             let background = self.shot.settings.render.background;
             self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
-        } else if beyond != Vec3::ZERO {
-            self.sink.add_met(path.slot, path.throughput * beyond);
+        } else if beyond != Vec3::ZERO && !self.is_gathered(path) {
+            self.sink.add_met(path, path.throughput * beyond);
         }
     }
 
@@ -308,7 +331,8 @@ impl Wave<'_, '_> {
         let mirrored = |weight: f32| reflected(&path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
-        if weaker >= LEAST_SPLIT && !self.is_path {
+        let splits = !self.is_path && path.history.is_seen;
+        if weaker >= LEAST_SPLIT && splits {
             self.push_reflected(mirrored(reflectance));
             self.push_refracted(refracted, 1.0 - reflectance);
         } else if self.shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
@@ -333,8 +357,8 @@ impl Wave<'_, '_> {
 
     fn spared(&self, ray: PathRay) -> Option<PathRay> {
         match self.onward {
-            Some(onward) => onward.spared(self.shot, ray),
-            None => Some(ray),
+            Some(onward) if self.is_path || !ray.history.is_seen => onward.spared(self.shot, ray),
+            Some(_) | None => Some(ray),
         }
     }
 }

@@ -119,6 +119,27 @@ impl Environment {
         if density > 0.0 { 1.0 / density } else { 0.0 }
     }
 
+    /// A unit direction to its light, and radiance over its density; the direction is any, not one that a surface sees.
+    pub fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        match self {
+            Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
+            Self::Map { sky, factor, turn } => {
+                let direction = sky.sample(u, *turn);
+                let (color, density) = sky.lookup(direction, *turn);
+                // At the edge of a dark cell rounding may lead into it.
+                (direction, color * *factor * if density > 0.0 { 1.0 / density } else { 0.0 })
+            }
+        }
+    }
+
+    /// The mean of the radiance over all directions.
+    pub fn mean(&self) -> Vec3 {
+        match self {
+            Self::Constant(radiance) => *radiance,
+            Self::Map { sky, factor, .. } => sky.mean() * *factor,
+        }
+    }
+
     /// A way for its light to arrive at a surface of this normal.
     pub fn sample(&self, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let direction = match self {

@@ -3,6 +3,7 @@
 use super::tree::{LightBounds, LightTree, MOST_WITHOUT};
 use super::triangle::TriangleEmitter;
 use super::{End, LightSample, Met, Source};
+use crate::geometry::AreaPoint;
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
@@ -41,6 +42,16 @@ impl MeshEmitter {
     /// The numbers that its triangles have in their object.
     pub fn primitives(&self) -> impl Iterator<Item = u32> {
         self.triangles.iter().map(|(_, primitive)| *primitive)
+    }
+
+    /// A point of one of its triangles, uniform over it, with the triangle's area and its number in the object.
+    pub fn place(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
+        let ([a, b, c], primitive) = &self.triangles[index];
+        let weights = warp::triangle(u).as_dvec3();
+        let point = *a * weights.x + *b * weights.y + *c * weights.z;
+        let vector_area = (*b - *a).cross(*c - *a) * 0.5;
+        let area = vector_area.length();
+        (AreaPoint { point, normal: vector_area / area }, area, *primitive)
     }
 
     /// Where the triangles are and what they send, for a unit of radiance.

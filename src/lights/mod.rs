@@ -4,6 +4,7 @@ pub mod cuboid;
 pub mod directional;
 pub mod disk;
 mod each;
+pub mod emission;
 pub mod emitter;
 pub mod environment;
 mod linear;
@@ -23,6 +24,7 @@ pub mod tree;
 pub mod triangle;
 
 pub use directional::DirectionalLight;
+pub use emission::{Ball, Emitted, Numbers, Outline, PhotonSource, Start};
 pub use emitter::{AreaLight, Part, area_light};
 pub use environment::Environment;
 pub use pattern::{Chart, Patch, Pattern};

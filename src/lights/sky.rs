@@ -4,10 +4,10 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use crate::materials::texels::Texels;
-use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::elementary::{atan2, sin_cos};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
 
 /// A map, top row at +y, the middle of it towards −z, its right quarter towards +x, with the distribution that its directions
@@ -71,6 +71,24 @@ impl SkyMap {
     /// The mean of the luminance over all directions.
     pub fn mean_luminance(&self) -> f64 {
         self.mean_luminance
+    }
+
+    /// The mean of the colours over all directions: between the middles of rows they are linear in the angle from the top.
+    pub fn mean(&self) -> Vec3 {
+        let rows = self.texels.height;
+        let step = std::f64::consts::PI / f64::from(rows);
+        let (sin, cos) = (|row: f64| libm::sin((row + 0.5) * step), |row: f64| libm::cos((row + 0.5) * step));
+        let of_row = |row: u32| {
+            let sum: DVec3 = (0..self.texels.width).map(|x| self.texels.get(x, row).as_dvec3()).sum();
+            let at = f64::from(row);
+            // ∫ sin θ dθ of what it is above it, and below it.
+            let above = if row == 0 { 1.0 - cos(at) } else { (sin(at) - sin(at - 1.0)) / step - cos(at) };
+            let is_last = row + 1 == rows;
+            let below = if is_last { 1.0 + cos(at) } else { cos(at) - (sin(at + 1.0) - sin(at)) / step };
+            sum * (above + below)
+        };
+        let sum: DVec3 = (0..rows).map(of_row).sum();
+        (sum / (2.0 * f64::from(self.texels.width))).as_vec3()
     }
 
     /// The colour in a unit direction, and the density in sr⁻¹ with which samples have it. `turn` are the turns of the map

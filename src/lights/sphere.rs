@@ -59,6 +59,6 @@ impl SphereEmitter {
 
 /// 1 − cos of the angle whose sin² this is, up to 90°.
 #[inline(always)]
-fn one_minus_cos(sin2: f32) -> f32 {
+pub(super) fn one_minus_cos(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).sqrt())
 }

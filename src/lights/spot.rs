@@ -5,7 +5,9 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use super::tree::bounds::{EmissionCone, LightBounds};
 use super::{End, LightSample, PointLight, Source};
 use crate::math::Vec3;
-use crate::math::elementary::acos;
+use crate::math::elementary::{acos, sin_cos};
+use crate::math::frame::Frame;
+use crate::sampling::warp;
 
 /// A point light that shines into a cone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +45,7 @@ impl SpotLight {
 
     /// The share of the intensity on the axis that it sends into a direction.
     #[inline(always)]
-    fn share(&self, away: Vec3) -> f32 {
+    pub fn share(&self, away: Vec3) -> f32 {
         // The sine of half the angle, which is exact where the cosine of a small one is not.
         let half_sine = (away - self.axis).length() * 0.5;
         let half_sine = if half_sine < 1.0 { half_sine } else { 1.0 };
@@ -53,6 +55,87 @@ impl SpotLight {
         let share = if inside < fade { inside / fade } else { 1.0 };
         if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
     }
+
+    /// The power over the intensity on the axis, in sr: that of the inner cone of the half angle (1 − blend)·H, and the integral
+    /// of (H − θ)/(blend·H) over the directions around it.
+    pub fn solid_angle(&self) -> f64 {
+        let Cones { inner, faded, .. } = self.cones();
+        inner + faded
+    }
+
+    /// A direction that its light goes into, by numbers in [0, 1), with a density that its share has.
+    pub fn direction(&self, u: [f32; 2]) -> Vec3 {
+        let Cones { half, width, inner, faded } = self.cones();
+        let goal = f64::from(u[0]) * (inner + faded);
+        let local = if goal < inner {
+            let one_minus_cos = (goal / (2.0 * std::f64::consts::PI)) as f32;
+            warp::cone([1.0, u[1]], one_minus_cos)
+        } else {
+            let part = ((inner + faded - goal) / faded).clamp(0.0, 1.0);
+            let angle = half - from_edge(half, width, part);
+            let (sin, cos) = libm::sincos(angle);
+            let (sin_phi, cos_phi) = sin_cos(2.0 * PI * u[1]);
+            Vec3::new(sin as f32 * cos_phi, sin as f32 * sin_phi, cos as f32)
+        };
+        Frame::from_normal(self.axis).to_world(local)
+    }
+
+    fn cones(&self) -> Cones {
+        let half = f64::from(self.half_angle);
+        let width = f64::from(self.blend) * half;
+        let sin = libm::sin((half - width) * 0.5);
+        let faded = if width > 0.0 { edge(half, width) / width } else { 0.0 };
+        let full = 2.0 * std::f64::consts::PI;
+        Cones { half, width, inner: full * 2.0 * sin * sin, faded: full * faded }
+    }
+}
+
+/// The cone of a spotlight.
+struct Cones {
+    /// Half its angle.
+    half: f64,
+    /// The part of that over which it fades.
+    width: f64,
+    /// Power of the inner part over the intensity on the axis, in sr.
+    inner: f64,
+    /// The same of the outer part.
+    faded: f64,
+}
+
+/// ∫ t·sin(H − t) dt from the edge of a cone inwards to δ; of small angles by the first terms of the sine, whose rest is less
+/// than 1e-9 of it.
+fn edge(half: f64, delta: f64) -> f64 {
+    if half < 0.02 {
+        let (h2, d2) = (half * half, delta * delta);
+        let third = h2 * half / 2.0 - h2 * delta + 0.75 * half * d2 - d2 * delta / 5.0;
+        return d2 * (half / 2.0 - delta / 3.0 - third / 6.0);
+    }
+    delta * libm::cos(half - delta) - 2.0 * libm::cos(half - 0.5 * delta) * libm::sin(0.5 * delta)
+}
+
+/// The way from the edge of a cone inwards, in [0, width], behind which there is a part of all that [`edge`] sums up: Newton's
+/// method between bounds.
+fn from_edge(half: f64, width: f64, part: f64) -> f64 {
+    let goal = part * edge(half, width);
+    let (mut low, mut high) = (0.0, width);
+    // Near the edge the sum goes by the square, or by the cube where the cone is as wide as there is.
+    let mut delta = width * part.sqrt();
+    for _ in 0..60 {
+        let off = edge(half, delta) - goal;
+        if off > 0.0 {
+            high = delta
+        } else {
+            low = delta
+        }
+        let next = delta - off / (delta * libm::sin(half - delta));
+        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+        let is_there = (next - delta).abs() <= 1e-9 * width;
+        delta = next;
+        if is_there {
+            break;
+        }
+    }
+    delta
 }
 
 #[cfg(test)]

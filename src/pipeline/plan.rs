@@ -8,10 +8,10 @@ use super::targets::NamedBy;
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
-use crate::integrators::{FirstHit, Measure, RenderSettings, Shown};
+use crate::integrators::{FirstHit, Measure, PhotonSettings, RenderSettings, Shown};
 use crate::math::Vec3;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Integrator, MaterialKind, Render, Scene, Tonemap};
+use crate::scene::description::{Accel, Falloff, Integrator, Light, MaterialKind, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -49,6 +49,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         render,
         dof: overrides.dof != Some(false) && aperture > 0.0,
         view: overrides.view.unwrap_or(View::Beauty),
+        photons: overrides.photons.unwrap_or(scene.photons.enabled).then(|| photons(&scene.photons)),
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
@@ -70,8 +71,18 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     })
 }
 
+/// Photons that a pass may send: what it stores must have room.
+const MOST_PHOTONS: u64 = 4_000_000;
+
+/// How photons are sent and gathered.
+fn photons(asked: &Photons) -> PhotonSettings {
+    let Photons { enabled: _, count, radius, bounces } = *asked;
+    PhotonSettings { count: count.clamp(1, MOST_PHOTONS) as u32, radius: radius as f32, bounces }
+}
+
 /// What a person should know of the integrator that was asked for.
-pub(super) fn warnings(scene: &Scene, render: &Render) -> Vec<String> {
+pub(super) fn warnings(scene: &Scene, settings: &RenderSettings) -> Vec<String> {
+    let RenderSettings { render, photons, .. } = &settings.heeded();
     let is_path = match render.integrator {
         Integrator::Path => true,
         Integrator::Whitted => false,
@@ -89,13 +100,33 @@ pub(super) fn warnings(scene: &Scene, render: &Render) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if render.heeded().clamp > 0.0 {
+    if photons.is_some() && scene.lights.iter().any(is_steady) {
+        warnings.push(
+            "photons carry no light of `falloff = \"none\"`: it bounces no further than to the next surface"
+                .to_owned(),
+        );
+    }
+    if photons.is_some() && scene.photons.count > MOST_PHOTONS {
+        warnings.push(format!(
+            "a pass sends {MOST_PHOTONS} photons at most, for their memory: `count` is larger"
+        ));
+    }
+    if render.clamp > 0.0 {
         warnings.push(format!(
             "`clamp` {} makes the picture less noisy, but too dark: it is biased",
             render.clamp
         ));
     }
     warnings
+}
+
+/// Whether distance does not weaken a light.
+fn is_steady(light: &Light) -> bool {
+    match light {
+        Light::Point(light) => light.falloff == Falloff::None,
+        Light::Spot(light) => light.point.falloff == Falloff::None,
+        Light::Directional(_) => false,
+    }
 }
 
 /// A scene may be large: it is copied only where it has to be another one.
@@ -159,7 +190,9 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
         Shown::FirstHit(FirstHit::Depth) => {
             ToneMapping { stretch: Stretch::Unknown(Kind::Distances), ..ToneMapping::DATA }
         }
-        Shown::Light(Measure::Work) | Shown::Film(Quantity::Samples | Quantity::Error) => {
+        Shown::Light(Measure::Work)
+        | Shown::FirstHit(FirstHit::Photons)
+        | Shown::Film(Quantity::Samples | Quantity::Error) => {
             ToneMapping { stretch: Stretch::Unknown(Kind::Amounts), ..ToneMapping::DATA }
         }
         Shown::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {

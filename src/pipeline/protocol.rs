@@ -305,6 +305,8 @@ pub struct Report {
     pub settings: Effective,
     /// The lights, and how vertices sample them.
     pub lights: LightsReport,
+    /// The photons that were sent for it; none where nothing gathers them.
+    pub photons: Option<PhotonsReport>,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
     /// What was done.
@@ -362,6 +364,29 @@ pub struct LightsReport {
     pub tree_nodes: u64,
     /// Bytes held by trees over lights, and over the triangles of lights.
     pub memory_bytes: u64,
+}
+
+/// The photons of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct PhotonsReport {
+    /// Passes that were sent; others were kept from before.
+    pub passes: u64,
+    /// Photons that were sent.
+    pub emitted: u64,
+    /// Photons of them that were stored.
+    pub stored: u64,
+    /// Seconds that it took to send and store them.
+    pub seconds: f64,
+    /// Photons sent in each of these seconds.
+    pub per_second: f64,
+    /// Radius of the first pass's kernel for caustics.
+    pub caustic_radius: f32,
+    /// Radius of the first pass's kernel for all photons.
+    pub radius: f32,
+    /// Bytes held by maps that are kept.
+    pub kept_memory_bytes: u64,
+    /// Most bytes of maps that were in use at once.
+    pub used_memory_bytes: u64,
 }
 
 /// How many lights a surface samples.

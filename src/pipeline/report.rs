@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::inputs::Inputs;
 use super::plan::Plan;
 use super::protocol::{
-    Counters, ImageReport, LightsReport, LightsSampled, Report, SampleCounts, StageReport,
+    Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts, StageReport,
 };
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
@@ -27,6 +27,7 @@ pub(super) struct Finished<'a> {
     pub(super) rays: RayCounters,
     pub(super) texels_loaded: u64,
     pub(super) texture_memory_bytes: u64,
+    pub(super) photons: Option<PhotonsReport>,
     pub(super) is_written: bool,
 }
 
@@ -37,6 +38,7 @@ pub(super) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds:
         image: image(finished),
         settings: finished.plan.effective.clone(),
         lights: lights(finished),
+        photons: finished.photons,
         stages,
         counters: counters(finished),
         seconds,
@@ -109,8 +111,8 @@ fn counters(finished: &Finished<'_>) -> Counters {
         reflected_rays: rays.reflected_rays,
         refracted_rays: rays.refracted_rays,
         scattered_rays: rays.scattered_rays,
-        photons_emitted: 0,
-        photons_stored: 0,
+        photons_emitted: finished.photons.map_or(0, |photons| photons.emitted),
+        photons_stored: finished.photons.map_or(0, |photons| photons.stored),
         texels_loaded: finished.texels_loaded,
         texture_memory_bytes: finished.texture_memory_bytes,
         texture_lookups: rays.texture_lookups,

@@ -107,16 +107,15 @@ pub struct Effective {
 
 impl Effective {
     pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
-        let RenderSettings { render, dof, view } = *settings;
+        let RenderSettings { render, dof, view, photons } = settings.heeded();
         Self {
             width: render.width,
             height: render.height,
             samples: render.samples,
             integrator: render.integrator,
-            shadows: render.shadows,
-            clamp: render.heeded().clamp,
-            // The integrators of this version gather no photons, whatever is asked for.
-            photons: false,
+            shadows: settings.render.shadows,
+            clamp: render.clamp,
+            photons: photons.is_some(),
             dof,
             accel: render.accel,
             view,

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Rect, TileSamples};
-use crate::integrators::{RayCounters, RenderSettings};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_by};
 use crate::world::World;
 
 /// What renders a tile: see [`crate::integrators::render_tile`].
@@ -32,6 +32,8 @@ pub(super) struct Tracer<'a> {
     pub(super) world: &'a World,
     pub(super) settings: &'a RenderSettings,
     pub(super) token: &'a CancelToken,
+    /// Those of the samples of all jobs, where they are gathered.
+    pub(super) photons: Option<&'a PhotonMaps>,
 }
 
 /// Samples of one tile that are to be made.
@@ -43,6 +45,14 @@ pub(super) struct Job {
 }
 
 impl Tracer<'_> {
+    fn trace(&self, job: &Job) -> Result<(TileSamples, RayCounters), Cancelled> {
+        let Self { kernel, world, settings, token, photons, .. } = *self;
+        match photons {
+            Some(_) => render_tile_by(photons, world, settings, job.rect, job.samples.clone(), token),
+            None => kernel(world, settings, job.rect, job.samples.clone(), token),
+        }
+    }
+
     /// Do the jobs. `keep` takes the samples of every job that is finished, on the thread that made them, in whose cache they
     /// are; `each` is then told on this one, in the order in which they end, and every now and then nothing; it says whether
     /// to go on. Jobs that have begun are finished.
@@ -67,13 +77,7 @@ impl Tracer<'_> {
                     let _guard = StopOnPanic(stopped);
                     while !stopped.load(Ordering::Relaxed)
                         && let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed))
-                        && let Ok((samples, rays)) = (self.kernel)(
-                            self.world,
-                            self.settings,
-                            job.rect,
-                            job.samples.clone(),
-                            self.token,
-                        )
+                        && let Ok((samples, rays)) = self.trace(job)
                         && sender.send((job, keep(job, samples), rays)).is_ok()
                     {}
                 });

@@ -25,6 +25,12 @@ impl Discrete {
         self.sums.last().copied().unwrap_or(0.0)
     }
 
+    /// The probability of an index.
+    pub fn share(&self, index: usize) -> f64 {
+        let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
+        (self.sums[index] - before) / self.total()
+    }
+
     /// The index that `u` in [0, 1) falls on, and where in its share `u` is, in [0, 1).
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let target = f64::from(u) * self.total();
@@ -51,6 +57,7 @@ mod tests {
             rests += rest;
         }
         assert_eq!(counts, [250, 0, 750, 0]);
+        assert_eq!([0, 1, 2, 3].map(|index| distribution.share(index)), [0.25, 0.0, 0.75, 0.0]);
         assert!((rests / 1000.0 - 0.5).abs() < 0.01);
         assert_eq!(distribution.sample(1.0_f32.next_down()).0, 2);
         assert_eq!(Discrete::new([0.0]), None);

@@ -29,6 +29,14 @@ pub enum Decision {
     Roulette,
     /// Whether to go on at all from a mirror or glass: another decision than that of the vertex after it, which has the same path.
     Spared,
+    /// Which light a photon starts at, and which piece of it.
+    Lamp,
+    /// Whether a photon is aimed, and at what.
+    Aim,
+    /// Where on its light a photon starts.
+    Start,
+    /// Where to a photon is sent.
+    Sent,
 }
 
 impl Decision {
@@ -46,7 +54,11 @@ impl Decision {
             Self::Pick => u32::MAX - 6,
             Self::Picked => u32::MAX - 7,
             Self::Trace => u32::MAX - 8,
-            Self::Spared => u32::MAX - 9,
+            Self::Lamp => u32::MAX - 9,
+            Self::Aim => u32::MAX - 10,
+            Self::Start => u32::MAX - 11,
+            Self::Sent => u32::MAX - 12,
+            Self::Spared => u32::MAX - 13,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }

@@ -40,6 +40,13 @@ pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
     Vec3::new(sin * cos_phi, sin * sin_phi, 1.0 - one_minus_cos)
 }
 
+/// Unit vectors before z with a density of cos θ/π (Malley's method: *Physically Based Rendering*, 4th ed., section 13.6.3).
+#[inline(always)]
+pub fn cosine(u: [f32; 2]) -> Vec3 {
+    let at = disk(Vec2::from_array(u));
+    at.extend((1.0 - at.length_squared()).max(0.0).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,6 +71,15 @@ mod tests {
         assert!((mean - Vec3::splat(1.0 / 3.0)).length() < 2e-3);
         let corner = grid().filter(|&u| triangle(u).x > 0.5).count();
         assert!((corner as i32 - 2500).abs() < 60);
+    }
+
+    #[test]
+    fn the_cosine_is_the_density() {
+        let moment = |of: fn(Vec3) -> f32| grid().map(|u| of(cosine(u.to_array()))).sum::<f32>() / 1e4;
+        // ∫cos²/π, ∫cos³/π, and nothing to any side.
+        assert!((moment(|d| d.z) - 2.0 / 3.0).abs() < 1e-3 && (moment(|d| d.z * d.z) - 0.5).abs() < 1e-3);
+        assert!(moment(|d| d.x).abs() < 1e-3 && moment(|d| d.y).abs() < 1e-3);
+        assert!(grid().all(|u| (cosine(u.to_array()).length() - 1.0).abs() < 1e-6));
     }
 
     #[test]

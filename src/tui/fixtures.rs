@@ -172,6 +172,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         range: None,
     };
     let report = Report {
+        photons: None,
         glimt: "0.1.0",
         scene: "scenes/cornell.toml".to_owned(),
         image,

@@ -34,7 +34,7 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
     binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", "shadows"),
     binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", "dof"),
-    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons: not in this version", ""),
+    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on, off", ""),
     binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", "path"),
     binding(&[KeyPress::plain('v')], "v", Action::NextView, "next view: normals, depth, …", "view"),
     binding(&[KeyPress::plain('V')], "V", Action::PreviousView, "previous view", ""),

@@ -26,6 +26,7 @@ pub(super) struct Toggles {
     pub shadows: Option<Shadows>,
     pub integrator: Option<Integrator>,
     pub dof: Option<bool>,
+    pub photons: Option<bool>,
     pub view: Option<View>,
 }
 
@@ -221,6 +222,7 @@ impl State {
         overrides.shadows = self.toggles.shadows.or(overrides.shadows);
         overrides.integrator = self.toggles.integrator.or(overrides.integrator);
         overrides.dof = self.toggles.dof.or(overrides.dof);
+        overrides.photons = self.toggles.photons.or(overrides.photons);
         overrides.view = self.toggles.view.or(overrides.view);
         overrides
     }
@@ -238,6 +240,12 @@ impl State {
     pub(super) fn shadows(&self) -> Shadows {
         let of_scene = self.effective.as_ref().map_or(Shadows::Soft, |effective| effective.shadows);
         self.overrides().shadows.unwrap_or(of_scene)
+    }
+
+    /// Whether photons are on now.
+    pub(super) fn photons(&self) -> bool {
+        let of_scene = self.effective.as_ref().is_some_and(|effective| effective.photons);
+        self.overrides().photons.unwrap_or(of_scene)
     }
 
     /// The integrator that holds now.

@@ -149,6 +149,22 @@ impl World {
         self.glass_at_eye.iter().copied().filter(is_inside)
     }
 
+    /// The closed shapes of glass, by their objects and materials.
+    pub fn closed_glasses(&self) -> impl Iterator<Item = (u32, u32)> {
+        (0..self.geometry.objects().len() as u32).filter_map(|id| {
+            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
+            (self.is_closed(id) && self.is_glass(material)).then_some((id, material))
+        })
+    }
+
+    /// Whether an object is a shape that has a point inside.
+    pub fn encloses(&self, object: u32, point: Vec3) -> bool {
+        match &self.geometry.objects()[object as usize] {
+            Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
+            Object::Mesh(_) => false,
+        }
+    }
+
     /// Whether no part of the lens is in a closed shape of glass.
     pub fn is_eye_in_air(&self) -> bool {
         self.glass_at_eye.is_empty()

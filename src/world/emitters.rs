@@ -8,8 +8,8 @@ use crate::geometry::Shape;
 use crate::lights::emitter::{Emitter, Part};
 use crate::lights::mesh::MeshEmitter;
 use crate::lights::{
-    AreaLight, Chart, DirectionalLight, Environment, Light, LightBounds, Lights, Patch, Pattern, PointLight,
-    SkyMap, SpotLight, area_light,
+    AreaLight, Ball, Chart, DirectionalLight, Environment, Light, LightBounds, Lights, Patch, Pattern,
+    PhotonSource, PointLight, SkyMap, SpotLight, area_light,
 };
 use crate::materials::Emission;
 use crate::materials::texels::Texels;
@@ -40,6 +40,13 @@ pub fn lights(scene: &Scene, geometry: &Geometry, images: &Images, sky: Option<A
     let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));
     let all = points.chain(environment.map(Light::Environment)).chain(areas.map(Light::Area));
     Arc::new(Lights::new(all.collect()))
+}
+
+/// What the lights of a scene with these objects send; none where they send nothing.
+pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonSource> {
+    let outline = |object: u32| geometry.objects().get(object as usize).map(Object::outline);
+    let balls: Vec<Ball> = geometry.objects().iter().filter_map(Object::ball).collect();
+    PhotonSource::new(lights, outline, Ball::around(&balls))
 }
 
 /// Light from all around; none where it is black.

@@ -84,6 +84,11 @@ impl Geometry {
     }
 
     /// The objects that have none.
+    /// Whether any object has no end.
+    pub fn has_unbounded(&self) -> bool {
+        !self.unbounded.is_empty()
+    }
+
     pub(super) fn unbounded(&self) -> &[u32] {
         &self.unbounded
     }

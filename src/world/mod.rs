@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub use crate::accel::{Cell, Loops, PACKET, Stretch};
 pub use camera::Camera;
 pub use contact::{Meeting, Near, NearTriangles, Sides};
-pub use emitters::{lights, sky};
+pub use emitters::{lights, photon_source, sky};
 pub use geometry::{Geometry, Hit};
 pub use lower::file_emits;
 pub use mesh_instance::MeshInstance;

@@ -3,7 +3,9 @@
 use super::mesh_instance::MeshInstance;
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::sphere::Sphere;
 use crate::geometry::{Aabb, Asked, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
+use crate::lights::{Ball, Outline};
 
 /// A thing that rays can hit.
 #[derive(Clone, Debug)]
@@ -80,6 +82,24 @@ impl Object {
         match self {
             Self::Shape(shape) => shape.bounds(),
             Self::Mesh(mesh) => Some(mesh.bounds()),
+        }
+    }
+
+    /// A ball around it; none where it has no end, or is nothing.
+    pub fn ball(&self) -> Option<Ball> {
+        if let Self::Shape(Shape::Sphere(Sphere { center, radius })) = self {
+            return Some(Ball { center: *center, radius: *radius });
+        }
+        let bounds = self.bounds().filter(|bounds| !bounds.is_empty())?;
+        let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+        Some(Ball { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 })
+    }
+
+    /// How it is told to lights that are objects.
+    pub(super) fn outline(&self) -> Outline {
+        match self {
+            Self::Shape(shape) => Outline::Shape(*shape),
+            Self::Mesh(mesh) => Outline::Mesh { rounding: mesh.rounding() },
         }
     }
 

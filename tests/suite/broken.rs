@@ -349,7 +349,6 @@ const BROKEN: &[(&str, &[Said])] = &[
         "warnings",
         &[
             (1, 1, "warning: nothing lights this scene"),
-            (7, 11, "warning: this version does not render photons"),
             (9, 11, r#"warning: the texture "bricks" is not used"#),
             (
                 14,

@@ -200,7 +200,7 @@ fn what_is_wrong_with_the_call_is_not_said_of_the_scene() {
 #[test]
 fn options_that_change_nothing_are_told() {
     let desk = Desk::new();
-    let stderr = desk.expect("ball.toml --once --dof on --photons on --progress none", 0);
+    let stderr = desk.expect("ball.toml --once --dof on --photons on --integrator path --progress none", 0);
     let warning = "warning: --dof on has no effect: the scene's camera is a pinhole";
     assert!(stderr.contains(warning) && stderr.contains("--photons on has no effect"), "{stderr}");
     assert!(stderr.ends_with("2 warnings\n"), "{stderr}");

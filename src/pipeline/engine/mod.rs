@@ -25,12 +25,13 @@ use super::stages::films::Films;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
+use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::preview::Screen;
 use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
 use super::stages::world::{Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
-use super::stages::{Findings, Reading, Staged, Stop, keys, photons::photons};
+use super::stages::{Findings, Reading, Staged, Stop, keys};
 use super::table::StageTable;
 use super::targets::{NamedBy, conflicts};
 use super::trace::{Kernel, Tracer};
@@ -38,6 +39,7 @@ use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
+use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
@@ -70,6 +72,7 @@ pub(super) struct Engine {
     lights: Memo<Arc<Lights>>,
     sky: SkyMemo,
     world: Memo<Arc<World>>,
+    photons: PhotonCache,
     films: Films,
     written: Written,
     /// What the current film is rendered by.
@@ -106,6 +109,9 @@ struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
     world: Keyed,
+    /// What light meets, and where its coordinates start.
+    surfaces: Key,
+    origin: DVec3,
     texels_loaded: u64,
     texture_memory_bytes: u64,
 }
@@ -122,6 +128,7 @@ impl Engine {
             lights: Memo::default(),
             sky: SkyMemo::default(),
             world: Memo::default(),
+            photons: PhotonCache::default(),
             films: Films::default(),
             written: Written::default(),
             plan: None,
@@ -190,11 +197,17 @@ impl Engine {
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
         let ready = self.prepare(request, &mut table, reading, findings)?;
-        table.run(Stage::Photons, || {
-            Ok(photons(ready.plan.scene.photons.enabled, request.overrides.photons))
-        })?;
+        let pool = self.pool(ready.plan.threads)?;
+        let (plan, world) = (&ready.plan, &ready.world.1);
+        let sending = Sending { world, plan, pool: &pool, token: meanwhile.token, sink };
+        let asked = (plan.scene.photons.enabled, request.overrides.photons);
+        let key =
+            |of_photons| keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
+        let store = &mut self.photons;
+        table.run(Stage::Photons, || Ok(photons(asked, key, store, sending)?))?;
+        let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
-        let rays = table.run(Stage::Render, || self.render(request, &ready, sink, meanwhile))?;
+        let rays = table.run(Stage::Render, || self.render(request, &ready, photons_key, sink, meanwhile))?;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
         let is_written = table
@@ -209,6 +222,7 @@ impl Engine {
             rays,
             texels_loaded: ready.texels_loaded,
             texture_memory_bytes: ready.texture_memory_bytes,
+            photons: photons_key.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
             is_written,
         };
         Ok(report(&finished, table.stages, begin.elapsed().as_secs_f64()))
@@ -227,7 +241,7 @@ impl Engine {
         })?;
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-        for warning in warnings(&plan.scene, &plan.settings.render) {
+        for warning in warnings(&plan.scene, &plan.settings) {
             findings.warn(&parsed.loaded, 0..0, warning);
         }
         let settings = Box::new(plan.effective.clone());
@@ -257,8 +271,9 @@ impl Engine {
         let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos));
         let lights = table.run(Stage::Lights, gather)?;
         let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
+        let surfaces = keys::surfaces(scene, &of, &textures.keys);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = textures;
-        Ok(Ready { parsed, plan, world, texels_loaded, texture_memory_bytes })
+        Ok(Ready { parsed, plan, world, surfaces, origin, texels_loaded, texture_memory_bytes })
     }
 
     /// All files that the scene names; every one is tried before the first error ends it.
@@ -290,6 +305,7 @@ impl Engine {
         &mut self,
         request: &Request,
         ready: &Ready,
+        photons: Option<Key>,
         sink: &Sink,
         meanwhile: &Meanwhile<'_>,
     ) -> Result<Staged<RayCounters>, Stop> {
@@ -314,8 +330,10 @@ impl Engine {
                 world: &ready.world.1,
                 settings: &plan.settings,
                 token: meanwhile.token,
+                photons: None,
             },
             plan,
+            photons: photons.and_then(|key| self.photons.get(key)),
             preview: request.preview,
             most_film_bytes: self.means.most_film_bytes,
             force: request.force,
@@ -383,7 +401,7 @@ impl Engine {
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             let plan = plan(&loaded.scene, path, &Overrides::default())
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-            for warning in warnings(&plan.scene, &plan.settings.render) {
+            for warning in warnings(&plan.scene, &plan.settings) {
                 findings.warn(loaded, 0..0, warning);
             }
             if plan.named_by == NamedBy::Scene {

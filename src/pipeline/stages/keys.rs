@@ -2,9 +2,9 @@
 //! keys and unused tables change nothing.
 
 use crate::film::Rect;
-use crate::integrators::RenderSettings;
+use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::math::DVec3;
-use crate::scene::description::{Accel, Scene};
+use crate::scene::description::{Accel, Render, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
 /// What the descriptions of a scene refer to by index.
@@ -86,8 +86,26 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
 
 /// Everything that a world is made of but the kind of its trees, which all have the same hits: views that show the trees add it.
 pub(in crate::pipeline) fn world(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
-    let mut key = Fingerprint::new("world");
-    key.key(&shapes(scene, of)).key(&described_lights(scene, of)).add(&scene.camera, of);
+    Fingerprint::new("world").key(&surfaces(scene, of, textures)).add(&scene.camera, of).finish()
+}
+
+/// Everything that photons depend on: what they meet, in coordinates that start somewhere, how they are sent and how far they go.
+pub(in crate::pipeline) fn photons(
+    surfaces: &Key,
+    origin: DVec3,
+    render: &Render,
+    photons: PhotonSettings,
+) -> Key {
+    let PhotonSettings { count, radius, bounces } = photons;
+    let mut key = Fingerprint::new("photons");
+    key.key(&from(surfaces, origin)).u64(count.into()).f32(radius).u64(bounces.into());
+    key.u64(render.max_depth.into()).u64(render.seed.into()).finish()
+}
+
+/// Everything that light meets.
+pub(in crate::pipeline) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
+    let mut key = Fingerprint::new("surfaces");
+    key.key(&shapes(scene, of)).key(&described_lights(scene, of));
     for object in &scene.objects {
         match object.material {
             Some(index) => key.index(1).add(&scene.materials[index], of),
@@ -116,7 +134,7 @@ mod tests {
     use crate::integrators::View;
     use crate::math::Vec3;
     use crate::pipeline::tests::loaded_of;
-    use crate::scene::description::{Integrator, PixelFilter, Render, Shadows, Tonemap};
+    use crate::scene::description::{Integrator, PixelFilter, Shadows, Tonemap};
 
     const BALL: &str = "[materials.m]\ntype = \"phong\"\ndiffuse = [1, 0, 0]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
 
@@ -192,7 +210,7 @@ mod tests {
         let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
         let render_settings = settings.render;
         // Without `..`: a field that is added does not compile until it has a line below.
-        let RenderSettings { render: _, dof, view } = settings;
+        let RenderSettings { render: _, dof, view, photons } = settings;
         let Render {
             width,
             height,
@@ -217,6 +235,10 @@ mod tests {
             (PixelFilter::Box, View::Beauty, Tonemap::None, Accel::Bvh)
         );
         let with = |render: Render| RenderSettings { render, ..settings };
+        assert_eq!(photons, None);
+        let some = PhotonSettings { count: 7, radius: 0.0, bounces: 2 };
+        let with_photons = |photons| RenderSettings { photons: Some(photons), ..settings };
+        let gathering = with_photons(some);
         let others = [
             with(Render { width: width + 1, ..render_settings }),
             with(Render { height: height + 1, ..render_settings }),
@@ -232,7 +254,14 @@ mod tests {
             with(Render { seed: seed + 1, ..render_settings }),
             RenderSettings { dof: !dof, ..settings },
             RenderSettings { view: View::Uv, ..settings },
+            gathering,
+            with_photons(PhotonSettings { count: 8, ..some }),
+            with_photons(PhotonSettings { radius: 0.5, ..some }),
+            with_photons(PhotonSettings { bounces: 3, ..some }),
         ];
+        let lit = Render { ambient: ambient + Vec3::ONE, ..render_settings };
+        assert_eq!(of(&RenderSettings { render: lit, ..gathering }), of(&gathering));
+        assert_eq!(of(&RenderSettings { render: path, ..gathering }), of(&with(path)));
         // The same samples: more of them, shown in another way, or found by another tree.
         for same in [
             Render { samples: samples + 1, ..render_settings },

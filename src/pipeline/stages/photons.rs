@@ -1,12 +1,168 @@
-//! Photon maps, which no integrator of this version gathers.
+//! Photon maps. The stage makes what all passes have in common and the first of them; the others are sent during the render, when
+//! their samples are due. Maps are kept while there is room: pictures that differ in the camera, the exposure or the size alone find
+//! them again.
 
+use std::cell::{Cell, RefCell};
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Instant;
+
+use rayon::ThreadPool;
+
+use super::super::cache::Memo;
+use super::super::plan::Plan;
+use super::super::protocol::PhotonsReport;
+use super::super::sink::Sink;
 use super::Staged;
+use crate::control::{CancelToken, Cancelled, Progress};
+use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons};
+use crate::scene::fingerprint::Key;
+use crate::world::World;
 
-/// Why there are none. `wanted` is what the command line says, `enabled` what the scene says.
-pub(in crate::pipeline) fn photons(enabled: bool, wanted: Option<bool>) -> Staged<()> {
-    match wanted.unwrap_or(enabled) {
-        true => Staged::skipped((), "this version renders no photons"),
-        false if enabled => Staged::skipped((), "switched off for this run"),
-        false => Staged::skipped((), "the scene does not enable photons"),
+/// Memory for maps that are kept from picture to picture.
+const MOST_KEPT_BYTES: usize = 128 << 20;
+/// Memory for maps that are in use at once beside those, unless one alone takes more.
+const MOST_ALIVE_BYTES: usize = 256 << 20;
+/// Passes in use at once.
+const MOST_ALIVE: u32 = 8;
+
+/// What the stage keeps: the photons of the last scene.
+pub(in crate::pipeline) type PhotonCache = Memo<PhotonStore>;
+
+/// What passes are sent by.
+#[derive(Clone, Copy)]
+pub(in crate::pipeline) struct Sending<'a> {
+    pub(in crate::pipeline) world: &'a World,
+    pub(in crate::pipeline) plan: &'a Plan,
+    pub(in crate::pipeline) pool: &'a ThreadPool,
+    pub(in crate::pipeline) token: &'a CancelToken,
+    pub(in crate::pipeline) sink: &'a Sink,
+}
+
+/// The photons of a scene.
+#[derive(Debug)]
+pub(in crate::pipeline) struct PhotonStore {
+    photons: Photons,
+    /// The first passes.
+    kept: RefCell<Vec<Arc<PhotonPass>>>,
+    /// What this request sent.
+    sent: Cell<Sent>,
+}
+
+/// What was sent for a picture.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sent {
+    passes: u64,
+    emitted: u64,
+    stored: u64,
+    seconds: f64,
+    most_alive_bytes: usize,
+}
+
+impl PhotonStore {
+    /// Passes that may be in use at once, of the size of the first.
+    pub(super) fn at_once(&self) -> u32 {
+        let size = self.kept.borrow().first().map_or(1, |pass| pass.memory_bytes().max(1));
+        ((MOST_ALIVE_BYTES / size) as u32).clamp(1, MOST_ALIVE)
     }
+
+    /// The maps of some samples.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub(super) fn maps(&self, samples: Range<u32>, sending: Sending<'_>) -> Result<PhotonMaps, Cancelled> {
+        let first = samples.start;
+        let passes = samples.map(|number| self.pass(number, sending)).collect::<Result<Vec<_>, _>>()?;
+        let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
+        let sent = self.sent.get();
+        self.sent.set(Sent { most_alive_bytes: sent.most_alive_bytes.max(bytes), ..sent });
+        Ok(PhotonMaps { first, passes })
+    }
+
+    fn pass(&self, number: u32, sending: Sending<'_>) -> Result<Arc<PhotonPass>, Cancelled> {
+        if let Some(pass) = self.kept.borrow().get(number as usize) {
+            return Ok(Arc::clone(pass));
+        }
+        let Sending { world, plan, pool, token, .. } = sending;
+        let begin = Instant::now();
+        let photons = &self.photons;
+        let pass = pool.install(|| photons.pass(world, &plan.settings, number, token))?;
+        let pass = Arc::new(pass);
+        let sent = self.sent.get();
+        self.sent.set(Sent {
+            passes: sent.passes + 1,
+            emitted: sent.emitted + pass.emitted,
+            stored: sent.stored + pass.stored(),
+            seconds: sent.seconds + begin.elapsed().as_secs_f64(),
+            ..sent
+        });
+        let has_room = self.kept_bytes() + pass.memory_bytes() <= MOST_KEPT_BYTES;
+        let mut kept = self.kept.borrow_mut();
+        if number as usize == kept.len() && (has_room || number == 0) {
+            kept.push(Arc::clone(&pass));
+        }
+        Ok(pass)
+    }
+
+    fn kept_bytes(&self) -> usize {
+        self.kept.borrow().iter().map(|pass| pass.memory_bytes()).sum()
+    }
+
+    /// What was sent since the stage began, and what is kept.
+    pub(in crate::pipeline) fn report(&self) -> PhotonsReport {
+        let Sent { passes, emitted, stored, seconds, most_alive_bytes } = self.sent.get();
+        let [caustic, _, all] = self.photons.radii();
+        PhotonsReport {
+            passes,
+            emitted,
+            stored,
+            seconds,
+            per_second: if seconds > 0.0 { emitted as f64 / seconds } else { 0.0 },
+            caustic_radius: caustic,
+            radius: all,
+            kept_memory_bytes: self.kept_bytes() as u64,
+            used_memory_bytes: most_alive_bytes as u64,
+        }
+    }
+}
+
+/// Make the first maps for a picture that gathers photons. `wanted` is what the command line says, `enabled` what the scene says.
+///
+/// # Errors
+/// Cancelled.
+pub(in crate::pipeline) fn photons(
+    (enabled, wanted): (bool, Option<bool>),
+    key: impl FnOnce(PhotonSettings) -> Key,
+    cache: &mut PhotonCache,
+    sending: Sending<'_>,
+) -> Result<Staged<()>, Cancelled> {
+    let settings = sending.plan.settings.heeded();
+    let skipped = |why: &str| Ok(Staged::skipped((), why));
+    let Some(of_photons) = settings.photons else {
+        return match wanted.unwrap_or(enabled) {
+            true => skipped("path needs none"),
+            false if enabled => skipped("switched off for this run"),
+            false => skipped("the scene does not enable photons"),
+        };
+    };
+    if !settings.gathers() {
+        return skipped("this view shows nothing of them");
+    }
+    let key = key(of_photons);
+    if let Some(store) = cache.get(key) {
+        store.sent.set(Sent::default());
+        return Ok(Staged::reused((), "nothing that they meet changed"));
+    }
+    let Sending { world, pool, token, .. } = sending;
+    let begin = Instant::now();
+    let send =
+        |progress: Progress<'_>| pool.install(|| Photons::new(world, &settings, of_photons, progress, token));
+    let (photons, first) = sending.sink.asset("photons", send)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let sent =
+        Sent { passes: 1, emitted: first.emitted, stored: first.stored(), seconds, most_alive_bytes: 0 };
+    let kept = RefCell::new(vec![Arc::new(first)]);
+    let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
+    cache.set(key, store);
+    Ok(Staged::done((), ""))
 }

@@ -14,10 +14,11 @@ use super::super::sink::Sink;
 use super::super::trace::{Job, Tracer, next_pass};
 use super::canvas::Canvas;
 use super::films::Films;
+use super::photons::{PhotonStore, Sending};
 use super::preview::Screen;
 use super::{Staged, Stop};
 use crate::film::{RadianceImage, Rect, TileSamples};
-use crate::integrators::{RayCounters, RenderSettings};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 
@@ -32,6 +33,8 @@ const PREVIEW_SHARE: u32 = 10;
 pub(in crate::pipeline) struct Rendering<'a> {
     pub(in crate::pipeline) tracer: Tracer<'a>,
     pub(in crate::pipeline) plan: &'a Plan,
+    /// Where photons are gathered: those of the scene.
+    pub(in crate::pipeline) photons: Option<&'a PhotonStore>,
     pub(in crate::pipeline) preview: Option<PreviewSize>,
     pub(in crate::pipeline) most_film_bytes: u64,
     /// Start from an empty film whatever is kept.
@@ -144,8 +147,22 @@ impl<'a> Painter<'a> {
 
     /// All tiles that have fewer samples than `target`.
     fn pass(&mut self, target: u32) -> Result<(), Stop> {
+        let Some(photons) = self.rendering.photons else { return self.pass_by(target, None) };
+        let Tracer { pool, world, token, .. } = self.rendering.tracer;
+        while !self.canvas.is_complete(target) && !self.is_over_time {
+            let samples = self.canvas.samples();
+            let part = target.min(samples.saturating_add(photons.at_once()));
+            let Rendering { plan, sink, .. } = *self.rendering;
+            let sending = Sending { world, plan, pool, token, sink };
+            let maps = photons.maps(samples..part, sending)?;
+            self.pass_by(part, Some(&maps))?;
+        }
+        Ok(())
+    }
+
+    fn pass_by(&mut self, target: u32, photons: Option<&PhotonMaps>) -> Result<(), Stop> {
         let jobs = self.canvas.jobs(target);
-        let tracer = self.rendering.tracer;
+        let tracer = Tracer { photons, ..self.rendering.tracer };
         let film = Arc::clone(&self.canvas.film);
         let keep = |job: &Job, samples: TileSamples| film.add(job.tile, &samples);
         tracer.run(&jobs, keep, |result| {

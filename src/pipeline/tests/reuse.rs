@@ -136,6 +136,41 @@ fn a_scene_without_files_says_why_stages_are_skipped() {
 }
 
 #[test]
+fn photons_are_sent_again_only_where_what_they_meet_changed() {
+    let mut bench = Bench::new(&format!("{SCENE}[photons]\nenabled = true\ncount = 500\n"));
+    let of = |report: &Report| report.photons.expect("they are on");
+    let report = bench.done().0;
+    assert_statuses(&report, "dddddddd");
+    assert!(report.settings.photons && of(&report).stored > 0);
+    assert_eq!((of(&report).passes, of(&report).emitted), (4, 2000), "one for each sample");
+    assert_eq!((report.counters.photons_emitted, report.counters.photons_stored), (2000, of(&report).stored));
+
+    for (from, to, expected) in [
+        ("position = [0, 1, 4]", "position = [0, 1.5, 4]", "drrrrrdd"),
+        ("exposure = 0.0", "exposure = 1.0", "drrrrrrd"),
+        ("width = 40", "width = 44", "drrrrrdd"),
+    ] {
+        bench.edit(from, to);
+        let report = bench.done().0;
+        assert_statuses(&report, expected);
+        assert_eq!((of(&report).passes, report.counters.photons_emitted), (0, 0), "{to}");
+    }
+    bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
+    assert_statuses(&bench.done().0, "drrrrddd");
+    bench.edit("intensity = [10, 10, 10]", "intensity = [9, 10, 10]");
+    assert_statuses(&bench.done().0, "drrrdddd");
+
+    let on = bench.picture();
+    bench.overrides.photons = Some(false);
+    let report = bench.done().0;
+    assert_statuses(&report, "rrrrrsdd");
+    assert!(report.photons.is_none() && bench.picture() != on);
+    bench.overrides.photons = None;
+    assert_statuses(&bench.done().0, "rrrrrrrd");
+    assert_eq!(bench.picture(), on, "its film was kept");
+}
+
+#[test]
 fn all_assets_that_cannot_be_used_are_said_and_watched_and_mending_them_helps() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.obj", "");

@@ -42,8 +42,13 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             }
         }
         Action::TogglePhotons => {
-            assert!(desk.key(key).is_empty());
-            assert!(desk.text().contains("photons come with a later version"));
+            for wanted in [true, false] {
+                let effects = desk.key(key);
+                assert_eq!(overrides(&effects).expect("a request").photons, Some(wanted));
+            }
+            desk.press('i');
+            assert!(desk.key(key).is_empty(), "path has none");
+            assert!(desk.text().contains("path finds all light without photons"), "{}", desk.text());
         }
         Action::CycleIntegrator => {
             for wanted in [Integrator::Path, Integrator::Whitted] {
@@ -132,8 +137,8 @@ fn the_bottom_line_is_made_from_the_table_until_there_is_a_message() {
     }
     desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert_eq!(bottom(&mut desk), hints);
-    desk.press('p');
-    assert!(bottom(&mut desk).contains("photons come with"));
+    desk.press('0');
+    assert!(bottom(&mut desk).contains("the keys have changed nothing"));
     desk.press('?');
     desk.press('?');
     assert_eq!(bottom(&mut desk), hints);

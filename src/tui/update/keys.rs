@@ -22,7 +22,7 @@ fn act(state: &mut State, action: Action) -> Vec<Effect> {
     match action {
         Action::CycleShadows => cycle_shadows(state),
         Action::ToggleDepthOfField => toggle_depth_of_field(state),
-        Action::TogglePhotons => told(state, "photons come with a later version: this one has none"),
+        Action::TogglePhotons => toggle_photons(state),
         Action::CycleIntegrator => cycle_integrator(state),
         Action::NextView => step_view(state, 1),
         Action::PreviousView => step_view(state, View::ALL.len() - 1),
@@ -90,6 +90,17 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
         Some(_) => {}
     }
     state.toggles.dof = Some(switched_off);
+    render(state, false)
+}
+
+fn toggle_photons(state: &mut State) -> Vec<Effect> {
+    match state.integrator() {
+        Integrator::Path => {
+            return told(state, "path finds all light without photons; i is whitted");
+        }
+        Integrator::Whitted => {}
+    }
+    state.toggles.photons = Some(!state.photons());
     render(state, false)
 }
 

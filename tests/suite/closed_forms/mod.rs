@@ -13,6 +13,7 @@ mod hard;
 mod many_lights;
 mod mirror;
 mod patterns;
+mod photons;
 mod robust;
 mod round;
 mod round_lights;

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use glimt::assets::image::mipmaps;
 use glimt::assets::{FileMaterial, LoadedMesh};
-use glimt::control::CancelToken;
+use glimt::control::{CancelToken, unwatched};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::{RenderSettings, View, render_tile};
+use glimt::integrators::{self, PhotonSettings, RenderSettings, View, render_tile_by};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
@@ -105,6 +105,11 @@ impl Build {
 
     pub fn depth(self, max_depth: u32) -> Self {
         self.with(|scene| scene.render.max_depth = max_depth)
+    }
+
+    /// With photons, so many in a pass, gathered within this radius by the first.
+    pub fn photons(self, count: u64, radius: f64) -> Self {
+        self.with(|scene| scene.photons = Photons { enabled: true, count, radius, bounces: 10_000 })
     }
 
     pub fn background(self, radiance: f32) -> Self {
@@ -229,7 +234,9 @@ impl Build {
 
     pub fn settings(&self, seed: u32) -> RenderSettings {
         let render = Render { seed, ..self.scene.render };
-        RenderSettings { render, dof: true, view: self.view }
+        let Photons { enabled, count, radius, bounces } = self.scene.photons;
+        let photons = PhotonSettings { count: count as u32, radius: radius as f32, bounces };
+        RenderSettings { render, dof: true, view: self.view, photons: enabled.then_some(photons) }
     }
 
     /// The whole picture, means of the samples.
@@ -258,8 +265,14 @@ impl Build {
 
 /// Mean of the samples of each pixel.
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
+    let token = CancelToken::new();
+    let maps = settings.heeded().photons.filter(|_| settings.gathers()).map(|of_photons| {
+        let photons = integrators::Photons::new(world, settings, of_photons, &unwatched, &token);
+        let (photons, _) = photons.expect("nobody cancels");
+        photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")
+    });
     let (tile, _) =
-        render_tile(world, settings, rect, 0..samples, &CancelToken::new()).expect("nobody cancels");
+        render_tile_by(maps.as_ref(), world, settings, rect, 0..samples, &token).expect("nobody cancels");
     let sums = tile.radiance.chunks(samples as usize);
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }

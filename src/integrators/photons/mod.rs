@@ -1,0 +1,300 @@
+//! Photon maps: light that reaches surfaces by mirrors, glass and other surfaces, found by sending it out from the lights
+//! (Jensen, *Global Illumination using Photon Maps*, 1996), in passes whose maps are each right but for the width of a kernel
+//! that shrinks from pass to pass, so that their mean converges (Hachisuka, Ogaki, Jensen, *Progressive Photon Mapping*, 2008; Knaus
+//! and Zwicker, *Progressive Photon Mapping: A Probabilistic Approach*, 2011). Pass i of the photons is sample i of every pixel.
+//!
+//! Which estimator carries which paths from lights L by mirrors and glass S and other surfaces D to the eye E:
+//!
+//! | paths | estimator |
+//! | --- | --- |
+//! | `L S* E` | the path from the eye meets the light |
+//! | `L D S* E` | light samples at the first D, and the step from there that meets the light at once, weighed against each other |
+//! | `L S+ D S* E` | caustic photons at the first D |
+//! | `L S+ D S* D S* E`, the last D without a glossy lobe | photons thrown back from a caustic, there |
+//! | `L D S* D S* E` | one step from the first D, by its lobes, to the next: light samples there |
+//! | `L S+ D S* D S* E`, the last D with a glossy lobe | the same step: caustic photons there |
+//! | `L (S\|D)* D (S\|D)* D S* D S* E` | the same step: all other photons there |
+//!
+//! So what the step meets of lights behind mirrors and glass counts nothing, and photons that come straight from a light are not
+//! kept. Scatterings of the eye's path, the vertex at which photons are gathered among them, and those of the photon are at most
+//! `max_depth` together.
+
+pub(super) mod gather;
+mod map;
+mod shoot;
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+use super::medium::Inside;
+use super::settings::RenderSettings;
+use super::shot::{SampleBlock, Shot};
+use crate::control::{CancelToken, Cancelled, Progress, unwatched};
+use crate::film::Rect;
+use crate::geometry::{Aabb, ShapeHit};
+use crate::lights::{Ball, PhotonSource};
+use crate::materials::Bsdf;
+use crate::scene::description::{Render, Shadows};
+use crate::world::{Hit, Object, World, photon_source};
+pub use map::{Photon, PhotonMap, Way};
+use shoot::{Shooting, Shots};
+
+/// How photons are sent and gathered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonSettings {
+    /// Photons that a pass sends out.
+    pub count: u32,
+    /// Radius of the first pass's kernels; 0: chosen by how close photons are.
+    pub radius: f32,
+    /// Most scatterings of a photon.
+    pub bounces: u32,
+}
+
+/// Photons that are sent out together by one thread.
+const CHUNK: u32 = 2048;
+
+/// α: how many of the photons of a pass the shrinking kernel keeps.
+const KEPT: f64 = 2.0 / 3.0;
+
+/// Photons that the first kernels are to hold, in the middle of the caustic ones, of those thrown back from caustics, and of all.
+const WANTED: [f32; 3] = [12.0, 48.0, 12.0];
+
+/// The part of the photons that are aimed at mirrors and glass, where there are any.
+const AIMED: f32 = 0.5;
+
+/// What all passes of a picture have in common.
+#[derive(Debug)]
+pub struct Photons {
+    settings: PhotonSettings,
+    emission: Option<PhotonSource>,
+    glasses: Vec<Inside>,
+    /// Of the first pass: of the kernel for caustics, of that for what is thrown back from them, and of that for all photons.
+    radii: [f32; 3],
+}
+
+/// The photons of a pass.
+#[derive(Debug)]
+pub struct PhotonPass {
+    /// Those that came by mirrors and glass alone.
+    pub caustic: PhotonMap,
+    /// Those that were thrown back from such places and came to others.
+    pub bounced: PhotonMap,
+    /// All.
+    pub all: PhotonMap,
+    /// How many were sent out.
+    pub emitted: u64,
+    /// Texture look-ups.
+    pub lookups: u64,
+}
+
+impl PhotonPass {
+    /// How many were stored.
+    pub fn stored(&self) -> u64 {
+        self.all.len() as u64
+    }
+
+    /// Bytes that it takes.
+    pub fn memory_bytes(&self) -> usize {
+        self.caustic.memory_bytes() + self.bounced.memory_bytes() + self.all.memory_bytes()
+    }
+}
+
+/// The passes of some samples.
+#[derive(Clone, Debug)]
+pub struct PhotonMaps {
+    /// The first of the samples.
+    pub first: u32,
+    /// One for each.
+    pub passes: Vec<Arc<PhotonPass>>,
+}
+
+impl PhotonMaps {
+    /// That of a sample, which is one of those that these are of.
+    pub fn pass(&self, sample: u32) -> &PhotonPass {
+        &self.passes[(sample - self.first) as usize]
+    }
+}
+
+impl Photons {
+    /// For a world, and pass 0, by whose photons the radii are chosen; `progress` is told how many of them were sent, and of how
+    /// many.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn new(
+        world: &World,
+        settings: &RenderSettings,
+        photons: PhotonSettings,
+        progress: Progress<'_>,
+        token: &CancelToken,
+    ) -> Result<(Self, PhotonPass), Cancelled> {
+        let emission = photon_source(&world.geometry, &world.lights);
+        let emission = emission.map(|emission| emission.aimed_at(&targets(world), AIMED));
+        let glasses = world.closed_glasses().map(|(object, material)| Inside { object, material }).collect();
+        let mut own = Self { settings: photons, emission, glasses, radii: [photons.radius; 3] };
+        let sent = own.shoot((world, settings), 0, progress, token)?;
+        if photons.radius == 0.0 {
+            let kinds = [&sent.caustic, &sent.bounced, &sent.all];
+            let radii = kinds.into_par_iter().zip(WANTED);
+            let radii = radii.map(|(of, wanted)| radius_to_hold(of, wanted, token));
+            let radii = radii.collect::<Result<Vec<_>, _>>()?;
+            own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
+        }
+        let first = own.mapped(&sent, 0, token)?;
+        Ok((own, first))
+    }
+
+    /// Radii of the first pass's kernels: of that for caustics, of that for what is thrown back from them, and of that for
+    /// all photons.
+    pub fn radii(&self) -> [f32; 3] {
+        self.radii
+    }
+
+    /// A pass. A function of its number, whatever the threads.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn pass(
+        &self,
+        world: &World,
+        settings: &RenderSettings,
+        number: u32,
+        token: &CancelToken,
+    ) -> Result<PhotonPass, Cancelled> {
+        let sent = self.shoot((world, settings), number, &unwatched, token)?;
+        self.mapped(&sent, number, token)
+    }
+
+    /// The maps of a pass.
+    fn mapped(&self, sent: &Sent, number: u32, token: &CancelToken) -> Result<PhotonPass, Cancelled> {
+        let shrunk = shrunk(number);
+        let [of_caustic, of_bounced, of_all] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
+        let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
+        let few = || (map(&sent.caustic, of_caustic), map(&sent.bounced, of_bounced));
+        let ((caustic, bounced), all) = rayon::join(few, || map(&sent.all, of_all));
+        let (emitted, lookups) = (self.settings.count.into(), sent.lookups);
+        Ok(PhotonPass { caustic: caustic?, bounced: bounced?, all: all?, emitted, lookups })
+    }
+
+    /// The passes of some samples.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn maps(
+        &self,
+        world: &World,
+        settings: &RenderSettings,
+        samples: Range<u32>,
+        token: &CancelToken,
+    ) -> Result<PhotonMaps, Cancelled> {
+        let first = samples.start;
+        let pass = |number| self.pass(world, settings, number, token).map(Arc::new);
+        Ok(PhotonMaps { first, passes: samples.map(pass).collect::<Result<_, _>>()? })
+    }
+
+    /// The photons of a pass in the order of their numbers.
+    fn shoot(
+        &self,
+        (world, settings): (&World, &RenderSettings),
+        number: u32,
+        progress: Progress<'_>,
+        token: &CancelToken,
+    ) -> Result<Sent, Cancelled> {
+        let Some(emission) = &self.emission else { return Ok(Sent::default()) };
+        let most_depth = self.settings.bounces.min(settings.render.max_depth.saturating_sub(1));
+        if most_depth == 0 {
+            return Ok(Sent::default());
+        }
+        // Photons come to the facets, from where they go on in every picture alike.
+        let settings =
+            RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
+        let done = AtomicU64::new(0);
+        let chunk = |first: u32| {
+            // All photons of a number of passes are samples of one sequence.
+            let count = self.settings.count;
+            let at_once = u32::MAX / count;
+            let start = number % at_once * count;
+            let samples = start + first..start + (first + CHUNK).min(count);
+            let tile = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
+            let block = SampleBlock { tile, samples };
+            let shot = Shot { pixel_spread: 0.0, ..Shot::new(world, &settings, &block, token) };
+            let (glasses, share) = (&*self.glasses, 1.0 / count as f32);
+            let shots = Shooting { shot: &shot, emission, glasses, share, most_depth }.shoot()?;
+            let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
+            progress(done, count.into());
+            Ok(shots)
+        };
+        let chunks: Vec<Shots> = (0..self.settings.count.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|number| chunk(number * CHUNK))
+            .collect::<Result<_, _>>()?;
+        let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
+        let all: Vec<Photon> = chunks.into_iter().flat_map(|chunk| chunk.photons).collect();
+        let of = |way: Way| all.iter().filter(|photon| photon.way == way).copied().collect();
+        Ok(Sent { caustic: of(Way::Caustic), bounced: of(Way::Bounced), all, lookups })
+    }
+}
+
+/// What was stored of a pass.
+#[derive(Default)]
+struct Sent {
+    all: Vec<Photon>,
+    /// Those that came by mirrors and glass alone.
+    caustic: Vec<Photon>,
+    /// Those that were thrown back from such places.
+    bounced: Vec<Photon>,
+    lookups: u64,
+}
+
+/// By how much smaller the radius of a pass is than that of the first: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).
+fn shrunk(pass: u32) -> f64 {
+    (1..=pass).map(f64::from).map(|i| (i + KEPT) / (i + 1.0)).product::<f64>().sqrt()
+}
+
+/// A radius within which the photon in the middle, by how many there are, has so many others.
+fn radius_to_hold(photons: &[Photon], wanted: f32, token: &CancelToken) -> Result<f32, Cancelled> {
+    /// Photons that are looked at, from each of so many of them.
+    const MOST: usize = 1 << 14;
+    const LOOKS: usize = 256;
+    /// Neighbours that are found among them.
+    const NEAR: f32 = 12.0;
+    let step = photons.len().div_ceil(MOST).max(1);
+    let some: Vec<Photon> = photons.iter().step_by(step).copied().collect();
+    let bounds = some.iter().fold(Aabb::EMPTY, |all, one| all.union(Aabb { min: one.point, max: one.point }));
+    let mut radius = 0.05 * (bounds.max - bounds.min).length();
+    if some.is_empty() || !(radius > 0.0) {
+        return Ok(1.0);
+    }
+    for _ in 0..12 {
+        let map = PhotonMap::new(&some, radius, token)?;
+        let count = |photon: &Photon| {
+            let mut count = -1.0_f32;
+            map.visit((photon.point, photon.normal), u32::MAX, |_, _| count += 1.0);
+            count
+        };
+        let mut counts: Vec<f32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
+        counts.sort_by(f32::total_cmp);
+        let middle = counts[counts.len() / 2];
+        let factor = (NEAR / middle.max(0.5)).sqrt();
+        radius *= factor.clamp(0.2, 4.0);
+        if (0.8..1.25).contains(&factor) {
+            break;
+        }
+    }
+    Ok(radius * (wanted / (NEAR * step as f32)).sqrt())
+}
+
+/// Balls around mirrors and glass.
+fn targets(world: &World) -> Vec<Ball> {
+    let specular = |(id, object): (u32, &Object)| {
+        let material = world.material_index(&Hit { shape: ShapeHit::at(0.0), object: id });
+        match &world.materials[material].bsdf {
+            Bsdf::Phong(_) => None,
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => object.ball(),
+        }
+    };
+    (0..).zip(world.geometry.objects()).filter_map(specular).collect()
+}

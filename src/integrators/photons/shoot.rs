@@ -1,0 +1,408 @@
+//! Photons on their way: from the lights over all surfaces, round by round, sixteen at a time, by the surfaces, media and lobes that
+//! paths from the eye meet.
+//!
+//! What is carried is basic flux, Φ/n². At a surface whose shading normal Nₛ is not that of its facet N₉ what goes on from there is
+//! what the adjoint of its BSDF says: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*,
+//! 1997, section 5.3).
+
+use super::super::cone::Cone;
+use super::super::crossing::{Crossing, CrossingMemory};
+use super::super::lit_row::{ALL, LitRow};
+use super::super::medium::{Inside, Medium, absorption, ior};
+use super::super::onward::{Onward, Scattering};
+use super::super::packet::Rays;
+use super::super::queues::{History, PathRay};
+use super::super::shot::Shot;
+use super::super::specular::{Interface, interface, reflected};
+use super::super::vertices::{LitVertex, Vertex};
+use super::super::view::Measure;
+use super::super::{PACKET, RayCounters};
+use super::map::{Photon, Way};
+use crate::control::Cancelled;
+use crate::geometry::Ray;
+use crate::geometry::rows::lanes;
+use crate::lights::{Emitted, Numbers, PhotonSource, Start};
+use crate::materials::Bsdf;
+use crate::math::Vec3;
+use crate::math::lanes::set_lane;
+use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
+use crate::world::{Hit, Loops};
+
+/// Surfaces where the glass stays the same that a photon passes at once.
+const MOST_HIDDEN: usize = 64;
+
+/// Directions that differ by no more than rounding, squared.
+const SAME: f32 = 1e-8;
+
+/// What all photons of a part of a pass have in common.
+pub struct Shooting<'a> {
+    /// The world, and the numbers of the photons as the samples of a single pixel; their slots count from 0.
+    pub shot: &'a Shot<'a>,
+    /// What the lights send.
+    pub emission: &'a PhotonSource,
+    /// The closed shapes of glass, with their materials.
+    pub glasses: &'a [Inside],
+    /// One over the number of photons.
+    pub share: f32,
+    /// Most scatterings of a photon.
+    pub most_depth: u32,
+}
+
+/// Photons of one part of a pass.
+#[derive(Default)]
+pub struct Shots {
+    /// What was stored, in the order of their numbers within each round.
+    pub photons: Vec<Photon>,
+    /// Texture look-ups.
+    pub lookups: u64,
+}
+
+impl Shooting<'_> {
+    /// Send the photons.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn shoot(&self) -> Result<Shots, Cancelled> {
+        let count = self.shot.block.len() as u32;
+        let mut flight = Flight {
+            shooting: self,
+            depth: 0,
+            references: vec![0.0; count as usize],
+            next: Vec::new(),
+            open: LitRow::EMPTY,
+            media: vec![Medium::default()],
+            crossing: CrossingMemory::default(),
+            shots: Shots::default(),
+            counters: RayCounters::default(),
+        };
+        let mut rays = Vec::new();
+        flight.start(count, &mut rays);
+        let mut row = LitRow::EMPTY;
+        while !rays.is_empty() {
+            for packet in rays.chunks(PACKET) {
+                self.shot.token.check()?;
+                flight.meet(packet, &mut row);
+            }
+            flight.scatter_open();
+            flight.media.truncate(1);
+            flight.spare();
+            std::mem::swap(&mut rays, &mut flight.next);
+            flight.next.clear();
+            flight.depth += 1;
+        }
+        flight.shots.lookups += flight.counters.texture_lookups;
+        Ok(flight.shots)
+    }
+
+    /// The glass around a point.
+    fn medium_at(&self, point: Vec3) -> Medium {
+        let world = self.shot.world;
+        let around = |glass: &&Inside| world.encloses(glass.object, point);
+        self.glasses.iter().filter(around).copied().fold(Medium::default(), Medium::entered)
+    }
+}
+
+/// Some photons under way.
+struct Flight<'a> {
+    shooting: &'a Shooting<'a>,
+    /// Scatterings so far.
+    depth: u32,
+    /// What each had in its largest part when it started, by slot.
+    references: Vec<f32>,
+    next: Vec<PathRay>,
+    /// Takes single vertices.
+    open: LitRow,
+    /// What they are in; the first is none.
+    media: Vec<Medium>,
+    crossing: CrossingMemory,
+    shots: Shots,
+    counters: RayCounters,
+}
+
+impl Flight<'_> {
+    /// Photons at the lights.
+    fn start(&mut self, count: u32, rays: &mut Vec<PathRay>) {
+        let shooting = self.shooting;
+        let shot = shooting.shot;
+        let has_planes = shot.world.geometry.has_unbounded();
+        for begin in (0..count).step_by(PACKET) {
+            let numbers = shot.world.geometry.instructions().run(Drawing { shot, first: begin });
+            for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
+                let Some(emitted) = shooting.emission.emit(numbers) else { continue };
+                let ray = emitted.ray();
+                if is_beyond(&emitted) && has_planes {
+                    let back = Ray::new(ray.origin, -ray.direction);
+                    if shot.world.geometry.closest(&back).is_some() {
+                        continue;
+                    }
+                }
+                let flux = emitted.flux * shooting.share;
+                let offset = begin as usize + i;
+                self.references[offset] = flux.max_element();
+                rays.push(PathRay {
+                    ray,
+                    throughput: flux,
+                    slot: offset as u32,
+                    path: CAMERA_PATH + 1,
+                    medium: shooting.medium_at(ray.origin),
+                    history: History::CAMERA,
+                    cone: Cone::default(),
+                });
+            }
+        }
+    }
+
+    /// Whether photons are scattered at the end of their rays.
+    fn goes_on(&self) -> bool {
+        self.depth < self.shooting.most_depth
+    }
+
+    /// What each photon of a packet meets.
+    fn meet(&mut self, rays: &[PathRay], row: &mut LitRow) {
+        let shot = self.shooting.shot;
+        let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, row);
+        if self.depth == 0 {
+            // What comes straight throws no caustic.
+            row.seen = 0;
+        } else {
+            for i in lanes(row.used) {
+                let (point, normal) = row.place_of(i);
+                self.store(&rays[i], point, normal);
+            }
+        }
+        if self.goes_on() && row.used != 0 {
+            let onward = Onward { leads_on: true, is_risked: false };
+            Scattering { shot, row, used: row.used, onward }.scatter(&self.media, &[], &mut self.next);
+        }
+        for i in lanes(met.any & !met.plain) {
+            if let Some(hit) = met.hit(i) {
+                self.shade(rays[i], hit);
+            }
+        }
+    }
+
+    /// Keep a photon where it arrives.
+    fn store(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
+        self.shots.photons.push(Photon {
+            point,
+            direction: -path.ray.direction,
+            flux: path.throughput,
+            normal,
+            depth: self.depth,
+            way: match path.history {
+                History { is_seen: true, .. } => Way::Caustic,
+                History { is_step: true, .. } => Way::Bounced,
+                History { .. } => Way::Other,
+            },
+        });
+    }
+
+    /// What a photon does at the first thing that is no mere change between parts of one glass.
+    fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
+        let shot = self.shooting.shot;
+        let mut is_direct = self.depth == 0;
+        for _ in 0..MOST_HIDDEN {
+            let vertex = Vertex::to_shade(shot, &path, &hit);
+            if vertex.material.bsdf.glass().is_none() {
+                return self.shade_surface(path, &vertex, hit.shape.t, is_direct);
+            }
+            let Crossing { sides, near, far, opaque } =
+                shot.crossing(&path, &vertex, hit.shape.t, &mut self.crossing);
+            path.medium = near;
+            if let Some(touching) = opaque {
+                let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
+                return self.shade_surface(path, &vertex, hit.shape.t, is_direct);
+            }
+            path.throughput *= absorption(shot.world, near, hit.shape.t);
+            if near.glass() != far.glass() {
+                return self.shade_glass(&path, &vertex.between(sides), far);
+            }
+            (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
+            is_direct = false;
+            match shot.world.geometry.closest(&path.ray) {
+                Some(next) => hit = next,
+                None => return,
+            }
+        }
+    }
+
+    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, distance: f32, is_direct: bool) {
+        let shot = self.shooting.shot;
+        path.throughput *= absorption(shot.world, path.medium, distance);
+        match &vertex.material.bsdf {
+            Bsdf::Phong(phong) => {
+                let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+                if bsdf.is_black() {
+                    return;
+                }
+                let shading = vertex.shading(&mut self.counters);
+                let mut medium = 0;
+                if !path.medium.is_air() {
+                    medium = self.media.len() as u32;
+                    self.media.push(path.medium);
+                }
+                if self.open.used == ALL {
+                    self.scatter_open();
+                }
+                // Light samples find what comes straight, and it throws no caustic.
+                if is_direct {
+                    path.history.is_seen = false;
+                } else {
+                    self.store(&path, vertex.surface.point, vertex.normal);
+                }
+                let i = self.open.used.trailing_ones() as usize;
+                let lit = LitVertex { path: &path, place: 0, vertex, shading, bsdf };
+                self.open.put(i, shot, &lit, Measure::ALL, medium);
+                let counts = self.open.landed(i, vertex.to_eye);
+                set_lane(&mut self.open.throughput, i, path.throughput * counts);
+            }
+            Bsdf::Mirror(mirror) if self.goes_on() => {
+                let shading = vertex.shading(&mut self.counters);
+                let ray = reflected(&path, vertex, &shading, mirror.reflectance);
+                self.push(&path, vertex, (shading.normal, 1.0), ray);
+            }
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => {}
+        }
+    }
+
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {
+        if !self.goes_on() {
+            return;
+        }
+        let shot = self.shooting.shot;
+        let shading = vertex.shading(&mut self.counters);
+        let Interface { reflectance, refracted } = interface(shot.world, path, vertex, &shading, far);
+        let is_reflected =
+            |reflectance| shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance;
+        match refracted {
+            Some(mut ray) if !is_reflected(reflectance) => {
+                let eta = ior(shot.world, far) / ior(shot.world, path.medium);
+                ray.throughput *= 1.0 / (eta * eta);
+                self.push(path, vertex, (shading.normal, eta), ray);
+            }
+            Some(_) | None => {
+                let ray = reflected(path, vertex, &shading, Vec3::ONE);
+                self.push(path, vertex, (shading.normal, 1.0), ray);
+            }
+        }
+    }
+
+    /// The adjoint of a δ lobe about a shading normal: see the top of this file. `eta` is by how much the index of refraction is
+    /// higher where the ray goes.
+    fn push(&mut self, path: &PathRay, vertex: &Vertex<'_>, (shading, eta): (Vec3, f32), mut ray: PathRay) {
+        let facet = vertex.normal;
+        if shading != facet {
+            let (wi, wo) = (vertex.to_eye, ray.ray.direction);
+            let along = |direction: Vec3| direction - shading * direction.dot(shading);
+            // Else the facet's own normal took the place of the other.
+            if (along(wi) + along(wo) * eta).length_squared() < SAME {
+                let (over, under) = (wi.dot(shading) * wo.dot(facet), wi.dot(facet) * wo.dot(shading));
+                ray.throughput *= if under == 0.0 { 0.0 } else { (over / under).abs() };
+            }
+        }
+        debug_assert_eq!(path.slot, ray.slot);
+        self.next.push(ray);
+    }
+
+    /// Send photons on from the single vertices.
+    fn scatter_open(&mut self) {
+        let shot = self.shooting.shot;
+        if self.goes_on() && self.open.used != 0 {
+            let onward = Onward { leads_on: true, is_risked: false };
+            let before = self.next.len();
+            Scattering { shot, row: &self.open, used: self.open.used, onward }.scatter(
+                &self.media,
+                &[],
+                &mut self.next,
+            );
+            for ray in &mut self.next[before..] {
+                let own = |i: &usize| self.open.slot[*i] == ray.slot;
+                if let Some(i) = lanes(self.open.used).find(own) {
+                    let counts = self.open.landed(i, ray.ray.direction);
+                    ray.throughput = if counts > 0.0 { ray.throughput / counts } else { Vec3::ZERO };
+                }
+            }
+        }
+        self.open.reset();
+    }
+
+    /// Roulette by flux: what is left has about the flux that it started with.
+    fn spare(&mut self) {
+        let shot = self.shooting.shot;
+        let mut kept = 0;
+        for begin in (0..self.next.len()).step_by(PACKET) {
+            let end = self.next.len().min(begin + PACKET);
+            let risks =
+                shot.world.geometry.instructions().run(Risking { shot, rays: &self.next[begin..end] });
+            for (place, risk) in (begin..end).zip(risks) {
+                let mut ray = self.next[place];
+                let flux = ray.throughput.max_element();
+                let chance = flux / self.references[ray.slot as usize];
+                if !(flux > 0.0 && risk < chance) {
+                    continue;
+                }
+                if chance < 1.0 {
+                    ray.throughput /= chance;
+                }
+                self.next[kept] = ray;
+                kept += 1;
+            }
+        }
+        self.next.truncate(kept);
+    }
+}
+
+fn is_beyond(emitted: &Emitted) -> bool {
+    match emitted.start {
+        Start::Beyond(_) => true,
+        Start::Point(_) | Start::Surface { .. } => false,
+    }
+}
+
+/// The numbers that photons start by.
+struct Drawing<'a> {
+    shot: &'a Shot<'a>,
+    first: u32,
+}
+
+impl Loops for Drawing<'_> {
+    type Done = [Numbers; PACKET];
+
+    #[inline(always)]
+    fn run(self) -> Self::Done {
+        let slots = std::array::from_fn(|i| self.first + i as u32);
+        let (xs, ys, samples) = self.shot.block.places_of(&slots);
+        let sampler = SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples);
+        let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET], decision, 0, 1);
+        let (light, aim) = (pairs(Decision::Lamp), pairs(Decision::Aim));
+        let (position, direction) = (pairs(Decision::Start), pairs(Decision::Sent));
+        std::array::from_fn(|i| Numbers {
+            light: light.map(|row| row[i]),
+            aim: aim.map(|row| row[i]),
+            position: position.map(|row| row[i]),
+            direction: direction.map(|row| row[i]),
+        })
+    }
+}
+
+/// The numbers that say whether rays go on.
+struct Risking<'a> {
+    shot: &'a Shot<'a>,
+    rays: &'a [PathRay],
+}
+
+impl Loops for Risking<'_> {
+    type Done = [f32; PACKET];
+
+    #[inline(always)]
+    fn run(self) -> Self::Done {
+        let (mut slots, mut paths) = ([0; PACKET], [0; PACKET]);
+        for (i, ray) in self.rays.iter().enumerate().take(PACKET) {
+            (slots[i], paths[i]) = (ray.slot, ray.path);
+        }
+        let (xs, ys, samples) = self.shot.block.places_of(&slots);
+        let sampler = SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples);
+        let [risks, _] = sampler.pairs(&paths, Decision::Roulette, 0, 1);
+        risks
+    }
+}

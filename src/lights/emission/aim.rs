@@ -1,0 +1,231 @@
+//! What photons are aimed at.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Ball;
+use crate::lights::SpotLight;
+use crate::lights::sphere::one_minus_cos;
+use crate::math::frame::Frame;
+use crate::math::{DVec3, Vec3};
+use crate::sampling::distribution::Discrete;
+use crate::sampling::warp;
+
+/// Balls that photons are aimed at: one is chosen by what it is expected to get, and a direction or a place uniform over what is
+/// seen of it.
+#[derive(Clone, Debug)]
+pub struct Targets {
+    balls: Vec<Ball>,
+    /// By the squares of the radii.
+    by_disc: Discrete,
+}
+
+/// More targets are put together to so many.
+pub const MOST_TARGETS: usize = 32;
+
+/// Which directions a point sends light into.
+pub enum Sends<'a> {
+    /// All alike.
+    Everywhere,
+    /// As a spotlight does.
+    Cone {
+        /// That.
+        light: &'a SpotLight,
+        /// Its power over its intensity on the axis, in sr.
+        spread: f64,
+    },
+    /// By the cosine with this unit normal, before a surface.
+    Front(DVec3),
+}
+
+impl Sends<'_> {
+    /// Power over that into the brightest direction, in sr.
+    pub fn spread(&self) -> f64 {
+        match self {
+            Self::Everywhere => 4.0 * PI,
+            Self::Cone { spread, .. } => *spread,
+            Self::Front(_) => PI,
+        }
+    }
+
+    /// What goes into a direction over what goes into the brightest one.
+    pub fn share(&self, direction: Vec3) -> f64 {
+        match self {
+            Self::Everywhere => 1.0,
+            Self::Cone { light, .. } => f64::from(light.share(direction)),
+            Self::Front(normal) => direction.as_dvec3().dot(*normal).max(0.0),
+        }
+    }
+
+    /// A bound on that over a cone of directions, given the sine of its half angle, up to 90°.
+    fn greatest(&self, axis: DVec3, sin: f64) -> f64 {
+        let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
+        // Cosine of the angle from a direction to the nearest one of the cone.
+        let nearest = |direction: DVec3| {
+            let along = direction.dot(axis).clamp(-1.0, 1.0);
+            let across = ((1.0 - along) * (1.0 + along)).sqrt();
+            if along >= cos { 1.0 } else { along * cos + across * sin }
+        };
+        match self {
+            Self::Everywhere => 1.0,
+            Self::Cone { light, .. } => {
+                let is_met = nearest(light.axis.as_dvec3()) >= libm::cos(f64::from(light.half_angle)) - 1e-9;
+                f64::from(u8::from(is_met))
+            }
+            Self::Front(normal) => nearest(*normal).max(0.0),
+        }
+    }
+}
+
+impl Targets {
+    /// None where there are none of any extent.
+    pub fn new(balls: &[Ball]) -> Option<Self> {
+        let balls: Vec<Ball> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
+        let balls = together(balls);
+        let by_disc = Discrete::new(balls.iter().map(|ball| ball.radius * ball.radius))?;
+        Some(Self { balls, by_disc })
+    }
+
+    /// All of them.
+    #[cfg(test)]
+    pub fn balls(&self) -> &[Ball] {
+        &self.balls
+    }
+
+    /// A target by a number in [0, 1), for light from beyond the scene.
+    pub fn by_disc(&self, u: f32) -> &Ball {
+        &self.balls[self.by_disc.sample(u).0]
+    }
+
+    /// The areas of all discs, in sum.
+    pub fn discs(&self) -> f64 {
+        PI * self.by_disc.total()
+    }
+
+    /// Density per area of places uniform over the discs of [`Targets::by_disc`], at a place that is on some of them.
+    pub fn by_discs(&self, is_on: impl Fn(&Ball) -> bool) -> f64 {
+        // A disc is chosen by its area: the density on each is the same.
+        self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.discs()
+    }
+
+    /// As they are seen from a point that sends light.
+    pub fn seen_from<'a>(&'a self, from: DVec3, sends: &'a Sends<'a>) -> View<'a> {
+        let mut view = View { targets: self, from, sends, weights: [0.0; MOST_TARGETS], total: 0.0 };
+        for (weight, ball) in view.weights.iter_mut().zip(&self.balls) {
+            *weight = match Cone::around(ball, from) {
+                Some(cone) => cone.solid_angle() * sends.greatest(cone.axis, cone.sin),
+                None => sends.spread(),
+            };
+            view.total += *weight;
+        }
+        view
+    }
+}
+
+/// Targets as they are seen from a point that sends light.
+pub struct View<'a> {
+    targets: &'a Targets,
+    from: DVec3,
+    sends: &'a Sends<'a>,
+    /// A bound on what each gets, in units of what goes into the brightest direction, in sr.
+    weights: [f64; MOST_TARGETS],
+    total: f64,
+}
+
+impl View<'_> {
+    /// A bound on what all get, in units of what goes into the brightest direction, in sr.
+    pub fn total(&self) -> f64 {
+        self.total
+    }
+
+    /// A direction uniform over the cone of a target, and which; none where that is all around the point, or there is none:
+    /// then directions that are not aimed stand for it.
+    pub fn sample(&self, u: f32, direction: [f32; 2]) -> Option<(Vec3, usize)> {
+        let goal = f64::from(u) * self.total;
+        let (mut sum, mut chosen) = (0.0, None);
+        for (number, weight) in self.weights[..self.targets.balls.len()].iter().enumerate() {
+            if *weight > 0.0 && sum <= goal {
+                chosen = Some(number);
+            }
+            sum += weight;
+        }
+        let target = chosen?;
+        let cone = Cone::around(&self.targets.balls[target], self.from)?;
+        let local = warp::cone(direction, cone.one_minus_cos);
+        Some((Frame::from_normal(cone.axis.as_vec3()).to_world(local), target))
+    }
+
+    /// The density of aimed directions over that of others, at one that was made for a target or by the others. ∞ where others
+    /// are never.
+    pub fn ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
+        if !(self.total > 0.0) {
+            return 1.0;
+        }
+        let density = self.sends.share(direction) / self.sends.spread();
+        let of = |(number, ball): (usize, &Ball)| {
+            let part = self.weights[number] / self.total;
+            match Cone::around(ball, self.from) {
+                // The very edge may be on either side.
+                Some(cone) if made_for == Some(number) || cone.holds(direction) => {
+                    part / (cone.solid_angle() * density)
+                }
+                Some(_) => 0.0,
+                None => part,
+            }
+        };
+        let is_reached = |(number, _): &(usize, &Ball)| self.weights[*number] > 0.0;
+        self.targets.balls.iter().enumerate().filter(is_reached).map(of).sum()
+    }
+}
+
+/// The directions to a ball.
+struct Cone {
+    axis: DVec3,
+    /// Of the half angle.
+    sin: f64,
+    one_minus_cos: f32,
+}
+
+impl Cone {
+    /// None from inside.
+    fn around(ball: &Ball, from: DVec3) -> Option<Self> {
+        let to_center = ball.center - from;
+        let distance = to_center.length();
+        let sin = ball.radius / distance;
+        (sin < 1.0).then(|| Self {
+            axis: to_center / distance,
+            sin,
+            one_minus_cos: one_minus_cos((sin * sin) as f32),
+        })
+    }
+
+    fn solid_angle(&self) -> f64 {
+        TAU * f64::from(self.one_minus_cos)
+    }
+
+    /// By the chord to the axis.
+    fn holds(&self, direction: Vec3) -> bool {
+        (direction.as_dvec3() - self.axis).length_squared() <= 2.0 * f64::from(self.one_minus_cos)
+    }
+}
+
+/// At most [`MOST_TARGETS`] balls around these: the largest group is cut in two along its longest side until there are so many.
+fn together(balls: Vec<Ball>) -> Vec<Ball> {
+    if balls.len() <= MOST_TARGETS {
+        return balls;
+    }
+    let mut groups = vec![balls];
+    while groups.len() < MOST_TARGETS {
+        let size = |group: &Vec<Ball>| if group.len() > 1 { Ball::around(group).radius } else { 0.0 };
+        let sizes = groups.iter().map(size).enumerate();
+        let Some((largest, _)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+        let mut group = groups.swap_remove(largest);
+        let centers = || group.iter().map(|ball| ball.center);
+        let extent =
+            centers().fold(DVec3::NEG_INFINITY, DVec3::max) - centers().fold(DVec3::INFINITY, DVec3::min);
+        let axis = if extent.x >= extent.y.max(extent.z) { 0 } else { 1 + usize::from(extent.z > extent.y) };
+        group.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
+        let rest = group.split_off(group.len() / 2);
+        groups.extend([group, rest]);
+    }
+    groups.iter().map(|group| Ball::around(group)).collect()
+}

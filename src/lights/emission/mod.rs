@@ -1,0 +1,396 @@
+//! PhotonSource: rays that start at lights, each with its share of their power.
+//!
+//! A photon of light ℓ is a ray y. Its flux is the power per measure of rays, Φ′(y), over the density with which such photons are
+//! made, so that the mean of the flux over photons is the power of all lights. There are two ways to make one, and a photon
+//! counts the density of both (one-sample multiple importance sampling; Veach, *Robust Monte Carlo Methods for Light Transport
+//! Simulation*, 1997, section 9.2.4): with probability 1 − q by the emission alone, q aimed at one of the [`Ball`]s around what is
+//! worth being met. Light and start are chosen alike in both, so with the probabilities P and A of the light, and a(y)/e(y) that
+//! of the densities of the rest,
+//!
+//! flux = Φ′(y)/e(y) / ((1 − q)·P + q·A·a(y)/e(y)).
+
+mod aim;
+mod surface;
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use super::point::Falloff;
+use super::tree::bounds::strength;
+use super::{Light, Lights};
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Ray, Shape};
+use crate::math::frame::Frame;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::sampling::distribution::Discrete;
+use crate::sampling::warp;
+
+use aim::{Sends, Targets};
+use surface::Surface;
+
+/// A ball in the coordinates of the lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Centre.
+    pub center: DVec3,
+    /// Radius.
+    pub radius: f64,
+}
+
+impl Ball {
+    /// Around balls: in the middle of the box around them.
+    pub fn around(balls: &[Self]) -> Self {
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for Self { center, radius } in balls {
+            (min, max) = (min.min(*center - *radius), max.max(*center + *radius));
+        }
+        let center = if balls.is_empty() { DVec3::ZERO } else { (min + max) * 0.5 };
+        let reach = |ball: &Self| (ball.center - center).length() + ball.radius;
+        Self { center, radius: balls.iter().map(reach).fold(0.0, f64::max) }
+    }
+}
+
+/// The object that a light is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outline {
+    /// A shape.
+    Shape(Shape),
+    /// A mesh.
+    Mesh {
+        /// More than any of its triangles is off where rays meet it.
+        rounding: f32,
+    },
+}
+
+/// The numbers in [0, 1) that a photon is made by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Numbers {
+    /// Which light, and which piece of it.
+    pub light: [f32; 2],
+    /// Whether it is aimed, and at which target.
+    pub aim: [f32; 2],
+    /// Where on the light, or on the disc that light from beyond the scene comes through.
+    pub position: [f32; 2],
+    /// Where to; of light from beyond the scene, where from.
+    pub direction: [f32; 2],
+}
+
+/// A photon at its start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emitted {
+    /// The number of its light.
+    pub light: u32,
+    /// Where it starts.
+    pub start: Start,
+    /// Unit direction that it goes in.
+    pub direction: Vec3,
+    /// Power in W over the density of such photons: the mean over photons is the power of all lights.
+    pub flux: Vec3,
+    /// Whether it was aimed at a target.
+    pub is_aimed: bool,
+}
+
+/// Where a photon starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// At a light without extent.
+    Point(Vec3),
+    /// On the front of a surface.
+    Surface {
+        /// The point.
+        point: Vec3,
+        /// Bound on each component's error.
+        error: Vec3,
+        /// Unit normal of the front.
+        normal: Vec3,
+    },
+    /// Beyond everything that has an end: on a plane that touches the ball around that. What has no end may lie on the way to
+    /// there from the light, against the direction of the photon.
+    Beyond(Vec3),
+}
+
+impl Emitted {
+    /// Its ray, which starts as one that the surface of its light scatters.
+    pub fn ray(&self) -> Ray {
+        let origin = match self.start {
+            Start::Point(point) | Start::Beyond(point) => point,
+            Start::Surface { point, error, normal } => offset_origin(point, error, normal, self.direction),
+        };
+        Ray::new(origin, self.direction)
+    }
+}
+
+/// What all lights send.
+#[derive(Clone, Debug)]
+pub struct PhotonSource {
+    lights: Arc<Lights>,
+    sources: Vec<OfLight>,
+    /// Around all that has an end: light from beyond the scene is sent over it.
+    around: Ball,
+    by_power: Discrete,
+    aim: Option<Aim>,
+}
+
+/// What a light sends.
+#[derive(Clone, Debug)]
+struct OfLight {
+    /// In W.
+    power: Vec3,
+    /// Of a light without extent: its power over its intensity on the axis, in sr.
+    spread: f64,
+    /// Of a light that is an object: its places.
+    surface: Option<Surface>,
+}
+
+/// What photons are aimed at.
+#[derive(Clone, Debug)]
+struct Aim {
+    targets: Targets,
+    /// The part of the photons that are aimed.
+    share: f32,
+    /// By what the lights send towards the targets, about.
+    by_light: Discrete,
+}
+
+/// The part of aimed photons whose light is chosen as that of others is: what is estimated as nothing may be something.
+const BY_POWER: f64 = 0.1;
+
+impl PhotonSource {
+    /// Of all lights; `outline` tells the object of a number, and `around` is a ball around all that has an end. None where
+    /// nothing is sent. Lights without fall-off and the background send nothing.
+    pub fn new(lights: &Arc<Lights>, outline: impl Fn(u32) -> Option<Outline>, around: Ball) -> Option<Self> {
+        let source = |(_, light): (u32, &Light)| OfLight::new(light, &outline, around);
+        let sources: Vec<OfLight> = lights.iter().map(source).collect();
+        let by_power = Discrete::new(sources.iter().map(|source| strength(source.power)))?;
+        Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
+    }
+
+    /// The same with a part of the photons aimed at targets, in [0, 1]. Where all are, only rays that meet a target are made, and
+    /// the mean of their flux is the power that goes there.
+    #[must_use]
+    pub fn aimed_at(self, targets: &[Ball], share: f32) -> Self {
+        let targets = Targets::new(targets).filter(|_| share > 0.0);
+        let aim = targets.and_then(|targets| {
+            let towards = |(number, light)| self.towards(number, light, &targets);
+            let towards: Vec<f64> = self.lights.iter().map(towards).collect();
+            let (sum, total) = (towards.iter().sum::<f64>(), self.by_power.total());
+            let weight = |(number, towards): (usize, &f64)| {
+                let estimate = if sum > 0.0 { (1.0 - BY_POWER) * towards / sum } else { 0.0 };
+                estimate + BY_POWER * strength(self.sources[number].power) / total
+            };
+            let by_light = Discrete::new(towards.iter().enumerate().map(weight))?;
+            Some(Aim { targets, share: share.min(1.0), by_light })
+        });
+        Self { aim, ..self }
+    }
+
+    /// What a light sends, in W.
+    pub fn power_of(&self, light: u32) -> Vec3 {
+        self.sources[light as usize].power
+    }
+
+    /// What all lights send, in W.
+    pub fn power(&self) -> Vec3 {
+        self.sources.iter().map(|source| source.power.as_dvec3()).sum::<DVec3>().as_vec3()
+    }
+
+    /// The part of the photons that are aimed.
+    pub fn aimed_share(&self) -> f32 {
+        self.aim.as_ref().map_or(0.0, |aim| aim.share)
+    }
+
+    /// A photon; none where what was chosen sends nothing.
+    pub fn emit(&self, u: &Numbers) -> Option<Emitted> {
+        let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.share);
+        let by_light = aim.map_or(&self.by_power, |aim| &aim.by_light);
+        let (number, _) = by_light.sample(u.light[0]);
+        let targets = aim.map(|aim| &aim.targets);
+        let made = self.made(number, targets, u).filter(|made| made.flux != Vec3::ZERO)?;
+        let (all, of_light) = (f64::from(self.aimed_share()), |by: &Discrete| by.share(number));
+        let aimed = self.aim.as_ref().map_or(0.0, |aim| all * of_light(&aim.by_light) * made.ratio);
+        let density = (1.0 - all) * of_light(&self.by_power) + aimed;
+        let flux = (made.flux.as_dvec3() / density).as_vec3();
+        let Made { start, direction, .. } = made;
+        Some(Emitted { light: number as u32, start, direction, flux, is_aimed: aim.is_some() })
+    }
+
+    /// A photon of one light, aimed at a target or not.
+    fn made(&self, number: usize, targets: Option<&Targets>, u: &Numbers) -> Option<Made> {
+        let source = &self.sources[number];
+        match self.lights.get(number as u32) {
+            Light::Point(light) => {
+                let anywhere = || warp::cone(u.direction, 2.0);
+                let (from, sends) = (light.position, Sends::Everywhere);
+                let (direction, ratio) = self.directed(from, &sends, targets, u, anywhere);
+                let flux = light.intensity * source.spread as f32;
+                Some(Made { start: Start::Point(from.as_vec3()), direction, flux, ratio })
+            }
+            Light::Spot(light) => {
+                let sends = Sends::Cone { light, spread: source.spread };
+                let from = light.point.position;
+                let (direction, ratio) =
+                    self.directed(from, &sends, targets, u, || light.direction(u.direction));
+                let flux = light.point.intensity * source.spread as f32;
+                Some(Made { start: Start::Point(from.as_vec3()), direction, flux, ratio })
+            }
+            Light::Directional(light) => {
+                let (to_light, irradiance) = light.arriving(u.direction);
+                self.from_beyond(to_light, irradiance, targets, u)
+            }
+            Light::Environment(light) => {
+                let (to_light, irradiance) = light.arriving_anywhere(u.direction);
+                self.from_beyond(to_light, irradiance, targets, u)
+            }
+            Light::Area(light) => {
+                let place = source.surface.as_ref()?.place(light, u.light[1], Vec2::from_array(u.position));
+                let normal = place.normal.as_vec3();
+                let by_cosine = || Frame::from_normal(normal).to_world(warp::cosine(u.direction));
+                let (direction, ratio) =
+                    self.directed(place.from, &Sends::Front(place.normal), targets, u, by_cosine);
+                let start = Start::Surface { point: place.point, error: place.error, normal };
+                Some(Made { start, direction, flux: place.flux, ratio })
+            }
+        }
+    }
+}
+
+/// A photon of one light, before the choice of the light counts.
+struct Made {
+    start: Start,
+    direction: Vec3,
+    /// Its flux, were all photons of this light and none aimed.
+    flux: Vec3,
+    /// The density of aimed photons over that of others.
+    ratio: f64,
+}
+
+impl PhotonSource {
+    /// A direction from a point, and the density of aimed ones over that of others.
+    #[inline(always)]
+    fn directed(
+        &self,
+        from: DVec3,
+        sends: &Sends<'_>,
+        targets: Option<&Targets>,
+        u: &Numbers,
+        unaimed: impl FnOnce() -> Vec3,
+    ) -> (Vec3, f64) {
+        let Some(aim) = &self.aim else { return (unaimed(), 0.0) };
+        let view = aim.targets.seen_from(from, sends);
+        match targets.and_then(|_| view.sample(u.aim[1], u.direction)) {
+            Some((direction, target)) => (direction, view.ratio(direction, Some(target))),
+            None => {
+                let direction = unaimed();
+                (direction, view.ratio(direction, None))
+            }
+        }
+    }
+
+    /// A photon from a direction, with the irradiance at normal incidence that it stands for.
+    fn from_beyond(
+        &self,
+        to_light: Vec3,
+        irradiance: Vec3,
+        targets: Option<&Targets>,
+        u: &Numbers,
+    ) -> Option<Made> {
+        let Frame { s, t, n } = Frame::from_normal(to_light);
+        let (s, t, n) = (s.as_dvec3(), t.as_dvec3(), n.as_dvec3());
+        let Ball { center, radius } = self.around;
+        // On the plane through the middle of the ball.
+        let through = |ball: &Ball| {
+            let at = warp::disk(Vec2::from_array(u.position)).as_dvec2() * ball.radius;
+            let middle = ball.center - center;
+            [middle.dot(s) + at.x, middle.dot(t) + at.y]
+        };
+        let [x, y] = match targets {
+            Some(targets) => through(targets.by_disc(u.aim[1])),
+            None => through(&self.around),
+        };
+        let is_inside = targets.is_none() || x * x + y * y <= radius * radius;
+        let ratio = self.aim.as_ref().map_or(0.0, |aim| {
+            let is_on = |ball: &Ball| {
+                let middle = ball.center - center;
+                let (x, y) = (x - middle.dot(s), y - middle.dot(t));
+                x * x + y * y <= ball.radius * ball.radius
+            };
+            aim.targets.by_discs(is_on) * (PI * radius * radius)
+        });
+        let start = Start::Beyond((center + s * x + t * y + n * radius).as_vec3());
+        let flux = (irradiance.as_dvec3() * (PI * radius * radius)).as_vec3();
+        is_inside.then_some(Made { start, direction: -to_light, flux, ratio })
+    }
+
+    /// About what a light sends towards targets: for the choice among lights.
+    fn towards(&self, number: u32, light: &Light, targets: &Targets) -> f64 {
+        let source = &self.sources[number as usize];
+        let power = strength(source.power);
+        if !(power > 0.0) {
+            return 0.0;
+        }
+        let disc = PI * self.around.radius * self.around.radius;
+        let part = match light {
+            Light::Point(light) => {
+                targets.seen_from(light.position, &Sends::Everywhere).total() / source.spread
+            }
+            Light::Spot(spot) => {
+                let sends = Sends::Cone { light: spot, spread: source.spread };
+                targets.seen_from(spot.point.position, &sends).total() / source.spread
+            }
+            Light::Directional(_) | Light::Environment(_) => targets.discs() / disc,
+            Light::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
+                let of = |i: u32| {
+                    let (u, piece) = (places(i), (i as f32 + 0.5) / PLACES as f32);
+                    let place = surface.place(light, piece, u);
+                    let part = targets.seen_from(place.from, &Sends::Front(place.normal)).total() / PI;
+                    part.min(1.0) * strength(place.flux)
+                };
+                (0..PLACES).map(of).sum::<f64>() / f64::from(PLACES) / power
+            }),
+        };
+        power * part.min(1.0)
+    }
+}
+
+/// How many places of a lamp are asked what they see of the targets.
+const PLACES: u32 = 16;
+
+/// A lattice on the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018).
+fn places(i: u32) -> Vec2 {
+    let along = |step: f64| ((f64::from(i) + 0.5) * step).fract() as f32;
+    Vec2::new(along(0.754_877_666_246_693), along(0.569_840_290_998_053_3))
+}
+
+impl OfLight {
+    fn new(light: &Light, outline: &impl Fn(u32) -> Option<Outline>, around: Ball) -> Self {
+        let disc = PI * around.radius * around.radius;
+        let of = |factor: f64, color: Vec3| (color.as_dvec3() * factor).as_vec3();
+        let without_extent = |falloff: Falloff, spread: f64, intensity: Vec3| {
+            let power = match falloff {
+                Falloff::Square => of(spread, intensity),
+                Falloff::None => Vec3::ZERO,
+            };
+            Self { power, spread, surface: None }
+        };
+        match light {
+            Light::Point(light) => without_extent(light.falloff, 4.0 * PI, light.intensity),
+            Light::Spot(light) => {
+                without_extent(light.point.falloff, light.solid_angle(), light.point.intensity)
+            }
+            Light::Directional(light) => {
+                Self { power: of(disc, light.arriving([0.5; 2]).1), spread: 0.0, surface: None }
+            }
+            Light::Environment(light) => {
+                Self { power: of(4.0 * PI * disc, light.mean()), spread: 0.0, surface: None }
+            }
+            Light::Area(light) => {
+                let surface = outline(light.object).and_then(|outline| Surface::new(light, &outline));
+                let power = surface.as_ref().map_or(Vec3::ZERO, Surface::power);
+                Self { power, spread: 0.0, surface }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,183 @@
+//! Places on lights that are objects.
+
+use std::f64::consts::PI;
+
+use super::Outline;
+use crate::geometry::surface::error;
+use crate::geometry::{AreaPoint, Shape};
+use crate::lights::AreaLight;
+use crate::lights::emitter::Emitter;
+use crate::lights::tree::bounds::strength;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::sampling::distribution::Discrete;
+
+/// The surface of a light in pieces, which are chosen by what they send.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    pieces: Discrete,
+    on: On,
+    /// In W.
+    power: Vec3,
+}
+
+/// What pieces are of.
+#[derive(Clone, Debug)]
+enum On {
+    /// A shape, whose parts are cut into side × side pieces of the same area.
+    Shape {
+        shape: Shape,
+        side: u32,
+        /// Areas of the parts.
+        areas: Vec<f64>,
+        /// The greatest of the lengths that a point is computed from.
+        reach: f64,
+    },
+    /// The triangles of a mesh.
+    Mesh { rounding: f32 },
+}
+
+/// A place on a light.
+pub struct Place {
+    /// The place, rounded.
+    pub point: Vec3,
+    /// The place.
+    pub from: DVec3,
+    /// Unit normal of the front.
+    pub normal: DVec3,
+    /// Bound on the error of each of its components.
+    pub error: Vec3,
+    /// What it sends by the cosine, over the density of such places: the mean is the power of the light, in W.
+    pub flux: Vec3,
+}
+
+/// A point of a piece.
+struct OnPiece {
+    point: DVec3,
+    normal: DVec3,
+    /// Of the piece.
+    area: f64,
+    primitive: u32,
+}
+
+/// How many pieces a lamp with a texture is cut into, at most.
+const PIECES: usize = 1024;
+
+/// Places of a piece along a side that are asked for its texture.
+const ASKED: u32 = 4;
+
+/// The part of the weight of a lamp's pieces that goes by their area: between the places that were asked may be more light.
+const BY_AREA: f64 = 0.05;
+
+impl Surface {
+    /// None of what has no area, or sends nothing.
+    pub fn new(light: &AreaLight, outline: &Outline) -> Option<Self> {
+        let (on, count) = match (outline, &light.shape) {
+            (Outline::Shape(shape), _) => {
+                let areas = shape.areas();
+                let most = if light.pattern.is_some() { PIECES / areas.len().max(1) } else { 1 };
+                let side = most.isqrt().max(1);
+                let count = areas.len() * side * side;
+                (On::Shape { shape: *shape, side: side as u32, areas, reach: reach(shape)? }, count)
+            }
+            (Outline::Mesh { rounding }, Emitter::Mesh(mesh)) => {
+                (On::Mesh { rounding: *rounding }, mesh.primitives().count())
+            }
+            (
+                Outline::Mesh { .. },
+                Emitter::Sphere(_)
+                | Emitter::Quad(_)
+                | Emitter::Box(_)
+                | Emitter::Triangle(_)
+                | Emitter::Disk(_)
+                | Emitter::Cylinder(_)
+                | Emitter::Cone(_)
+                | Emitter::Torus(_),
+            ) => return None,
+        };
+        let asked = if light.pattern.is_some() { ASKED } else { 1 };
+        let of = |index: usize| {
+            let mut sum = DVec3::ZERO;
+            let mut area = 0.0;
+            for i in 0..asked * asked {
+                let u = Vec2::new((i % asked) as f32 + 0.5, (i / asked) as f32 + 0.5) / asked as f32;
+                let place = on.at(light, index, u);
+                area = place.area;
+                sum += radiance(light, &place).as_dvec3();
+            }
+            (area, sum * (area * PI / f64::from(asked * asked)))
+        };
+        let all: Vec<(f64, DVec3)> = (0..count).map(of).collect();
+        let power: DVec3 = all.iter().map(|(_, power)| *power).sum();
+        let area: f64 = all.iter().map(|(area, _)| area).sum();
+        let total = strength(power.as_vec3());
+        let by_power = if total > 0.0 { (1.0 - BY_AREA) / total } else { 0.0 };
+        let weight =
+            |(own, power): &(f64, DVec3)| BY_AREA * own / area + by_power * power.element_sum() / 3.0;
+        let pieces = Discrete::new(all.iter().map(weight))?;
+        Some(Self { pieces, on, power: power.as_vec3() })
+    }
+
+    /// What it sends, in W; of a lamp with a texture the mean over places close to each other.
+    pub fn power(&self) -> Vec3 {
+        self.power
+    }
+
+    /// A place by numbers in [0, 1).
+    pub fn place(&self, light: &AreaLight, piece: f32, u: Vec2) -> Place {
+        let (index, _) = self.pieces.sample(piece);
+        let place = self.on.at(light, index, u);
+        let OnPiece { point, normal, area, .. } = place;
+        let factor = PI * area / self.pieces.share(index);
+        let flux = (radiance(light, &place).as_dvec3() * factor).as_vec3();
+        let rounded = point.as_vec3();
+        let error = match self.on {
+            On::Shape { reach, .. } => error(rounded, reach),
+            On::Mesh { rounding } => error(rounded, 0.0) + Vec3::splat(rounding),
+        };
+        Place { point: rounded, from: point, normal, error, flux }
+    }
+}
+
+impl On {
+    /// A place of a piece, uniform over it.
+    fn at(&self, light: &AreaLight, index: usize, u: Vec2) -> OnPiece {
+        match (self, &light.shape) {
+            (Self::Shape { shape, side, areas, .. }, _) => {
+                let all = *side as usize;
+                let (part, cell) = (index / (all * all), index % (all * all));
+                let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
+                let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
+                let AreaPoint { point, normal } = shape.place(part as u32, u);
+                OnPiece { point, normal, area: areas[part] / (all * all) as f64, primitive: part as u32 }
+            }
+            (Self::Mesh { .. }, Emitter::Mesh(mesh)) => {
+                let (place, area, primitive) = mesh.place(index, u);
+                OnPiece { point: place.point, normal: place.normal, area, primitive }
+            }
+            (
+                Self::Mesh { .. },
+                Emitter::Sphere(_)
+                | Emitter::Quad(_)
+                | Emitter::Box(_)
+                | Emitter::Triangle(_)
+                | Emitter::Disk(_)
+                | Emitter::Cylinder(_)
+                | Emitter::Cone(_)
+                | Emitter::Torus(_),
+            ) => OnPiece { point: DVec3::ZERO, normal: DVec3::Y, area: 0.0, primitive: 0 },
+        }
+    }
+}
+
+/// What a place sends, W·sr⁻¹·m⁻².
+fn radiance(light: &AreaLight, place: &OnPiece) -> Vec3 {
+    let pattern = light.pattern.as_ref();
+    light.radiance * pattern.map_or(Vec3::ONE, |pattern| pattern.at(place.point.as_vec3(), place.primitive))
+}
+
+/// No less than the lengths that the points of a shape are computed from; none where it has no end.
+fn reach(shape: &Shape) -> Option<f64> {
+    let bounds = shape.bounds()?;
+    let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
+    Some(greatest + 2.0 * bounds.extent().as_dvec3().length())
+}
