@@ -15,7 +15,7 @@
 //! | [`accel`] | trees over boxes and ids, a closure tests the shape; over triangles, of boxes by vector instructions and of planes |
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | phong and its lobes, mirror, glass; texture lookup, normal maps, Fresnel |
-//! | [`lights`] | point and area lights, light from beyond the scene; a tree over many |
+//! | [`lights`] | point and area lights, light from beyond the scene; a tree over many; the photons that they emit |
 //! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |
 //! | [`world`] | everything ready to trace, immutable |

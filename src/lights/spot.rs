@@ -110,11 +110,12 @@ fn edge(half: f64, delta: f64) -> f64 {
         let third = h2 * half / 2.0 - h2 * delta + 0.75 * half * d2 - d2 * delta / 5.0;
         return d2 * (half / 2.0 - delta / 3.0 - third / 6.0);
     }
-    delta * libm::cos(half - delta) - 2.0 * libm::cos(half - 0.5 * delta) * libm::sin(0.5 * delta)
+    let ((sin, cos), (sin_half, cos_half)) = (libm::sincos(half - delta), libm::sincos(0.5 * delta));
+    delta * cos - 2.0 * sin_half * (cos * cos_half - sin * sin_half)
 }
 
 /// The way from the edge of a cone inwards, in [0, width], behind which there is a part of all that [`edge`] sums up: Newton's
-/// method between bounds.
+/// method between bounds, whose last step is far smaller than the one before.
 fn from_edge(half: f64, width: f64, part: f64) -> f64 {
     let goal = part * edge(half, width);
     let (mut low, mut high) = (0.0, width);
@@ -122,14 +123,10 @@ fn from_edge(half: f64, width: f64, part: f64) -> f64 {
     let mut delta = width * part.sqrt();
     for _ in 0..60 {
         let off = edge(half, delta) - goal;
-        if off > 0.0 {
-            high = delta
-        } else {
-            low = delta
-        }
+        (low, high) = if off > 0.0 { (low, delta) } else { (delta, high) };
         let next = delta - off / (delta * libm::sin(half - delta));
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        let is_there = (next - delta).abs() <= 1e-9 * width;
+        let is_there = (next - delta).abs() <= 1e-6 * delta;
         delta = next;
         if is_there {
             break;

@@ -145,3 +145,50 @@ fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u
     let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
     (0..mesh.triangles.len() as u32).filter(is_meant)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assets::LoadedMesh;
+    use crate::control::CancelToken;
+    use crate::geometry::mesh::TriangleMesh;
+    use crate::lights::{Numbers, Start};
+    use crate::math::random;
+    use crate::math::transform::Transform;
+    use crate::scene::description::Accel;
+    use crate::world::MeshTree;
+
+    #[test]
+    fn photons_leave_a_convex_mesh_wherever_it_stands_and_however_large_it_is() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
+        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+        let token = CancelToken::new();
+        let tree = Arc::new(MeshTree::build(loaded, Accel::Bvh, &token).expect("nobody cancels"));
+        let turned = DVec3::new(30.0, -50.0, 80.0);
+        for (scale, at) in [
+            (DVec3::ONE, DVec3::ZERO),
+            (DVec3::new(0.5, -2.0, 1.0), DVec3::new(3.0, -1.0, 2.0)),
+            (DVec3::splat(1e-2), DVec3::new(1e3, 20.0, -400.0)),
+            (DVec3::new(1e4, 1e4, -1e3), DVec3::new(-1.0, 5.0, 0.0)),
+        ] {
+            let transform = Transform::scale_rotate_translate(scale, turned, at);
+            let mesh = MeshInstance { tree: Arc::clone(&tree), transform, smooth: false };
+            let emission = Emission::constant(Vec3::ONE);
+            let lights = mesh_lights(0, &mesh, Some(&emission), &Images::default());
+            let lights = Arc::new(Lights::new(lights.into_iter().map(Light::Area).collect()));
+            let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);
+            let geometry = geometry.expect("nobody cancels");
+            let source = photon_source(&geometry, &lights).expect("it shines");
+            let mut next = random::unit(1);
+            for _ in 0..20_000 {
+                let mut pair = || [next(), next()];
+                let u = Numbers { light: pair(), aim: pair(), position: pair(), direction: pair() };
+                let photon = source.emit(&u).expect("a photon");
+                assert!(matches!(photon.start, Start::Surface { .. }));
+                assert_eq!(geometry.closest(&photon.ray()), None, "{scale} {at}: {photon:?}");
+            }
+        }
+    }
+}

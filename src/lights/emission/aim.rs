@@ -2,6 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use arrayvec::ArrayVec;
+
 use super::Ball;
 use crate::lights::SpotLight;
 use crate::lights::sphere::one_minus_cos;
@@ -108,14 +110,19 @@ impl Targets {
     }
 
     /// As they are seen from a point that sends light.
-    pub fn seen_from<'a>(&'a self, from: DVec3, sends: &'a Sends<'a>) -> View<'a> {
-        let mut view = View { targets: self, from, sends, weights: [0.0; MOST_TARGETS], total: 0.0 };
-        for (weight, ball) in view.weights.iter_mut().zip(&self.balls) {
-            *weight = match Cone::around(ball, from) {
+    #[inline]
+    pub fn seen_from<'a>(&self, from: DVec3, sends: &'a Sends<'a>) -> View<'a> {
+        let mut view = View { sends, seen: ArrayVec::new(), total: 0.0 };
+        for ball in &self.balls {
+            let cone = Cone::around(ball, from);
+            let weight = match &cone {
                 Some(cone) => cone.solid_angle() * sends.greatest(cone.axis, cone.sin),
                 None => sends.spread(),
             };
-            view.total += *weight;
+            if weight > 0.0 {
+                view.total += weight;
+                view.seen.push(Seen { cone, weight });
+            }
         }
         view
     }
@@ -123,12 +130,18 @@ impl Targets {
 
 /// Targets as they are seen from a point that sends light.
 pub struct View<'a> {
-    targets: &'a Targets,
-    from: DVec3,
     sends: &'a Sends<'a>,
-    /// A bound on what each gets, in units of what goes into the brightest direction, in sr.
-    weights: [f64; MOST_TARGETS],
+    /// Those that are reached.
+    seen: ArrayVec<Seen, MOST_TARGETS>,
     total: f64,
+}
+
+/// A target as it is seen from a point that sends light.
+struct Seen {
+    /// None where it is all around the point.
+    cone: Option<Cone>,
+    /// A bound on what it gets, in units of what goes into the brightest direction, in sr.
+    weight: f64,
 }
 
 impl View<'_> {
@@ -141,15 +154,14 @@ impl View<'_> {
     /// then directions that are not aimed stand for it.
     pub fn sample(&self, u: f32, direction: [f32; 2]) -> Option<(Vec3, usize)> {
         let goal = f64::from(u) * self.total;
-        let (mut sum, mut chosen) = (0.0, None);
-        for (number, weight) in self.weights[..self.targets.balls.len()].iter().enumerate() {
-            if *weight > 0.0 && sum <= goal {
-                chosen = Some(number);
+        let (mut sum, mut target) = (0.0, 0);
+        for (number, seen) in self.seen.iter().enumerate() {
+            if sum <= goal {
+                target = number;
             }
-            sum += weight;
+            sum += seen.weight;
         }
-        let target = chosen?;
-        let cone = Cone::around(&self.targets.balls[target], self.from)?;
+        let cone = self.seen.get(target)?.cone.as_ref()?;
         let local = warp::cone(direction, cone.one_minus_cos);
         Some((Frame::from_normal(cone.axis.as_vec3()).to_world(local), target))
     }
@@ -160,20 +172,20 @@ impl View<'_> {
         if !(self.total > 0.0) {
             return 1.0;
         }
-        let density = self.sends.share(direction) / self.sends.spread();
-        let of = |(number, ball): (usize, &Ball)| {
-            let part = self.weights[number] / self.total;
-            match Cone::around(ball, self.from) {
+        let (mut by_cones, mut by_others) = (0.0, 0.0);
+        for (number, Seen { cone, weight }) in self.seen.iter().enumerate() {
+            match cone {
                 // The very edge may be on either side.
                 Some(cone) if made_for == Some(number) || cone.holds(direction) => {
-                    part / (cone.solid_angle() * density)
+                    by_cones += weight / cone.solid_angle();
                 }
-                Some(_) => 0.0,
-                None => part,
+                Some(_) => {}
+                None => by_others += weight,
             }
-        };
-        let is_reached = |(number, _): &(usize, &Ball)| self.weights[*number] > 0.0;
-        self.targets.balls.iter().enumerate().filter(is_reached).map(of).sum()
+        }
+        let by_cones =
+            if by_cones > 0.0 { by_cones * self.sends.spread() / self.sends.share(direction) } else { 0.0 };
+        (by_cones + by_others) / self.total
     }
 }
 

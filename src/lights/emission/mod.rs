@@ -235,11 +235,11 @@ impl PhotonSource {
             }
             Light::Directional(light) => {
                 let (to_light, irradiance) = light.arriving(u.direction);
-                self.from_beyond(to_light, irradiance, targets, u)
+                self.arriving_beyond(to_light, irradiance, targets, u)
             }
             Light::Environment(light) => {
                 let (to_light, irradiance) = light.arriving_anywhere(u.direction);
-                self.from_beyond(to_light, irradiance, targets, u)
+                self.arriving_beyond(to_light, irradiance, targets, u)
             }
             Light::Area(light) => {
                 let place = source.surface.as_ref()?.place(light, u.light[1], Vec2::from_array(u.position));
@@ -287,7 +287,7 @@ impl PhotonSource {
     }
 
     /// A photon from a direction, with the irradiance at normal incidence that it stands for.
-    fn from_beyond(
+    fn arriving_beyond(
         &self,
         to_light: Vec3,
         irradiance: Vec3,
