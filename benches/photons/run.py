@@ -11,6 +11,7 @@ samples over 8 seeds, or by photons of a --radius so small that it shows nothing
 import argparse
 import json
 import math
+import os
 import statistics
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 HOME = ROOT / "target" / "photons"
-SIDE = 256
+SIDE = int(os.environ.get("SIDE", "256"))
 # Scene, settings, and whether pixels that see its mirrors and glass are left out.
 SCENES = {
     "caustic": ("scenes/photons.toml", ["render.max_depth=8", "photons.count=100000"], True),

@@ -61,7 +61,7 @@ const CHUNK: u32 = 2048;
 const KEPT: f64 = 2.0 / 3.0;
 
 /// Photons that the first kernels are to hold, in the middle of the caustic ones, of those thrown back from caustics, and of all.
-const WANTED: [f32; 3] = [12.0, 32.0, 12.0];
+const WANTED: [f32; 3] = [12.0, 32.0, 4.0];
 
 /// The part of the photons that are aimed at mirrors and glass, where there are any.
 const AIMED: f32 = 0.5;
