@@ -5,12 +5,13 @@
 
 Renders each scene by photons and by `path` with 4, 16, 64, … samples, and prints seconds of rendering and relMSE, the slope of
 the error between the last two, and the mean of the picture over that of the reference. The reference is by paths with --reference
-samples over 8 seeds; it is kept under target/photons. Pixels that see mirror or glass balls are left out where the scene says so.
+samples over 8 seeds, or by photons of a --radius so small that it shows nothing; it is kept under target/photons. Pixels that see mirror or glass balls are left out where the scene says so.
 """
 
 import argparse
 import json
 import math
+import os
 import statistics
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 HOME = ROOT / "target" / "photons"
-SIDE = 256
+SIDE = int(os.environ.get("SIDE", "256"))
 # Scene, settings, and whether pixels that see its mirrors and glass are left out.
 SCENES = {
     "caustic": ("scenes/photons.toml", ["render.max_depth=8", "photons.count=100000"], True),
@@ -82,12 +83,15 @@ def mean(pixels, used):
     return sum(sum(p) for p, u in zip(pixels, used) if u)
 
 
-def reference(glimt, name, samples, seeds=8):
-    kept = HOME / f"{name}-{samples}.json"
+def reference(glimt, name, samples, radius, seeds):
+    more = ["--integrator", "path"]
+    if radius:
+        more = ["--integrator", "whitted", "--photons", "on", "--set", f"photons.radius={radius}"]
+    kept = HOME / f"{name}-{SIDE}-{samples}-{radius}-{seeds}.json"
     if not kept.exists():
         sums = None
         for seed in range(1000, 1000 + seeds):
-            pixels, _ = render(glimt, name, ["--integrator", "path"], samples, seed)
+            pixels, _ = render(glimt, name, more, samples, seed)
             sums = pixels if sums is None else [tuple(map(sum, zip(a, b))) for a, b in zip(sums, pixels)]
         kept.write_text(json.dumps([tuple(x / seeds for x in p) for p in sums]))
     return json.loads(kept.read_text())
@@ -99,12 +103,14 @@ def main():
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--most", type=int, default=64)
     parser.add_argument("--reference", type=int, default=4096)
+    parser.add_argument("--reference-seeds", type=int, default=8)
+    parser.add_argument("--radius", type=float, default=0, help="references by photons of this small radius in place of paths")
     parser.add_argument("--glimt", default=ROOT / "target" / "release" / "glimt")
     parser.add_argument("--by", nargs="*", default=["photons", "path"])
     asked = parser.parse_args()
     HOME.mkdir(parents=True, exist_ok=True)
     for name in asked.names:
-        truth = reference(asked.glimt, name, asked.reference)
+        truth = reference(asked.glimt, name, asked.reference, asked.radius, asked.reference_seeds)
         used = [True] * len(truth)
         if SCENES[name][2]:
             # Mirror and glass have no albedo.

@@ -5,7 +5,7 @@ use super::super::lit_row::LitRow;
 use super::super::shot::Shot;
 use super::super::view::{Measure, Ways};
 use super::PhotonMaps;
-use super::map::{Photon, PhotonMap, Way};
+use super::map::{Photon, Way};
 use crate::geometry::rows::lanes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
@@ -46,35 +46,29 @@ impl Loops for Gathering<'_> {
             let by_photons = row.albedos[1][i] == 0.0;
             let without_caustics = row.from_gloss & 1 << i == 0;
             let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
+            let maps = if is_seen {
+                let bounced = indirect && by_photons;
+                [caustic.then_some((&pass.caustic, false)), bounced.then_some((&pass.bounced, false))]
+            } else {
+                [indirect.then_some((&pass.all, without_caustics)), None]
+            };
+            let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
             let mut sum = Vec3::ZERO;
-            let mut add = |map: &PhotonMap, takes: &dyn Fn(Way) -> bool| {
+            for (map, leaves_caustics_out) in maps.into_iter().flatten() {
                 if measure == Measure::Work {
                     map.visit(place, most_depth, |_, _| sum += Vec3::ONE);
-                } else if specular == Vec3::ZERO {
-                    map.visit(place, most_depth, |photon: &Photon, density| {
-                        let taken = if takes(photon.way) { density } else { 0.0 };
-                        sum += diffuse * photon.flux * (taken * row.landed(i, photon.direction));
-                    });
-                } else {
-                    let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
-                    map.visit(place, most_depth, |photon: &Photon, density| {
-                        let f = diffuse + specular * gloss(mirrored, photon.direction, shininess);
-                        let taken = if takes(photon.way) { density } else { 0.0 };
-                        sum += f * photon.flux * (taken * row.landed(i, photon.direction));
-                    });
+                    continue;
                 }
-            };
-            if !is_seen {
-                if indirect {
-                    add(&pass.all, &|way| !(without_caustics && way == Way::Caustic));
-                }
-            } else {
-                if caustic {
-                    add(&pass.caustic, &|_| true);
-                }
-                if indirect && by_photons {
-                    add(&pass.bounced, &|_| true);
-                }
+                map.visit(place, most_depth, |photon: &Photon, density| {
+                    if leaves_caustics_out && photon.way == Way::Caustic {
+                        return;
+                    }
+                    let mut f = diffuse;
+                    if specular != Vec3::ZERO {
+                        f += specular * gloss(mirrored, photon.direction, shininess);
+                    }
+                    sum += f * photon.flux * (density * row.landed(i, photon.direction));
+                });
             }
             set_lane(&mut sums, i, sum);
         }

@@ -200,7 +200,12 @@ fn row(of: &[f32], start: usize) -> Option<&[f32; LANES]> {
 /// The cell of a point.
 #[inline(always)]
 fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
-    [point.x, point.y, point.z].map(|x| (x * cells).floor() as i32)
+    // The system's floor is a call; a number that is too large for its cell is in the last one.
+    let below = |x: f32| {
+        let whole = x as i32;
+        whole.wrapping_sub(i32::from(whole as f32 > x))
+    };
+    [below(point.x * cells), below(point.y * cells), below(point.z * cells)]
 }
 
 /// The bucket of a cell: those of one column follow each other.
@@ -208,4 +213,75 @@ fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
 fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
     let hash = (y as u32).wrapping_mul(0x9e37_79b1) ^ (z as u32).wrapping_mul(0x85eb_ca77).rotate_left(16);
     (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d).rotate_left(13).wrapping_add(x as u32) & mask
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::signed as random;
+
+    fn photon(point: Vec3, normal: Vec3) -> Photon {
+        Photon { point, direction: normal, flux: Vec3::ONE, normal, depth: 1, way: Way::Caustic }
+    }
+
+    #[test]
+    fn a_map_finds_what_a_look_at_all_photons_finds_each_once() {
+        let mut next = random(5);
+        for count in [0, 1, 2, 3, 17, 3000] {
+            for radius in [1e-3_f32, 0.05, 0.4, 30.0] {
+                let mut place = || {
+                    let point = Vec3::new(next(), next(), 0.1 * next()) * 3.0;
+                    let normal = if next() > 0.0 { Vec3::Z } else { Vec3::new(0.6, 0.0, 0.8) };
+                    (point, normal)
+                };
+                let photons: Vec<Photon> = (0..count).map(|_| place()).map(|(p, n)| photon(p, n)).collect();
+                let map = PhotonMap::new(&photons, radius, &CancelToken::new()).expect("nobody cancels");
+                assert_eq!(map.len(), count);
+                for _ in 0..60 {
+                    let (point, normal) = place();
+                    let mut found = Vec::new();
+                    map.visit((point, normal), 1, |photon, density| {
+                        found.push((photon.point.to_array(), density))
+                    });
+                    let near = |photon: &&Photon| {
+                        let way = photon.point - point;
+                        let above = way.dot(normal);
+                        let is_near = way.length_squared() - above * above < radius * radius;
+                        let is_flat = above.abs() < REACH * radius;
+                        is_near && is_flat && photon.normal.dot(normal) > LEAST_COSINE
+                    };
+                    let mut expected: Vec<_> =
+                        photons.iter().filter(near).map(|photon| photon.point.to_array()).collect();
+                    let mut points: Vec<_> = found.iter().map(|(point, _)| *point).collect();
+                    points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
+                    expected.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
+                    assert!(points.len().abs_diff(expected.len()) <= 1, "but for rounding at the edge");
+                    let peak = 2.0 / (std::f32::consts::PI * radius * radius);
+                    assert!(found.iter().all(|(_, density)| *density >= 0.0 && *density <= peak));
+                    points.dedup();
+                    assert_eq!(points.len(), found.len(), "each once");
+                    assert!(points.iter().filter(|point| !expected.contains(point)).count() <= 1);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_kernel_sums_to_one_and_leaves_out_what_came_too_late() {
+        // Photons on a fine grid stand for their areas.
+        let step = 0.01_f32;
+        let at = |i: i32| (i as f32 + 0.3) * step;
+        let place = |i: i32| photon(Vec3::new(at(i % 200 - 100), 0.5, at(i / 200 - 100)), Vec3::Y);
+        let photons: Vec<Photon> = (0..40_000).map(place).collect();
+        let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("nobody cancels");
+        let sum = |most_depth: u32, normal: Vec3| {
+            let mut sum = 0.0;
+            map.visit((Vec3::new(0.1, 0.5, -0.2), normal), most_depth, |_, density| {
+                sum += density * step * step
+            });
+            sum
+        };
+        assert!((sum(1, Vec3::Y) - 1.0).abs() < 2e-3, "{}", sum(1, Vec3::Y));
+        assert_eq!((sum(0, Vec3::Y), sum(1, Vec3::NEG_Y)), (0.0, 0.0));
+    }
 }
