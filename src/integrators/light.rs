@@ -39,6 +39,15 @@ pub struct LightRays {
     pub lookups: u64,
 }
 
+impl LightRays {
+    /// Add those of others.
+    pub fn add(&mut self, other: Self) {
+        self.shadow += other.shadow;
+        self.scattered += other.scattered;
+        self.lookups += other.lookups;
+    }
+}
+
 /// What of the light that arrives at the vertices of a row gets to the eye.
 pub(super) struct Arrived {
     /// Before the throughput of the paths.
@@ -82,10 +91,10 @@ struct Waiting {
 }
 
 impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
-    type Done = Arrived;
+    type Done = Sums;
 
     #[inline(always)]
-    fn run(self) -> Arrived {
+    fn run(self) -> Sums {
         let render = &self.shot.settings.render;
         let mut sampler = None;
         let mut sums = Sums::NOTHING;
@@ -128,7 +137,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                 self.add_waiting(light.middle(), &waiting, &mut sums);
             }
         }
-        sums.arrived(self.measure)
+        sums
     }
 }
 

@@ -1,12 +1,15 @@
 //! The rows of vertices that wait to be lit, and what arrives by them.
 
+use arrayvec::ArrayVec;
+
 use super::beside::{LobeRays, Others};
 use super::cone::Cone;
-use super::light::{LightRays, Lighting};
+use super::light::{LightRays, Lighting, Sums};
 use super::lit_row::{ALL, LitRow};
 use super::medium::Medium;
 use super::onward::{Onward, Scattering};
 use super::picking::Picking;
+use super::pool::Pool;
 use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
@@ -31,9 +34,14 @@ pub struct LitQueue {
     arrived: Vec<Vec3>,
     /// The glass around vertices; the first is none.
     media: Vec<Medium>,
+    /// Shadow rays of some rows.
+    pool: Pool,
     /// The beams that come to the vertices of the paths of the round, where they are asked for.
     cones: Vec<Cone>,
 }
+
+/// Rows that are lit together where lights are picked.
+const ROWS: usize = 64;
 
 impl LitQueue {
     /// Rows from which on they are lit before more come, while what they need is in the cache.
@@ -131,6 +139,8 @@ impl LitQueue {
     /// Forget all vertices.
     fn clear(&mut self) {
         (self.count, self.open) = (0, 0);
+        // Rays of a round that was cancelled.
+        self.pool.clear();
     }
 
     /// Light all vertices and forget them; what rays that took. Where paths go on from them, the rays of the next round
@@ -143,58 +153,110 @@ impl LitQueue {
         next: &mut Vec<PathRay>,
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
-        for row in &mut self.rows[..self.count] {
-            shot.token.check()?;
-            if row.may_lift != 0 {
-                shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
-            }
-            let row = &*row;
-            let media = (self.media.len() > 1 && row.is_inside()).then_some(&*self.media);
-            let others = match onward {
-                Some(_) => Others::Paths,
-                None => Others::lobes(row.sharp(shot, measure)),
-            };
-            let instructions = shot.world.geometry.instructions();
-            let used = row.used;
-            let plain = Lighting::<false> { shot, row, used, measure, others, media };
-            let weighed = Lighting::<true> { shot, row, used, measure, others, media };
-            let mut arrived = match (others, shot.world.lights.tree()) {
-                (Others::Nothing, None) => instructions.run(plain),
-                (Others::Nothing, Some(tree)) => instructions.run(Picking { lighting: plain, tree }),
-                (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
-                (Others::Paths | Others::Lobes(_), Some(tree)) => {
-                    instructions.run(Picking { lighting: weighed, tree })
+        let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
+        let together = if shot.world.lights.tree().is_some() { ROWS } else { 1 };
+        for first in (0..self.count).step_by(together) {
+            let end = (first + together).min(self.count);
+            group.clear();
+            for number in first..end {
+                shot.token.check()?;
+                let row = &mut self.rows[number];
+                if row.may_lift != 0 {
+                    shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
                 }
-            };
-            if let Others::Lobes(sharp) = others {
-                arrived = instructions.run(LobeRays { shot, row, sharp, measure, media, arrived });
-            }
-            rays.shadow += arrived.rays.shadow;
-            rays.scattered += arrived.rays.scattered;
-            rays.lookups += arrived.rays.lookups;
-            arrived.light = match measure {
-                Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(&arrived.light),
-                Measure::Work => arrived.light,
-            };
-            match row.run() {
-                Some(first) => {
-                    let own = &mut self.arrived[first as usize..][..LANES];
-                    for (i, own) in own.iter_mut().enumerate() {
-                        *own = lane(&arrived.light, i);
-                    }
-                }
-                None => {
-                    for i in lanes(row.used) {
-                        self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
-                    }
+                let sums = self.sums(number, shot, (measure, onward), group.len() as u32);
+                group.push(sums);
+                if self.pool.is_full() {
+                    self.pool.trace(&shot.world.geometry, &mut group);
                 }
             }
-            if let Some(onward) = onward.filter(|onward| onward.leads_on) {
-                Scattering { shot, row, onward }.scatter(&self.media, &self.cones, next);
+            self.pool.trace(&shot.world.geometry, &mut group);
+            for (number, sums) in (first..end).zip(group.drain(..)) {
+                rays.add(self.finish(number, shot, (measure, onward), sums));
+                if let Some(onward) = onward.filter(|onward| onward.leads_on) {
+                    let row = &self.rows[number];
+                    Scattering { shot, row, onward }.scatter(&self.media, &self.cones, next);
+                }
             }
         }
         self.clear();
         Ok(rays)
+    }
+
+    /// What finds light beside samples of the lamps at a row.
+    fn others(row: &LitRow, shot: &Shot<'_>, (measure, onward): (Measure, Option<Onward>)) -> Others {
+        match onward {
+            Some(_) => Others::Paths,
+            None => Others::lobes(row.sharp(shot, measure)),
+        }
+    }
+
+    /// The glass around the vertices of a row; none where all are in air.
+    fn media_of(&self, row: &LitRow) -> Option<&[Medium]> {
+        (self.media.len() > 1 && row.is_inside()).then_some(&*self.media)
+    }
+
+    /// What samples of the lamps bring to a row; rays to lamps that were picked wait, under a number.
+    fn sums(
+        &mut self,
+        row: usize,
+        shot: &Shot<'_>,
+        (measure, onward): (Measure, Option<Onward>),
+        number: u32,
+    ) -> Sums {
+        let mut pool = std::mem::take(&mut self.pool);
+        let row = &self.rows[row];
+        let (others, media) = (Self::others(row, shot, (measure, onward)), self.media_of(row));
+        let (instructions, used) = (shot.world.geometry.instructions(), row.used);
+        let plain = Lighting::<false> { shot, row, used, measure, others, media };
+        let weighed = Lighting::<true> { shot, row, used, measure, others, media };
+        let sums = match (others, shot.world.lights.tree()) {
+            (Others::Nothing, None) => instructions.run(plain),
+            (Others::Nothing, Some(tree)) => {
+                instructions.run(Picking { lighting: plain, tree, number, pool: &mut pool })
+            }
+            (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
+            (Others::Paths | Others::Lobes(_), Some(tree)) => {
+                instructions.run(Picking { lighting: weighed, tree, number, pool: &mut pool })
+            }
+        };
+        self.pool = pool;
+        sums
+    }
+
+    /// Note what arrives at a row; what rays that took.
+    fn finish(
+        &mut self,
+        row: usize,
+        shot: &Shot<'_>,
+        (measure, onward): (Measure, Option<Onward>),
+        sums: Sums,
+    ) -> LightRays {
+        let row = &self.rows[row];
+        let mut arrived = sums.arrived(measure);
+        if let Others::Lobes(sharp) = Self::others(row, shot, (measure, onward)) {
+            let media = self.media_of(row);
+            let lobes = LobeRays { shot, row, sharp, measure, media, arrived };
+            arrived = shot.world.geometry.instructions().run(lobes);
+        }
+        arrived.light = match measure {
+            Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(&arrived.light),
+            Measure::Work => arrived.light,
+        };
+        match row.run() {
+            Some(first) => {
+                let own = &mut self.arrived[first as usize..][..LANES];
+                for (i, own) in own.iter_mut().enumerate() {
+                    *own = lane(&arrived.light, i);
+                }
+            }
+            None => {
+                for i in lanes(row.used) {
+                    self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
+                }
+            }
+        }
+        arrived.rays
     }
 }
 

@@ -4,7 +4,7 @@
 //! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues` with the beams that they
 //! stand for (`cone`), their way to hits (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what
 //! touches it (`crossing`), the ways on at mirrors and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the
-//! `light` there, the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows
+//! `light` there, that of lights which are picked (`picking`, `pool`), the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows
 //! the rays round by round, for both methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are
 //! of first hits, `bounds` are lines over the picture.
 
@@ -21,6 +21,7 @@ mod medium;
 mod onward;
 mod packet;
 mod picking;
+mod pool;
 mod queues;
 mod settings;
 mod shot;
@@ -39,6 +40,7 @@ use crate::film::{NegativeLobes, Rect, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
+pub use picking::picks;
 use queues::Queues;
 pub use settings::RenderSettings;
 use shot::{SampleBlock, Shot};
