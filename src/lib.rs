@@ -41,7 +41,7 @@
 //! accel       -> geometry math control
 //! sampling    -> math choice
 //! materials   -> math choice
-//! lights      -> geometry sampling materials math choice
+//! lights      -> geometry sampling materials math choice control
 //! scene       -> geometry materials lights sampling film math choice system
 //! assets      -> geometry materials math control system
 //! world       -> scene assets accel materials lights geometry math control

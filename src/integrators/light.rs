@@ -90,10 +90,10 @@ struct Waiting {
 }
 
 impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
-    type Done = Arrived;
+    type Done = Sums;
 
     #[inline(always)]
-    fn run(self) -> Arrived {
+    fn run(self) -> Sums {
         let render = &self.shot.settings.render;
         let mut sampler = None;
         let mut sums = Sums::NOTHING;
@@ -136,7 +136,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                 self.add_waiting(light.middle(), &waiting, &mut sums);
             }
         }
-        sums.arrived(self.measure)
+        sums
     }
 }
 

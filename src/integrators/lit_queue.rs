@@ -1,14 +1,17 @@
 //! The rows of vertices that wait to be lit, and what arrives by them.
 
+use arrayvec::ArrayVec;
+
 use super::beside::{LobeRays, Others};
 use super::cone::Cone;
-use super::light::{Arrived, LightRays, Lighting, add_where};
+use super::light::{Arrived, LightRays, Lighting, Sums, add_where};
 use super::lit_row::{ALL, LitRow};
 use super::medium::Medium;
 use super::onward::{Onward, Scattering};
 use super::photons::PhotonMaps;
 use super::photons::gather::Gathering;
 use super::picking::Picking;
+use super::pool::Pool;
 use super::queues::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
@@ -34,9 +37,14 @@ pub struct LitQueue {
     arrived: Vec<Vec3>,
     /// The glass around vertices; the first is none.
     media: Vec<Medium>,
+    /// Shadow rays of some rows.
+    pool: Pool,
     /// The beams that come to the vertices of the paths of the round, where they are asked for.
     cones: Vec<Cone>,
 }
+
+/// Rows that are lit together where lights are picked.
+const ROWS: usize = 64;
 
 impl LitQueue {
     /// Rows from which on they are lit before more come, while what they need is in the cache.
@@ -134,6 +142,8 @@ impl LitQueue {
     /// Forget all vertices.
     fn clear(&mut self) {
         (self.count, self.open) = (0, 0);
+        // Rays of a round that was cancelled.
+        self.pool.clear();
     }
 
     /// Light all vertices and forget them; what rays that took. Where paths go on from them, the rays of the next round
@@ -146,43 +156,154 @@ impl LitQueue {
         next: &mut Vec<PathRay>,
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
-        for row in &mut self.rows[..self.count] {
-            shot.token.check()?;
-            if row.may_lift != 0 {
-                shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
-            }
-            let row = &*row;
-            let media = (self.media.len() > 1 && row.is_inside()).then_some(&*self.media);
-            let asked = Asked { shot, row, measure, media };
-            let mut arrived = match shot.photons {
-                Some(maps) => asked.lit_and_gathered(maps, (depth, onward)),
-                None => asked.lit(row.used & shown(row, measure), onward.is_some()),
-            };
-            rays += arrived.rays;
-            arrived.light = match measure {
-                Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(&arrived.light),
-                Measure::Work => arrived.light,
-            };
-            match row.run() {
-                Some(first) => {
-                    let own = &mut self.arrived[first as usize..][..LANES];
-                    for (i, own) in own.iter_mut().enumerate() {
-                        *own = lane(&arrived.light, i);
-                    }
+        let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
+        let together = if shot.world.lights.tree().is_some() { ROWS } else { 1 };
+        let by_paths = onward.is_some();
+        let scatters = onward.filter(|onward| onward.leads_on);
+        for first in (0..self.count).step_by(together) {
+            let end = (first + together).min(self.count);
+            for number in first..end {
+                shot.token.check()?;
+                let row = &mut self.rows[number];
+                if row.may_lift != 0 {
+                    shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
                 }
-                None => {
-                    for i in lanes(row.used) {
-                        self.arrived[row.place[i] as usize] = lane(&arrived.light, i);
+                if let Some(maps) = shot.photons {
+                    let arrived = self.lit_and_gathered(number, shot, maps, measure, (depth, onward));
+                    rays += arrived.rays;
+                    self.note(number, measure, arrived);
+                } else {
+                    let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
+                    let sums = self.sums(asked, shot, measure, group.len() as u32);
+                    group.push(sums);
+                    if self.pool.is_full() {
+                        self.pool.trace(&shot.world.geometry, &mut group);
                     }
                 }
             }
-            if let Some(onward) = onward.filter(|onward| onward.leads_on) {
-                let used = if shot.photons.is_some() { row.used & row.seen } else { row.used };
-                Scattering { shot, row, used, onward }.scatter(&self.media, &self.cones, next);
+            self.pool.trace(&shot.world.geometry, &mut group);
+            for (number, sums) in (first..end).zip(group.drain(..)) {
+                let row = &self.rows[number];
+                let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
+                let arrived = self.arrived(asked, shot, measure, sums);
+                rays += arrived.rays;
+                self.note(number, measure, arrived);
+            }
+            if let Some(onward) = scatters {
+                for row in &self.rows[first..end] {
+                    let used = if shot.photons.is_some() { row.used & row.seen } else { row.used };
+                    Scattering { shot, row, used, onward }.scatter(&self.media, &self.cones, next);
+                }
             }
         }
         self.clear();
         Ok(rays)
+    }
+
+    /// What finds light beside samples of the lamps.
+    fn others(&self, asked: Asked, shot: &Shot<'_>, measure: Measure) -> Others {
+        if asked.by_paths {
+            Others::Paths
+        } else {
+            Others::lobes(self.rows[asked.number].sharp(shot, measure) & asked.used)
+        }
+    }
+
+    /// The glass around the vertices of a row; none where all are in air.
+    fn media_of(&self, row: &LitRow) -> Option<&[Medium]> {
+        (self.media.len() > 1 && row.is_inside()).then_some(&*self.media)
+    }
+
+    /// What samples of the lamps bring; rays to lamps that were picked wait in the pool, under a number.
+    fn sums(&mut self, asked: Asked, shot: &Shot<'_>, measure: Measure, number: u32) -> Sums {
+        let mut pool = std::mem::take(&mut self.pool);
+        let row = &self.rows[asked.number];
+        let (others, media) = (self.others(asked, shot, measure), self.media_of(row));
+        let (instructions, used) = (shot.world.geometry.instructions(), asked.used);
+        let plain = Lighting::<false> { shot, row, used, measure, others, media };
+        let weighed = Lighting::<true> { shot, row, used, measure, others, media };
+        let sums = match (others, shot.world.lights.tree()) {
+            (Others::Nothing, None) => instructions.run(plain),
+            (Others::Nothing, Some(tree)) => {
+                instructions.run(Picking { lighting: plain, tree, number, pool: &mut pool })
+            }
+            (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
+            (Others::Paths | Others::Lobes(_), Some(tree)) => {
+                instructions.run(Picking { lighting: weighed, tree, number, pool: &mut pool })
+            }
+        };
+        self.pool = pool;
+        sums
+    }
+
+    /// What arrives, with what rays in lobes bring.
+    fn arrived(&self, asked: Asked, shot: &Shot<'_>, measure: Measure, sums: Sums) -> Arrived {
+        let row = &self.rows[asked.number];
+        let arrived = sums.arrived(measure);
+        match self.others(asked, shot, measure) {
+            Others::Lobes(sharp) => {
+                let media = self.media_of(row);
+                let lobes = LobeRays { shot, row, sharp, measure, media, arrived };
+                shot.world.geometry.instructions().run(lobes)
+            }
+            Others::Nothing | Others::Paths => arrived,
+        }
+    }
+
+    /// What comes straight from lights, without waiting for other rows.
+    fn lit(&mut self, asked: Asked, shot: &Shot<'_>, measure: Measure) -> Arrived {
+        let mut sums = [self.sums(asked, shot, measure, 0)];
+        self.pool.trace(&shot.world.geometry, &mut sums);
+        let [sums] = sums;
+        self.arrived(asked, shot, measure, sums)
+    }
+
+    /// The same and what photons bring. Paths go on from vertices that the eye sees alone: one step, to where light is looked up.
+    fn lit_and_gathered(
+        &mut self,
+        number: usize,
+        shot: &Shot<'_>,
+        maps: &PhotonMaps,
+        measure: Measure,
+        (depth, onward): (u32, Option<Onward>),
+    ) -> Arrived {
+        let row = &self.rows[number];
+        let shown = row.used & shown(row, measure);
+        let (first, second) = (shown & row.seen, shown & !row.seen);
+        let is_shared = onward.is_some() && shot.settings.render.shadows == Shadows::Soft;
+        let mut arrived = self.lit(Asked { number, used: first, by_paths: is_shared }, shot, measure);
+        if second != 0 {
+            let Arrived { light, rays } =
+                self.lit(Asked { number, used: second, by_paths: false }, shot, measure);
+            add_where(second, &light, &mut arrived.light);
+            arrived.rays += rays;
+        }
+        let row = &self.rows[number];
+        let gathering = Gathering { shot, row, maps, depth, measure };
+        add_where(row.used, &shot.world.geometry.instructions().run(gathering), &mut arrived.light);
+        arrived
+    }
+
+    /// Note what arrives at a row.
+    fn note(&mut self, number: usize, measure: Measure, arrived: Arrived) {
+        let row = &self.rows[number];
+        let light = match measure {
+            Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(&arrived.light),
+            Measure::Work => arrived.light,
+        };
+        match row.run() {
+            Some(first) => {
+                let own = &mut self.arrived[first as usize..][..LANES];
+                for (i, own) in own.iter_mut().enumerate() {
+                    *own = lane(&light, i);
+                }
+            }
+            None => {
+                for i in lanes(row.used) {
+                    self.arrived[row.place[i] as usize] = lane(&light, i);
+                }
+            }
+        }
     }
 }
 
@@ -193,54 +314,15 @@ fn shown(row: &LitRow, measure: Measure) -> u32 {
     !(hidden(row.seen, direct) | hidden(!row.seen, indirect))
 }
 
-/// The vertices of a row and what is asked of them.
+/// Which vertices are lit, and how.
 #[derive(Clone, Copy)]
-struct Asked<'a> {
-    shot: &'a Shot<'a>,
-    row: &'a LitRow,
-    measure: Measure,
-    /// Those that the vertices are in; none where all are in air.
-    media: Option<&'a [Medium]>,
-}
-
-impl Asked<'_> {
-    /// What comes straight from lights to the vertices whose bits are set; rays of paths that go on from there bring their share.
-    fn lit(self, used: u32, by_paths: bool) -> Arrived {
-        let Self { shot, row, measure, media } = self;
-        let others = if by_paths { Others::Paths } else { Others::lobes(row.sharp(shot, measure) & used) };
-        let instructions = shot.world.geometry.instructions();
-        let plain = Lighting::<false> { shot, row, used, measure, others, media };
-        let weighed = Lighting::<true> { shot, row, used, measure, others, media };
-        let mut arrived = match (others, shot.world.lights.tree()) {
-            (Others::Nothing, None) => instructions.run(plain),
-            (Others::Nothing, Some(tree)) => instructions.run(Picking { lighting: plain, tree }),
-            (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
-            (Others::Paths | Others::Lobes(_), Some(tree)) => {
-                instructions.run(Picking { lighting: weighed, tree })
-            }
-        };
-        if let Others::Lobes(sharp) = others {
-            arrived = instructions.run(LobeRays { shot, row, sharp, measure, media, arrived });
-        }
-        arrived
-    }
-
-    /// The same and what photons bring. Paths go on from vertices that the eye sees alone: one step, to where light is looked up.
-    fn lit_and_gathered(self, maps: &PhotonMaps, (depth, onward): (u32, Option<Onward>)) -> Arrived {
-        let Self { shot, row, measure, .. } = self;
-        let shown = row.used & shown(row, measure);
-        let (first, second) = (shown & row.seen, shown & !row.seen);
-        let is_shared = onward.is_some() && shot.settings.render.shadows == Shadows::Soft;
-        let mut arrived = self.lit(first, is_shared);
-        if second != 0 {
-            let Arrived { light, rays } = self.lit(second, false);
-            add_where(second, &light, &mut arrived.light);
-            arrived.rays += rays;
-        }
-        let gathering = Gathering { shot, row, maps, depth, measure };
-        add_where(row.used, &shot.world.geometry.instructions().run(gathering), &mut arrived.light);
-        arrived
-    }
+struct Asked {
+    /// The number of the row.
+    number: usize,
+    /// A bit for each vertex.
+    used: u32,
+    /// Whether rays of paths that go on from there bring their share.
+    by_paths: bool,
 }
 
 /// Lifts the vertices of a row to where nothing is on the way.

@@ -4,7 +4,7 @@
 //! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues` with the beams that they
 //! stand for (`cone`), their way to hits (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what
 //! touches it (`crossing`), the ways on at mirrors and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the
-//! `light` there, the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows
+//! `light` there, that of lights which are picked (`picking`, `pool`), the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows
 //! the rays round by round, for both methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are
 //! of first hits, `bounds` are lines over the picture.
 
@@ -22,6 +22,7 @@ mod onward;
 mod packet;
 mod photons;
 mod picking;
+mod pool;
 mod queues;
 mod settings;
 mod shot;
@@ -41,6 +42,7 @@ use crate::math::Vec3;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
 pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, PhotonSettings, Photons};
+pub use picking::picks;
 use queues::Queues;
 pub use settings::RenderSettings;
 use shot::{SampleBlock, Shot};

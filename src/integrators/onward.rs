@@ -5,12 +5,13 @@ use super::beside::weight;
 use super::cone::Cone;
 use super::lit_row::{LitRow, Response};
 use super::medium::Medium;
+use super::picking::picks;
 use super::queues::{History, PathRay};
 use super::shot::Shot;
 use super::specular::SCATTERED;
 use crate::geometry::rows::lanes;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::{Met, Source};
+use crate::lights::{Met, Picks, Source};
 use crate::materials::TexturePoint;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
@@ -168,6 +169,11 @@ impl Loops for Scattering<'_> {
 }
 
 impl Shot<'_> {
+    /// How vertices pick lights.
+    pub fn picks(&self) -> Picks {
+        picks(self.settings.render.integrator)
+    }
+
     /// What a path counts that meets a lamp, of which a light sample might have come.
     pub fn lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let density = path.history.density;
@@ -215,7 +221,7 @@ impl Shot<'_> {
         if !lights.are_beyond() {
             return Vec3::ZERO;
         }
-        let samples = lights.samples_at(ray.origin, normal);
+        let samples = lights.samples_at(self.picks(), ray.origin, normal);
         lights.beyond_with(sky, ray.direction, |number, density| share(density * samples.of(number)))
     }
 
@@ -226,7 +232,8 @@ impl Shot<'_> {
         let met = Met { direction, distance, normal: of_light, primitive };
         let lights = &self.world.lights;
         lights.of_hit(hit.object, primitive).map_or(0.0, |(number, light)| {
-            light.pdf(ray.origin, normal, &met) * lights.samples_at(ray.origin, normal).of(number)
+            light.pdf(ray.origin, normal, &met)
+                * lights.samples_at(self.picks(), ray.origin, normal).of(number)
         })
     }
 

@@ -1,148 +1,88 @@
-//! Direct light where there are more lights than a vertex samples: it picks some by a tree over all of them. Of those samples rays
-//! are sent to a part, chosen by what they bring.
+//! Direct light where there are more lights than a vertex samples: it picks some by a tree over all of them.
 
-use arrayvec::ArrayVec;
+use std::ops::Range;
 
-use super::light::{Arrived, Lighting, Sums, add_where};
-use super::lit_row::Response;
+use super::light::{Lighting, Sums, add_where};
+use super::pool::Pool;
 use super::view::Measure;
 use crate::geometry::rows::lanes;
-use crate::lights::{Cut, LightRow, LightTree, Lights, Middle};
+use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{LANES, Lanes, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
-use crate::scene::description::Shadows;
+use crate::scene::description::{Integrator, Shadows};
 use crate::world::Loops;
 
 /// Lights the vertices of a row by lights that they pick.
 pub(super) struct Picking<'a, const WEIGHED: bool> {
     pub(super) lighting: Lighting<'a, WEIGHED>,
     pub(super) tree: &'a LightTree,
+    /// The number of the row, and what takes its rays.
+    pub(super) number: u32,
+    pub(super) pool: &'a mut Pool,
 }
 
-/// Picks of a vertex for each sample that is asked for.
-const PICKS: usize = Lights::PICKS as usize;
-
-/// The picks of a row of vertices, each vertex's in the order of the tree: so rows of rays go to places that are close together.
-struct Picks {
-    /// Numbers of the lights.
-    lights: [[u32; LANES]; PICKS],
-    /// One over the expected numbers of samples; 0 where nothing was picked.
-    shares: [Lanes; PICKS],
+/// How vertices pick lights, where these are too many for all of them to be sampled.
+pub fn picks(integrator: Integrator) -> Picks {
+    match integrator {
+        Integrator::Whitted => Picks::BY_EYE,
+        Integrator::Path => Picks::BY_PATHS,
+    }
 }
 
-/// Samples of lights that a row of vertices picked.
+/// A pick of each vertex of a row. Those of one sample are in the order of the tree: so rows of rays go to places that are close
+/// together.
 #[derive(Clone)]
-struct Sampled {
-    samples: LightRow,
-    /// What they bring if nothing is in the way.
-    values: Lanes3,
-    /// A bit for each that brings anything.
-    active: u32,
-    /// What they bring whatever is shown of it, about: all parts of a picture choose the same rays.
-    importance: Lanes,
+struct PickRow {
+    /// Numbers of the lights.
+    lights: [u32; LANES],
+    /// One over the expected numbers of samples; 0 where nothing was picked.
+    shares: Lanes,
+    /// The same as a vertex without a glossy lobe would pick: what weights go by, as other rays that find the light know no more.
+    weighed: Lanes,
 }
 
-impl Sampled {
-    /// A part of the samples of each vertex that is used, chosen in proportion to their importance: numbers u, u + 1, … of steps
-    /// over its sum, the samples being in the order of the tree. Their values stand for all.
-    #[inline(always)]
-    fn chosen(all: &[Self], used: u32, u: &Lanes) -> ArrayVec<Self, TRACED> {
-        let mut chosen: ArrayVec<Self, TRACED> = ArrayVec::new();
-        for _ in 0..TRACED {
-            chosen.push(Self { active: 0, ..all[0].clone() });
-        }
-        let mut total = [0.0; LANES];
-        for one in all {
-            for i in 0..LANES {
-                total[i] += one.importance[i];
-            }
-        }
-        for i in lanes(used) {
-            let step = total[i] * (1.0 / TRACED as f32);
-            let (mut sum, mut place) = (0.0, 0);
-            for one in all {
-                sum += one.importance[i];
-                let first = place;
-                while place < TRACED && (place as f32 + u[i]) * step < sum {
-                    place += 1;
-                }
-                if place > first {
-                    let times = (place - first) as f32 * step / one.importance[i];
-                    chosen[first].take(i, one, times);
-                }
-            }
-        }
-        chosen
-    }
-
-    /// Take a sample of another row, which counts so many times.
-    #[inline(always)]
-    fn take(&mut self, i: usize, other: &Self, times: f32) {
-        self.samples.take(i, &other.samples);
-        set_lane(&mut self.values, i, lane(&other.values, i) * times);
-        self.active |= other.active & 1 << i;
-    }
-}
-
-/// Rays of a vertex towards the lights that it picked, for each sample that is asked for.
-const TRACED: usize = 8;
+/// Samples whose picks are made together.
+const TOGETHER: u32 = 8;
 
 impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
-    type Done = Arrived;
+    type Done = Sums;
 
     #[inline(always)]
-    fn run(self) -> Arrived {
-        let Self { lighting, tree } = self;
+    fn run(self) -> Sums {
+        let Self { lighting, tree, number, pool } = self;
         let (sampler, mut sums) = (lighting.row.sampler(lighting.shot), Sums::NOTHING);
-        for group in 0..lighting.shot.settings.render.shadow_samples {
-            let picks = Picks::new(&lighting, tree, &sampler, group);
-            lighting.add_picks(&picks, &sampler, group, &mut sums);
+        let samples = lighting.shot.settings.render.shadow_samples;
+        let each = lighting.shot.picks().count;
+        // Where there are many, rays of one row of picks go to one place as well.
+        let mut pool = (samples <= TOGETHER).then_some(pool);
+        for first in (0..samples).step_by(TOGETHER as usize) {
+            let picks = lighting.picks(tree, &sampler, first..(first + TOGETHER).min(samples));
+            for (k, pick) in (first * each..).zip(&picks) {
+                let mut taking = Taking { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
+                lighting.add_pick(pick, &sampler, (k, samples * each), &mut taking);
+            }
         }
-        sums.arrived(lighting.measure)
+        sums
     }
 }
 
-impl Picks {
-    /// One group of picks for each sample that is asked for.
-    #[inline(always)]
-    fn new<const WEIGHED: bool>(
-        lighting: &Lighting<'_, WEIGHED>,
-        tree: &LightTree,
-        sampler: &SamplerRow<LANES>,
-        group: u32,
-    ) -> Self {
-        let row = lighting.row;
-        let count = lighting.shot.settings.render.shadow_samples * Lights::PICKS;
-        let mut numbers = [[0.0; PICKS]; LANES];
-        for k in 0..PICKS {
-            let u = sampler.pairs(&row.path, Decision::Pick, group * Lights::PICKS + k as u32, count);
-            for i in 0..LANES {
-                // One of each group is in each part of [0, 1): so they are sorted. Both numbers of a pair are the digits of one:
-                // a light among many has a small share.
-                let part = (u[0][i] * PICKS as f32) as usize % PICKS;
-                numbers[i][part] = f64::from(u[0][i]) + f64::from(u[1][i]) * DIGITS;
-            }
-        }
-        let mut picks = Self { lights: [[0; LANES]; PICKS], shares: [[0.0; LANES]; PICKS] };
-        for i in lanes(lighting.used) {
-            let cut = Cut::new(tree, lane(&row.from, i), lane(&row.normal, i));
-            let own = cut.pick(&numbers[i]);
-            for k in 0..PICKS {
-                if let Some(pick) = own[k] {
-                    picks.lights[k][i] = pick.light;
-                    picks.shares[k][i] = 1.0 / (pick.probability * count as f32);
-                }
-            }
-        }
-        picks
-    }
+/// What takes the light that a row picks, or its rays.
+struct Taking<'a> {
+    tree: &'a LightTree,
+    row: u32,
+    /// None: rays are traced at once.
+    pool: Option<&'a mut Pool>,
+    sums: &'a mut Sums,
+}
 
-    /// A row of picks: their lights, one over the expected numbers of samples, and a bit for each vertex that picked one. The
-    /// others look at a light as well, which counts nothing.
+impl PickRow {
+    const NOTHING: Self = Self { lights: [0; LANES], shares: [0.0; LANES], weighed: [0.0; LANES] };
+
+    /// The lights, and a bit for each vertex that picked one. The others look at a light as well, which counts nothing.
     #[inline(always)]
-    fn row(&self, k: usize) -> ([u32; LANES], &Lanes, u32) {
-        let (mut lights, shares, mut used) = (self.lights[k], &self.shares[k], 0);
+    fn lights(&self) -> ([u32; LANES], u32) {
+        let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
         for i in 0..LANES {
             used |= u32::from(shares[i] > 0.0) << i;
         }
@@ -150,7 +90,7 @@ impl Picks {
         for i in 0..LANES {
             lights[i] = if shares[i] > 0.0 { lights[i] } else { filler };
         }
-        (lights, shares, used)
+        (lights, used)
     }
 }
 
@@ -158,68 +98,120 @@ impl Picks {
 const DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
 impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
+    /// The picks of the vertices for some samples.
     #[inline(always)]
-    fn add_picks(&self, picks: &Picks, sampler: &SamplerRow<LANES>, group: u32, sums: &mut Sums) {
-        let render = &self.shot.settings.render;
-        let mut all = ArrayVec::<Sampled, PICKS>::new();
-        for k in 0..PICKS {
-            let sampled = self.sampled(picks, sampler, group, k);
+    fn picks(&self, tree: &LightTree, sampler: &SamplerRow<LANES>, samples: Range<u32>) -> Vec<PickRow> {
+        let (row, way) = (self.row, self.shot.picks());
+        let count = self.shot.settings.render.shadow_samples * way.count;
+        let group = way.count as usize;
+        let (first, end) = (samples.start * way.count, samples.end * way.count);
+        let mut numbers = vec![[0.0; LANES]; (end - first) as usize];
+        for k in first..end {
+            let u = sampler.pairs(&row.path, Decision::Pick, k, count);
+            let place = (k - first) as usize / group * group;
             for i in 0..LANES {
-                let is_active = sampled.active & 1 << i != 0;
-                sums.total[i] += if is_active { sampled.values[0][i] } else { 0.0 };
-            }
-            match render.shadows {
-                // Nothing is traced, so there is no work.
-                Shadows::Off if self.measure == Measure::Work => {}
-                Shadows::Off => add_where(sampled.active, &sampled.values, &mut sums.light),
-                Shadows::Hard | Shadows::Soft => all.push(sampled),
+                // One of each group is in each part of [0, 1): so they are sorted. Both numbers of a pair are the digits of one:
+                // a light among many has a small share.
+                let part = (u[0][i] * group as f32) as usize % group;
+                numbers[place + part][i] = f64::from(u[0][i]) + f64::from(u[1][i]) * DIGITS;
             }
         }
-        if render.shadows == Shadows::Off {
-            return;
-        }
-        let [u, _] = sampler.pairs(&self.row.path, Decision::Trace, group, render.shadow_samples);
-        for sampled in &Sampled::chosen(&all, self.used, &u) {
-            if sampled.active != 0 {
-                let Sampled { samples, values, active, .. } = sampled;
-                let traced = active & !self.row.hidden(&samples.directions);
-                let (rays, ends) = self.shadow_rays(samples, traced);
-                self.add_seen(&rays, &ends, traced, &samples.sources, values, sums);
+        let mut picks = vec![PickRow::NOTHING; numbers.len()];
+        let (mut cut, mut without) = (way.cut(tree), WEIGHED.then(|| way.cut(tree)));
+        for i in lanes(self.used) {
+            let plain = Receiver::plain(lane(&row.from, i), lane(&row.normal, i));
+            let lobe = self.lobe(i);
+            cut.go_to(&Receiver { lobe, ..plain });
+            let without = without.as_mut().filter(|_| lobe.is_some()).map(|without| {
+                without.go_to(&plain);
+                &*without
+            });
+            for (numbers, picks) in numbers.chunks(group).zip(picks.chunks_mut(group)) {
+                cut.pick(numbers.iter().map(|row| row[i]), |place, pick| {
+                    let row = &mut picks[place];
+                    row.lights[i] = pick.light;
+                    row.shares[i] = 1.0 / (pick.probability * count as f32);
+                    row.weighed[i] = match without {
+                        Some(without) => 1.0 / (without.probability(pick.light) * count as f32),
+                        None => row.shares[i],
+                    };
+                });
             }
         }
+        picks
     }
 
-    /// Sample a row of picked lights.
+    /// The glossy lobe of a vertex.
     #[inline(always)]
-    fn sampled(&self, picks: &Picks, sampler: &SamplerRow<LANES>, group: u32, k: usize) -> Sampled {
+    fn lobe(&self, i: usize) -> Option<Lobe> {
+        let lobes = self.row.lobes(i);
+        if !(lobes.specular > 0.0) {
+            return None;
+        }
+        let [diffuse, glossy] = [lobes.value(0.0), lobes.value(1.0) - lobes.value(0.0)];
+        let is_both = diffuse > 0.0;
+        Some(Lobe {
+            axis: lobes.mirrored_eye,
+            shininess: lobes.shininess,
+            peak: if is_both { glossy / diffuse } else { 1.0 },
+            diffuse: if is_both { 1.0 } else { 0.0 },
+        })
+    }
+
+    /// Add what a row of picked lights sends.
+    #[inline(always)]
+    fn add_pick(
+        &self,
+        pick: &PickRow,
+        sampler: &SamplerRow<LANES>,
+        (number, count): (u32, u32),
+        taking: &mut Taking<'_>,
+    ) {
+        let Taking { tree, row: row_number, pool, sums } = taking;
         let (row, render) = (self.row, &self.shot.settings.render);
-        let (lights, shares, used) = picks.row(k);
-        let (number, count) = (group * Lights::PICKS + k as u32, render.shadow_samples * Lights::PICKS);
+        let (lights, used) = pick.lights();
         let u = sampler.pairs(&row.path, Decision::Picked, number, count);
         let at = (&row.from, &row.normal);
         let (mut samples, mut inverse) = self.shot.world.lights.sample_each(&lights, at, used, &u);
         for i in 0..LANES {
-            let weight = lane(&samples.weights, i) * shares[i];
+            let weight = lane(&samples.weights, i) * pick.shares[i];
             set_lane(&mut samples.weights, i, weight);
-            inverse[i] *= shares[i];
+            inverse[i] *= pick.weighed[i];
         }
         let (mut values, active) = self.values(&samples, 1.0);
-        let Response { cosines, glosses, .. } = row.response(&samples.directions);
-        let mut importance = [0.0; LANES];
-        for i in 0..LANES {
-            let brings =
-                lane(&samples.weights, i).max_element() * cosines[i] * row.lobes(i).value(glosses[i]);
-            importance[i] = if brings > 0.0 { brings } else { 0.0 };
-        }
+        let active = active & used;
         if WEIGHED {
             // As many rays in lobes as samples are asked for come on all groups of picks, each of which has its own density.
             let others = self.others.to_each(render.shadow_samples) * render.shadow_samples as f32;
             values = self.others.left(row, &samples, values, (&inverse, others));
         }
-        if render.shadows == Shadows::Hard {
-            self.aim_at_middles(&mut samples, &lights, active);
+        if active == 0 {
+            return;
         }
-        Sampled { samples, values, active: active & used, importance }
+        for i in 0..LANES {
+            let is_active = active & 1 << i != 0;
+            sums.total[i] += if is_active { values[0][i] } else { 0.0 };
+        }
+        match render.shadows {
+            // Nothing is traced, so there is no work.
+            Shadows::Off if self.measure == Measure::Work => return,
+            Shadows::Off => return add_where(active, &values, &mut sums.light),
+            Shadows::Hard => self.aim_at_middles(&mut samples, &lights, active),
+            Shadows::Soft => {}
+        }
+        let traced = active & !row.hidden(&samples.directions);
+        let (rays, ends) = self.shadow_rays(&samples, traced);
+        match pool {
+            Some(pool) if self.measure != Measure::Work => {
+                sums.rays.shadow += u64::from(traced.count_ones());
+                let mut places = [0; LANES];
+                for i in 0..LANES {
+                    places[i] = tree.place_of(lights[i]);
+                }
+                pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
+            }
+            Some(_) | None => self.add_seen(&rays, &ends, traced, &samples.sources, &values, sums),
+        }
     }
 
     /// Let rays go to the middles of the lights, where these have any.

@@ -72,6 +72,7 @@ fn ball(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
     match &light.shape {
         Emitter::Sphere(ball) => Some((ball, light)),
         Emitter::Quad(_)
+        | Emitter::Picture(_)
         | Emitter::Box(_)
         | Emitter::Triangle(_)
         | Emitter::Disk(_)

@@ -4,6 +4,7 @@ use super::cuboid::BoxEmitter;
 use super::disk::DiskEmitter;
 use super::mesh::MeshEmitter;
 use super::pattern::Pattern;
+use super::picture::PictureEmitter;
 use super::rectangle::QuadEmitter;
 use super::round::{ConeSide, CylinderSide, RoundEmitter};
 use super::sphere::SphereEmitter;
@@ -14,7 +15,8 @@ use super::{End, LightSample, Met, Source};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
-use crate::math::{DVec3, Vec3};
+use crate::materials::TexturePoint;
+use crate::math::{DVec2, DVec3, Vec3};
 
 /// A shape that sends out light from its front side, in every direction alike.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,6 +51,8 @@ pub enum Emitter {
     Sphere(SphereEmitter),
     /// A parallelogram.
     Quad(QuadEmitter),
+    /// A parallelogram that is sampled by its picture.
+    Picture(Box<PictureEmitter>),
     /// A box.
     Box(BoxEmitter),
     /// A triangle.
@@ -108,6 +112,18 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 }
 
 impl AreaLight {
+    /// With a pattern, by which a quad is sampled as well.
+    pub fn with_pattern(mut self, pattern: Pattern) -> Self {
+        if let Emitter::Quad(quad) = &self.shape {
+            let color = |at: [f64; 2]| pattern.texture().lookup(&TexturePoint::sharp(DVec2::from_array(at)));
+            let picture = PictureEmitter::new(*quad, pattern.texture().texels_across(), color);
+            if let Some(picture) = picture {
+                self.shape = Emitter::Picture(Box::new(picture));
+            }
+        }
+        Self { pattern: Some(Box::new(pattern)), ..self }
+    }
+
     /// [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let sample = self.plain_sample(point, normal, u)?;
@@ -129,6 +145,7 @@ impl AreaLight {
         match &self.shape {
             Emitter::Sphere(sphere) => own(sphere.sample(point, u)),
             Emitter::Quad(quad) => own(quad.sample(point, u)),
+            Emitter::Picture(picture) => own(picture.sample(point, u)),
             Emitter::Box(cuboid) => own(cuboid.sample(point, u)),
             Emitter::Triangle(triangle) => own(triangle.sample(point, u)),
             Emitter::Disk(disk) => own(disk.sample(point, u)),
@@ -147,6 +164,7 @@ impl AreaLight {
         match &self.shape {
             Emitter::Sphere(sphere) => sphere.pdf(from),
             Emitter::Quad(quad) => quad.pdf(from, met),
+            Emitter::Picture(picture) => picture.pdf(from, met),
             Emitter::Box(cuboid) => cuboid.pdf(from, met),
             Emitter::Triangle(triangle) => triangle.pdf(from, met),
             Emitter::Disk(disk) => disk.pdf(from, met.direction) as f32,
@@ -162,6 +180,7 @@ impl AreaLight {
         match &self.shape {
             Emitter::Sphere(sphere) => sphere.center,
             Emitter::Quad(quad) => quad.middle(),
+            Emitter::Picture(picture) => picture.middle(),
             Emitter::Box(cuboid) => cuboid.middle(),
             Emitter::Triangle(triangle) => triangle.middle(),
             Emitter::Disk(disk) => disk.middle(),

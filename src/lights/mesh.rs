@@ -1,8 +1,9 @@
 //! Emissive triangles of a mesh: few by area, many by a tree over them.
 
-use super::tree::{LightBounds, LightTree, MOST_WITHOUT};
+use super::tree::{LightBounds, LightTree, MOST_WITHOUT, Receiver};
 use super::triangle::TriangleEmitter;
 use super::{End, LightSample, Met, Source};
+use crate::control::{CancelToken, Cancelled};
 use crate::geometry::AreaPoint;
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -25,18 +26,21 @@ pub struct MeshEmitter {
 
 impl MeshEmitter {
     /// From corners with their primitive numbers, which increase; none where there is no area.
-    pub fn new(triangles: Vec<([DVec3; 3], u32)>) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the token was told so.
+    pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;
         let areas = triangles.iter().map(|(corners, _)| vector_area_of(corners).length());
-        let by_area = Discrete::new(areas)?;
+        let Some(by_area) = Discrete::new(areas) else { return Ok(None) };
         let center = triangles.iter().map(|(corners, _)| {
             (corners[0] + corners[1] + corners[2]) / 3.0 * vector_area_of(corners).length()
         });
         let center = center.sum::<DVec3>() / by_area.total();
         let all: Vec<_> = triangles.iter().map(|(corners, _)| LightBounds::of_triangle(corners)).collect();
-        let bounds = LightBounds::around(all.iter().flatten())?;
-        let tree = if all.len() > MOST_WITHOUT { LightTree::new(&all) } else { None };
-        Some(Self { triangles, by_area, center, bounds, tree })
+        let Some(bounds) = LightBounds::around(all.iter().flatten()) else { return Ok(None) };
+        let tree = if all.len() > MOST_WITHOUT { LightTree::new(&all, token)? } else { None };
+        Ok(Some(Self { triangles, by_area, center, bounds, tree }))
     }
 
     /// The numbers that its triangles have in their object.
@@ -76,7 +80,7 @@ impl MeshEmitter {
     ) -> Option<LightSample> {
         match &self.tree {
             Some(tree) => {
-                let pick = tree.pick(point, normal, f64::from(u[0]))?;
+                let pick = tree.pick(&Receiver::plain(point, normal), f64::from(u[0]))?;
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
                 let arrival = emitter(corners)?.sample(point, [rest, u[1]]);
@@ -113,7 +117,9 @@ impl MeshEmitter {
         let Some(tree) = &self.tree else { return met.pdf_by_area(self.by_area.total()) };
         let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
         let own = index.ok().and_then(|index| Some((index, emitter(&self.triangles[index].0)?)));
-        own.map_or(0.0, |(index, own)| tree.probability(from, normal, index as u32) * own.pdf(from, met))
+        own.map_or(0.0, |(index, own)| {
+            tree.probability(&Receiver::plain(from, normal), index as u32) * own.pdf(from, met)
+        })
     }
 
     #[cfg(test)]

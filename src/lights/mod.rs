@@ -11,6 +11,7 @@ mod linear;
 mod meridians;
 pub mod mesh;
 pub mod pattern;
+pub mod picture;
 pub mod point;
 pub mod rectangle;
 pub mod round;
@@ -30,10 +31,10 @@ pub use environment::Environment;
 pub use pattern::{Chart, Patch, Pattern};
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
-pub use set::{Lights, Samples};
+pub use set::{Lights, Picks, Samples};
 pub use sky::SkyMap;
 pub use spot::SpotLight;
-pub use tree::{Cut, LightBounds, LightTree, Pick};
+pub use tree::{Cut, LightBounds, LightTree, Lobe, Pick, Receiver};
 
 use crate::math::Vec3;
 

@@ -1,6 +1,7 @@
 //! Lamps that do not send the same radiance from everywhere.
 //!
-//! They are sampled as if they did, and every sample counts the texture at its point: densities are those of the shape, and exact.
+//! Samples of a quad follow its texture, those of other shapes are taken as if they did; each counts the texture at its point:
+//! densities are those of the emitter, and exact.
 
 use std::sync::Arc;
 
@@ -41,6 +42,11 @@ impl Pattern {
     /// Of a texture, on a lamp with these texture coordinates.
     pub fn new(texture: &Arc<Texture>, chart: Chart) -> Self {
         Self { texture: Arc::clone(texture), chart }
+    }
+
+    /// What is looked up.
+    pub fn texture(&self) -> &Texture {
+        &self.texture
     }
 
     /// At a point of the lamp; `primitive` is the triangle of a mesh that it is on.

@@ -55,7 +55,7 @@ impl QuadEmitter {
     /// Uniform over the solid angle of a rectangle, over the area of another parallelogram.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let to_corner = (self.corner - point.as_dvec3()).as_vec3();
+        let to_corner = self.to_corner(point);
         let by_area = self.by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
@@ -75,13 +75,39 @@ impl QuadEmitter {
         Arrival { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
+    /// From a point to the corner.
+    #[inline(always)]
+    pub(super) fn to_corner(&self, point: Vec3) -> Vec3 {
+        (self.corner - point.as_dvec3()).as_vec3()
+    }
+
     /// From the point that sees it to a point uniform over the area, and that as solid angle.
     #[inline(always)]
-    fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
+    pub(super) fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
+        (offset, self.shown(offset))
+    }
+
+    /// The solid angle that it would fill if all of it were at an offset from the point that sees it; not above 0 from behind.
+    #[inline(always)]
+    pub(super) fn shown(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
         let height = -offset.dot(self.normal) * self.area;
-        (offset, height * nearness * nearness * nearness)
+        height * nearness * nearness * nearness
+    }
+
+    /// Density in sr⁻¹ of samples, seen from the front, where they are uniform over the solid angle.
+    #[inline(always)]
+    pub(super) fn density(&self, to_corner: Vec3) -> Option<f32> {
+        let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
+        spherical.filter(SphericalRectangle::is_told).map(|spherical| 1.0 / spherical.solid_angle)
+    }
+
+    /// What an offset from the corner is multiplied by to tell how far along the edges it is.
+    pub(super) fn along(&self) -> [Vec3; 2] {
+        let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
+        let (across_v, across_u) = (v.cross(n), n.cross(u));
+        [(across_v / across_v.dot(u)).as_vec3(), (across_u / across_u.dot(v)).as_vec3()]
     }
 
     /// Centre of area.
@@ -91,15 +117,11 @@ impl QuadEmitter {
 
     /// [`Light::pdf`](super::Light::pdf).
     pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
-        let to_corner = (self.corner - from.as_dvec3()).as_vec3();
+        let to_corner = self.to_corner(from);
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
-        let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
-        match spherical.filter(SphericalRectangle::is_told) {
-            Some(spherical) => 1.0 / spherical.solid_angle,
-            None => met.pdf_by_area(f64::from(self.area)),
-        }
+        self.density(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
     }
 }
 

@@ -47,8 +47,8 @@ impl SourceRow {
 
     /// Take one of another row.
     #[inline(always)]
-    fn copy(&mut self, lane: usize, other: &Self) {
-        (self.object[lane], self.part[lane]) = (other.object[lane], other.part[lane]);
+    pub fn copy(&mut self, lane: usize, other: &Self, from: usize) {
+        (self.object[lane], self.part[lane]) = (other.object[from], other.part[from]);
         self.is_any |= other.is_any;
     }
 
@@ -108,16 +108,6 @@ impl LightRow {
             beyond: 0,
             of_sky: [0.0; LANES],
         }
-    }
-
-    /// Take a sample of another row.
-    #[inline(always)]
-    pub fn take(&mut self, i: usize, other: &Self) {
-        set_lane(&mut self.directions, i, lane(&other.directions, i));
-        set_lane(&mut self.targets, i, lane(&other.targets, i));
-        set_lane(&mut self.weights, i, lane(&other.weights, i));
-        self.sources.copy(i, &other.sources);
-        self.beyond = self.beyond & !(1 << i) | other.beyond & 1 << i;
     }
 
     fn put(&mut self, i: usize, sample: &LightSample) {
@@ -184,6 +174,7 @@ impl Light {
         }
         match &light.shape {
             Emitter::Quad(quad) => row_by!(quad),
+            Emitter::Picture(picture) => row_by!(picture),
             Emitter::Sphere(sphere) => row_by!(sphere),
             Emitter::Disk(disk) => row_by!(disk),
             Emitter::Box(cuboid) => row_by!(cuboid),

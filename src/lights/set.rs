@@ -3,8 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use super::emitter::{Emitter, Part};
-use super::tree::{Cut, LightTree, MOST_WITHOUT};
+use super::tree::{Cut, LightTree, MOST_WITHOUT, Receiver};
 use super::{AreaLight, DirectionalLight, Environment, Light};
+use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
 /// The lights of a scene, known by their index.
@@ -20,13 +21,36 @@ pub struct Lights {
     tree: Option<LightTree>,
 }
 
+/// How vertices pick lights, where not all of them are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Picks {
+    /// Lights that a vertex picks, for each sample of a light that it is asked for.
+    pub count: u32,
+    /// Nodes of the tree that it looks at for all of them, at most.
+    nodes: usize,
+}
+
+impl Picks {
+    /// Where all that is seen of the light are these: as good as a look at each of a thousand lights.
+    pub const BY_EYE: Self = Self { count: MOST_WITHOUT as u32, nodes: Cut::MOST };
+
+    /// Of paths, which have other noise as well.
+    pub const BY_PATHS: Self = Self { count: 4, nodes: 8 };
+
+    /// What points pick from.
+    #[inline(always)]
+    pub fn cut(self, tree: &LightTree) -> Cut<'_> {
+        Cut::new(tree, self.nodes)
+    }
+}
+
 /// How often a vertex samples lights, for each time that it is asked to.
-pub struct Samples<'a>(Option<Cut<'a>>);
+pub struct Samples<'a>(Option<(Picks, Cut<'a>)>);
 
 impl Samples<'_> {
     /// How often it is expected to sample the light of this number.
     pub fn of(&self, number: u32) -> f32 {
-        self.0.as_ref().map_or(1.0, |cut| Lights::PICKS as f32 * cut.probability(number))
+        self.0.as_ref().map_or(1.0, |(picks, cut)| picks.count as f32 * cut.probability(number))
     }
 }
 
@@ -41,7 +65,10 @@ enum OfObject {
 
 impl Lights {
     /// These, in this order.
-    pub fn new(all: Vec<Light>) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the token was told so.
+    pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Cancelled> {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             match light {
@@ -53,21 +80,23 @@ impl Lights {
             }
         }
         let bounds = || all.iter().map(Light::bounds).collect::<Vec<_>>();
-        let tree = if count(&all) > MOST_WITHOUT { LightTree::new(&bounds()) } else { None };
-        Self { all, tree, ..lights }
+        let tree = if count(&all) > MOST_WITHOUT { LightTree::new(&bounds(), token)? } else { None };
+        Ok(Self { all, tree, ..lights })
     }
-
-    /// Lights that a vertex picks, for each sample of a light that it is asked for, where not all of them are sampled.
-    pub const PICKS: u32 = MOST_WITHOUT as u32;
 
     /// The tree that vertices pick lights from; none where they sample all of them.
     pub fn tree(&self) -> Option<&LightTree> {
         self.tree.as_ref()
     }
 
-    /// How often a vertex samples lights, at a point of a surface with this normal.
-    pub fn samples_at(&self, point: Vec3, normal: Vec3) -> Samples<'_> {
-        Samples(self.tree().map(|tree| Cut::new(tree, point, normal)))
+    /// How often a vertex that picks in this way samples lights, at a point of a surface with this normal, if nothing else is known
+    /// of that.
+    pub fn samples_at(&self, picks: Picks, point: Vec3, normal: Vec3) -> Samples<'_> {
+        Samples(self.tree().map(|tree| {
+            let mut cut = picks.cut(tree);
+            cut.go_to(&Receiver::plain(point, normal));
+            (picks, cut)
+        }))
     }
 
     /// Bytes that trees over lights and over the triangles of lights hold.
@@ -105,6 +134,7 @@ impl Lights {
                 Part::Listed,
                 Emitter::Sphere(_)
                 | Emitter::Quad(_)
+                | Emitter::Picture(_)
                 | Emitter::Box(_)
                 | Emitter::Triangle(_)
                 | Emitter::Disk(_)

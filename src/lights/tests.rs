@@ -3,6 +3,7 @@
 use super::emitter::Emitter;
 use super::mesh::MeshEmitter;
 use super::*;
+use crate::control::CancelToken;
 use crate::geometry::cone::Cone;
 use crate::geometry::cuboid::Cuboid;
 use crate::geometry::cylinder::Cylinder;
@@ -38,7 +39,8 @@ const OBJECT: u32 = 7;
 
 fn lights_of(shape: &Shape) -> Lights {
     let lights = area_light(shape, Vec3::ONE, OBJECT).map(Light::Area);
-    Lights::new(std::iter::once(Light::Point(POINT)).chain(lights).collect())
+    Lights::new(std::iter::once(Light::Point(POINT)).chain(lights).collect(), &CancelToken::new())
+        .expect("nobody cancels")
 }
 
 const POINT: PointLight =
@@ -183,7 +185,8 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
     let corners = |z: f64| [DVec3::new(0.0, 0.0, z), DVec3::new(1.0, 0.0, z), DVec3::new(0.0, 1.0, z)];
     let light = |numbers: &[u32], radiance: f32| {
         let triangles = numbers.iter().map(|&number| (corners(f64::from(number)), number)).collect();
-        let mesh = MeshEmitter::new(triangles).expect("an area");
+        let mesh =
+            MeshEmitter::new(triangles, &CancelToken::new()).expect("nobody cancels").expect("an area");
         let bounds = mesh.bounds().times(Vec3::splat(radiance));
         Light::Area(AreaLight {
             bounds,
@@ -194,7 +197,9 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
             part: Part::Listed,
         })
     };
-    let lights = Lights::new(vec![light(&[0, 4], 1.0), Light::Point(POINT), light(&[2], 2.0)]);
+    let lights =
+        Lights::new(vec![light(&[0, 4], 1.0), Light::Point(POINT), light(&[2], 2.0)], &CancelToken::new())
+            .expect("nobody cancels");
     let of_hit = |object, primitive| lights.of_hit(object, primitive).map(|(number, _)| number);
     assert_eq!(
         [0, 1, 2, 3, 4, 5].map(|triangle| of_hit(3, triangle)),

@@ -99,6 +99,12 @@ impl Texture {
         }
     }
 
+    /// How many texels fit into u and v.
+    pub fn texels_across(&self) -> [f64; 2] {
+        let across = size(&self.texels).as_dvec2() * self.repeat.as_dvec2();
+        across.abs().to_array()
+    }
+
     /// The mean of its image, which is that of all of it where a whole number of tiles fits into u and v.
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));

@@ -12,8 +12,8 @@ use super::stages::films::Films;
 use super::targets::guarded;
 use crate::control::CancelToken;
 use crate::film::stretch::Stretch;
-use crate::integrators::RayCounters;
-use crate::lights::{LightTree, Lights};
+use crate::integrators::{RayCounters, picks};
+use crate::lights::LightTree;
 use crate::output::{OutputError, write::atomic_until};
 use crate::world::World;
 
@@ -78,9 +78,10 @@ fn image(finished: &Finished<'_>) -> ImageReport {
 
 fn lights(finished: &Finished<'_>) -> LightsReport {
     let lights = &finished.world.lights;
-    let samples = u64::from(finished.plan.settings.render.shadow_samples);
+    let render = &finished.plan.settings.render;
+    let samples = u64::from(render.shadow_samples);
     let (sampled, picks) = match lights.tree() {
-        Some(_) => (LightsSampled::Picked, samples * u64::from(Lights::PICKS)),
+        Some(_) => (LightsSampled::Picked, samples * u64::from(picks(render.integrator).count)),
         None => (LightsSampled::All, 0),
     };
     LightsReport {

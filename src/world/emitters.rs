@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::lower::{emission, file_emission};
 use super::{Geometry, Images, MeshInstance, Object};
+use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::emitter::{Emitter, Part};
 use crate::lights::mesh::MeshEmitter;
@@ -23,23 +24,35 @@ pub fn sky(texels: &Arc<Texels>) -> Option<Arc<SkyMap>> {
 
 /// The lights of a scene with these objects: those without extent first, then the environment, then the objects that emit.
 /// A mesh is a light for each of its emitting materials. `sky` is the map of an environment that has one.
-pub fn lights(scene: &Scene, geometry: &Geometry, images: &Images, sky: Option<Arc<SkyMap>>) -> Arc<Lights> {
+///
+/// # Errors
+/// [`Cancelled`] when the token was told so.
+pub fn lights(
+    scene: &Scene,
+    geometry: &Geometry,
+    images: &Images,
+    sky: Option<Arc<SkyMap>>,
+    token: &CancelToken,
+) -> Result<Arc<Lights>, Cancelled> {
     let points = scene.lights.iter().map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissions: Vec<Emission> =
         scene.materials.iter().map(|material| lit(emission(scene, images, &material.emission))).collect();
-    let areas = objects.flat_map(|((id, object), described)| {
+    let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));
+    let mut all: Vec<Light> = points.chain(environment.map(Light::Environment)).collect();
+    for ((id, object), described) in objects {
         let emission = described.material.map(|index| &emissions[index]);
         match object {
             Object::Shape(shape) => {
-                emission.and_then(|emission| shape_light(shape, emission, id)).into_iter().collect()
+                let light = emission.and_then(|emission| shape_light(shape, emission, id));
+                all.extend(light.map(Light::Area));
             }
-            Object::Mesh(mesh) => mesh_lights(id, mesh, emission, images),
+            Object::Mesh(mesh) => {
+                all.extend(mesh_lights(id, mesh, emission, images, token)?.into_iter().map(Light::Area));
+            }
         }
-    });
-    let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));
-    let all = points.chain(environment.map(Light::Environment)).chain(areas.map(Light::Area));
-    Arc::new(Lights::new(all.collect()))
+    }
+    Ok(Arc::new(Lights::new(all, token)?))
 }
 
 /// What the lights of a scene with these objects send; none where they send nothing.
@@ -92,9 +105,11 @@ fn lit(emission: Emission) -> Emission {
 /// The light that a shape is which emits.
 fn shape_light(shape: &Shape, emission: &Emission, object: u32) -> Option<AreaLight> {
     let light = area_light(shape, emission.scale, object).filter(|_| emission.shines())?;
-    let pattern =
-        emission.texture.as_ref().map(|texture| Box::new(Pattern::new(texture, Chart::Shape(*shape))));
-    Some(AreaLight { pattern, bounds: of_mean(light.bounds, emission), ..light })
+    let light = AreaLight { bounds: of_mean(light.bounds, emission), ..light };
+    Some(match &emission.texture {
+        Some(texture) => light.with_pattern(Pattern::new(texture, Chart::Shape(*shape))),
+        None => light,
+    })
 }
 
 /// Bounds of a lamp as bright as the mean of its texture.
@@ -108,7 +123,8 @@ fn mesh_lights(
     mesh: &MeshInstance,
     emission: Option<&Emission>,
     images: &Images,
-) -> Vec<AreaLight> {
+    token: &CancelToken,
+) -> Result<Vec<AreaLight>, Cancelled> {
     let loaded = mesh.tree.loaded();
     let emissions: Vec<(Option<u32>, Emission)> = match emission {
         Some(emission) => vec![(None, emission.clone())],
@@ -117,9 +133,9 @@ fn mesh_lights(
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };
-    let light = |(own, emission): (Option<u32>, Emission)| {
+    let light = |(own, emission): (Option<u32>, Emission)| -> Result<Option<AreaLight>, Cancelled> {
         let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
-        let emitter = MeshEmitter::new(triangles)?;
+        let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
         let bounds = of_mean(emitter.bounds().times(emission.scale), &emission);
         let pattern = emission.texture.as_ref().map(|texture| {
             let patch =
@@ -127,16 +143,17 @@ fn mesh_lights(
             let patches = triangles_of(mesh, own).map(patch).collect();
             Box::new(Pattern::new(texture, Chart::Triangles(patches)))
         });
-        Some(AreaLight {
+        Ok(Some(AreaLight {
             shape: Emitter::Mesh(emitter),
             radiance: emission.scale,
             pattern,
             object,
             part: Part::Listed,
             bounds,
-        })
+        }))
     };
-    emissions.into_iter().filter(|(_, emission)| emission.shines()).filter_map(light).collect()
+    let lights = emissions.into_iter().filter(|(_, emission)| emission.shines()).map(light);
+    lights.filter_map(Result::transpose).collect()
 }
 
 /// The triangles of one of the mesh file's own materials; none: all.
@@ -176,8 +193,10 @@ mod tests {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
             let mesh = MeshInstance { tree: Arc::clone(&tree), transform, smooth: false };
             let emission = Emission::constant(Vec3::ONE);
-            let lights = mesh_lights(0, &mesh, Some(&emission), &Images::default());
-            let lights = Arc::new(Lights::new(lights.into_iter().map(Light::Area).collect()));
+            let lights = mesh_lights(0, &mesh, Some(&emission), &Images::default(), &CancelToken::new())
+                .expect("nobody cancels");
+            let lights = lights.into_iter().map(Light::Area).collect();
+            let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("nobody cancels"));
             let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);
             let geometry = geometry.expect("nobody cancels");
             let source = photon_source(&geometry, &lights).expect("it shines");

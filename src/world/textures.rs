@@ -36,6 +36,20 @@ pub struct NeededTexture {
     pub has_mipmaps: bool,
 }
 
+impl NeededTexture {
+    /// The map of an environment.
+    pub fn of_environment(file: &Path) -> Self {
+        Self {
+            source: environment_map(file),
+            name: "environment".to_owned(),
+            declared: None,
+            mesh_file: None,
+            is_environment: true,
+            has_mipmaps: false,
+        }
+    }
+}
+
 /// The image files that materials of objects look up, each once. Textures that no such material names are not among
 /// them.
 pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededTexture> {
@@ -74,16 +88,8 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
             });
         }
     }
-    if let Some(source) = environment_source(scene) {
-        let name = "environment".to_owned();
-        add(NeededTexture {
-            source,
-            name,
-            declared: None,
-            mesh_file: None,
-            is_environment: true,
-            has_mipmaps: false,
-        });
+    if let Some(file) = environment_file(scene) {
+        add(NeededTexture::of_environment(file));
     }
     needed
 }
@@ -98,9 +104,16 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
 
 /// Where the map of the environment comes from, where that has one that is not made black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
+    environment_file(scene).map(environment_map)
+}
+
+fn environment_file(scene: &Scene) -> Option<&Path> {
     let environment = scene.environment.as_ref().filter(|environment| environment.color != Vec3::ZERO)?;
-    let path = environment.file.as_ref()?.value.clone();
-    Some(TextureSource { path, encoding: ImageEncoding::Color })
+    Some(&environment.file.as_ref()?.value)
+}
+
+fn environment_map(file: &Path) -> TextureSource {
+    TextureSource { path: file.to_owned(), encoding: ImageEncoding::Color }
 }
 
 /// Which materials of the scene some object has, and which mesh files' own materials some instance takes.

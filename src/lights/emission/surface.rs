@@ -86,6 +86,7 @@ impl Surface {
                 Outline::Mesh { .. },
                 Emitter::Sphere(_)
                 | Emitter::Quad(_)
+                | Emitter::Picture(_)
                 | Emitter::Box(_)
                 | Emitter::Triangle(_)
                 | Emitter::Disk(_)
@@ -158,6 +159,7 @@ impl On {
                 Self::Mesh { .. },
                 Emitter::Sphere(_)
                 | Emitter::Quad(_)
+                | Emitter::Picture(_)
                 | Emitter::Box(_)
                 | Emitter::Triangle(_)
                 | Emitter::Disk(_)

@@ -1,6 +1,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
+use crate::control::CancelToken;
 use crate::geometry::cone::Cone;
 use crate::geometry::cuboid::Cuboid;
 use crate::geometry::cylinder::Cylinder;
@@ -92,7 +93,7 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
 }
 
 fn source_of(light: Light, shape: Option<Shape>) -> PhotonSource {
-    let lights = Arc::new(Lights::new(vec![light]));
+    let lights = Arc::new(Lights::new(vec![light], &CancelToken::new()).expect("nobody cancels"));
     PhotonSource::new(&lights, |_| shape.map(Outline::Shape), SCENE).expect("power")
 }
 
@@ -399,7 +400,8 @@ fn lamps_are_chosen_by_their_power() {
         let position = DVec3::new(f64::from(i % 100), f64::from(i / 100), 0.0);
         Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
     };
-    let lights = Arc::new(Lights::new((0..10_000).map(lamp).collect()));
+    let lights =
+        Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("nobody cancels"));
     let source = PhotonSource::new(&lights, |_| None, SCENE).expect("power");
     let (mut next, mut counts) = (numbers(random::unit(8)), [0.0; 7]);
     let power = source.power();
@@ -423,7 +425,7 @@ fn lamps_are_chosen_by_their_power() {
 
 #[test]
 fn lights_without_fall_off_send_nothing() {
-    let lights = |last: Vec<Light>| Arc::new(Lights::new(last));
+    let lights = |last: Vec<Light>| Arc::new(Lights::new(last, &CancelToken::new()).expect("nobody cancels"));
     let none = vec![Light::Point(point(Falloff::None))];
     assert!(PhotonSource::new(&lights(none), |_| None, SCENE).is_none());
     let both = vec![Light::Point(point(Falloff::None)), Light::Point(point(Falloff::Square))];
@@ -554,7 +556,11 @@ fn sheet(side: u32) -> Vec<Patch> {
 fn meshes_send_what_samples_of_them_say() {
     for (side, is_textured) in [(2, false), (12, false), (2, true), (12, true)] {
         let patches = sheet(side);
-        let mesh = MeshEmitter::new(patches.iter().map(|patch| (patch.corners, patch.primitive)).collect());
+        let mesh = MeshEmitter::new(
+            patches.iter().map(|patch| (patch.corners, patch.primitive)).collect(),
+            &CancelToken::new(),
+        )
+        .expect("nobody cancels");
         let mesh = mesh.expect("an area");
         let bounds = mesh.bounds();
         let light = AreaLight {
@@ -572,7 +578,7 @@ fn meshes_send_what_samples_of_them_say() {
         } else {
             Light::Area(light)
         };
-        let lights = Arc::new(Lights::new(vec![light.clone()]));
+        let lights = Arc::new(Lights::new(vec![light.clone()], &CancelToken::new()).expect("nobody cancels"));
         let source = PhotonSource::new(&lights, |_| Some(Outline::Mesh { rounding: 1e-6 }), SCENE);
         let source = source.expect("power");
         assert_same_irradiance(&format!("mesh {side} {is_textured}"), &light, &source, None);

@@ -4,29 +4,32 @@
 use super::bounds::{EmissionCone, LightBounds};
 use super::node::{Child, Node};
 use super::{LightTree, NOWHERE};
+use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
 use crate::math::lanes::LANES;
 
-/// Bins along the longest axis.
-const BINS: usize = 16;
-
 impl LightTree {
     /// Over these lights, known by their index; those without bounds have no light. None where no light has.
-    pub fn new(lights: &[Option<LightBounds>]) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the token was told so; a large tree takes a while.
+    pub fn new(lights: &[Option<LightBounds>], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         let mut leaves: Vec<Leaf> = (0..).zip(lights).filter_map(Leaf::new).collect();
         // Lights of one space come together.
         leaves.sort_by_key(|leaf| leaf.bounds.space);
         let power = leaves.iter().map(|leaf| leaf.bounds.power).sum();
         let mut places = vec![NOWHERE; lights.len()];
-        let mut builder = Builder { nodes: Vec::new(), power, leaves: leaves.len() as u32 };
+        let mut builder = Builder { nodes: Vec::new(), power, leaves: leaves.len() as u32, token };
         if leaves.is_empty() {
-            return None;
+            return Ok(None);
         }
-        builder.node(&mut leaves, 0);
+        builder.node(&mut leaves, 0)?;
         for (place, leaf) in (0..).zip(&leaves) {
             places[leaf.light as usize] = place;
         }
-        Some(Self { nodes: builder.nodes, places })
+        let is_over_lights = |node: &Node| matches!(node.children[0], Child::Light(_));
+        let over_lights = (0..).zip(&builder.nodes).filter(|(_, node)| is_over_lights(node)).map(|(i, _)| i);
+        Ok(Some(Self { over_lights: over_lights.collect(), nodes: builder.nodes, places }))
     }
 }
 
@@ -44,20 +47,22 @@ impl Leaf {
     }
 }
 
-struct Builder {
+struct Builder<'a> {
     nodes: Vec<Node>,
     /// Of all lights.
     power: f64,
     /// How many lights.
     leaves: u32,
+    token: &'a CancelToken,
 }
 
-impl Builder {
+impl Builder<'_> {
     /// Build the node over some leaves, before which there are so many; its number.
-    fn node(&mut self, leaves: &mut [Leaf], before: u32) -> u32 {
+    fn node(&mut self, leaves: &mut [Leaf], before: u32) -> Result<u32, Cancelled> {
         let number = self.nodes.len() as u32;
         self.nodes.push(Node::empty(self.leaves));
-        let groups = groups(leaves);
+        let is_over_lights = leaves.len() <= LANES;
+        let groups = groups(leaves, self.token)?;
         let mut node = Node::empty(self.leaves);
         let (mut rest, mut first) = (leaves, before);
         for (i, count) in groups.into_iter().enumerate() {
@@ -67,21 +72,26 @@ impl Builder {
             node.set(i, &bounds, self.power);
             node.first[i] = first;
             node.children[i] = match own {
-                [leaf] => Child::Light(leaf.light),
-                several => Child::Node(self.node(several, first)),
+                [leaf] if is_over_lights => Child::Light(leaf.light),
+                several => Child::Node(self.node(several, first)?),
             };
             node.count = i as u32 + 1;
             first += count as u32;
         }
         self.nodes[number as usize] = node;
-        number
+        Ok(number)
     }
 }
 
-/// Put leaves into groups, at most one for each child: the sizes of these.
-fn groups(leaves: &mut [Leaf]) -> Vec<usize> {
+/// Put leaves into groups, at most one for each child: the sizes of these. Groups are as few as will do, so that nodes are full.
+fn groups(leaves: &mut [Leaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
+    token.check()?;
     if leaves.len() <= LANES {
-        return vec![1; leaves.len()];
+        return Ok(vec![1; leaves.len()]);
+    }
+    let mut unit = LANES;
+    while unit * LANES < leaves.len() {
+        unit *= LANES;
     }
     let mut groups: Vec<Group> = Vec::with_capacity(LANES);
     let mut start = 0;
@@ -90,16 +100,17 @@ fn groups(leaves: &mut [Leaf]) -> Vec<usize> {
         start += own.len();
     }
     while groups.len() < LANES {
-        let dearest = (0..groups.len()).filter(|&i| groups[i].count > 1);
+        let dearest = (0..groups.len()).filter(|&i| groups[i].count > unit);
         let Some(dearest) = dearest.max_by(|&a, &b| groups[a].cost.total_cmp(&groups[b].cost)) else { break };
         let Group { start, count, .. } = groups[dearest];
         let own = &mut leaves[start..start + count];
-        let middle = split(own);
+        token.check()?;
+        let middle = split(own, unit);
         let (left, right) = own.split_at(middle);
         groups[dearest] = Group::new(start, left);
         groups.insert(dearest + 1, Group::new(start + middle, right));
     }
-    groups.into_iter().map(|group| group.count).collect()
+    Ok(groups.into_iter().map(|group| group.count).collect())
 }
 
 /// A run of leaves.
@@ -111,9 +122,7 @@ struct Group {
 
 impl Group {
     fn new(start: usize, leaves: &[Leaf]) -> Self {
-        let mut sum = Sum::NOTHING;
-        leaves.iter().for_each(|leaf| sum.add(leaf));
-        Self { start, count: leaves.len(), cost: sum.cost() }
+        Self { start, count: leaves.len(), cost: Sum::of(leaves).cost() }
     }
 }
 
@@ -131,6 +140,12 @@ struct Sum {
 impl Sum {
     const NOTHING: Self =
         Self { count: 0, power: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, axes: DVec3::ZERO };
+
+    fn of(leaves: &[Leaf]) -> Self {
+        let mut sum = Self::NOTHING;
+        leaves.iter().for_each(|leaf| sum.add(leaf));
+        sum
+    }
 
     fn add(&mut self, leaf: &Leaf) {
         let LightBounds { center, radius, power, cone, .. } = &leaf.bounds;
@@ -161,39 +176,56 @@ impl Sum {
     }
 }
 
-/// Sort leaves into two parts, none of them empty: where the second begins.
-fn split(leaves: &mut [Leaf]) -> usize {
-    let middle = leaves.len() / 2;
+/// More leaves than these are not sorted, but parted between bins.
+const MOST_SORTED: usize = 1 << 15;
+
+/// Bins along the longest axis.
+const BINS: usize = 64;
+
+/// Put leaves into two parts along the longest axis, none of them empty: where the second begins. Few are sorted, and the first
+/// part is one of some units.
+fn split(leaves: &mut [Leaf], unit: usize) -> usize {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for leaf in &*leaves {
         (min, max) = (min.min(leaf.bounds.center), max.max(leaf.bounds.center));
     }
     let extent = max - min;
     let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
-    if !(extent[axis] > 0.0) {
-        return middle;
+    if leaves.len() > MOST_SORTED && extent[axis] > 0.0 {
+        let bin_of = |leaf: &Leaf| {
+            let share = (leaf.bounds.center[axis] - min[axis]) / extent[axis];
+            ((share * BINS as f64) as usize).min(BINS - 1)
+        };
+        let mut bins = [Sum::NOTHING; BINS];
+        for leaf in &*leaves {
+            bins[bin_of(leaf)].add(leaf);
+        }
+        let last = cheapest(&bins);
+        let count = bins[..last].iter().map(|bin| bin.count).sum();
+        if count > 0 {
+            leaves.sort_by_key(|leaf| bin_of(leaf) >= last);
+            return count;
+        }
     }
-    let bin_of = |leaf: &Leaf| {
-        let share = (leaf.bounds.center[axis] - min[axis]) / extent[axis];
-        ((share * BINS as f64) as usize).min(BINS - 1)
-    };
-    let mut bins = [Sum::NOTHING; BINS];
-    for leaf in &*leaves {
-        bins[bin_of(leaf)].add(leaf);
+    // A stable order: the tree is the same on all machines.
+    leaves.sort_by(|a, b| a.bounds.center[axis].total_cmp(&b.bounds.center[axis]));
+    let parts: Vec<Sum> = leaves.chunks(unit).map(Sum::of).collect();
+    cheapest(&parts) * unit
+}
+
+/// How many of some parts, side by side, best come together, the others being together as well; there are leaves on both sides.
+fn cheapest(parts: &[Sum]) -> usize {
+    let mut right = parts.to_vec();
+    for i in (0..parts.len() - 1).rev() {
+        right[i] = right[i].and(&right[i + 1]);
     }
-    let mut right = [Sum::NOTHING; BINS];
-    for i in (1..BINS).rev() {
-        right[i - 1] = right[i].and(&bins[i]);
-    }
-    let (mut left, mut best) = (Sum::NOTHING, (f64::INFINITY, 0));
-    for i in 0..BINS - 1 {
-        left = left.and(&bins[i]);
+    let (mut left, mut best) = (Sum::NOTHING, (f64::INFINITY, 1));
+    for i in 1..parts.len() {
+        left = left.and(&parts[i - 1]);
         let cost = left.cost() + right[i].cost();
         if left.count > 0 && right[i].count > 0 && cost < best.0 {
             best = (cost, i);
         }
     }
-    // A stable order: the tree is the same on all machines.
-    leaves.sort_by_key(|leaf| bin_of(leaf) > best.1);
-    leaves.partition_point(|leaf| bin_of(leaf) <= best.1)
+    best.1
 }

@@ -1,121 +1,177 @@
-//! Cuts through a light tree: nodes that a point is so near to that their bounds say little are replaced by their children, as
-//! far as there is room, before anything is picked. Many picks for one point share a cut.
+//! Cuts through a light tree: nodes whose children a point picks from. Where lights are not too many, these are all nodes over
+//! lights; else those that the point is so near to that their bounds say little are replaced by their children, as far as there
+//! is room. Many picks for one point share a cut.
 
-use super::node::{Child, Expected};
-use super::{LightTree, NOWHERE, Pick, ROOT, Way, rest, target};
+use arrayvec::ArrayVec;
+
+use super::node::{Child, Expected, Receiver};
+use super::{LightTree, NOWHERE, Pick, ROOT, Shares, Way, rest, target};
 use crate::math::Vec3;
-use crate::math::lanes::LANES;
+use crate::math::lanes::{LANES, Lanes};
 
-/// What a point picks from.
+/// What points pick from, one after the other.
 pub struct Cut<'a> {
     tree: &'a LightTree,
-    point: Vec3,
-    normal: Vec3,
-    /// How many there are.
-    count: usize,
-    /// Sums of their importance up to each.
-    sums: [f64; ROOM],
-    /// What they are.
-    items: [Child; ROOM],
+    /// Nodes at most.
+    room: usize,
+    receiver: Receiver,
+    /// Numbers of the nodes.
+    nodes: ArrayVec<u32, { Cut::MOST }>,
+    /// The importance of their children; 0 of those that are nodes of the cut themselves.
+    importance: ArrayVec<Lanes, { Cut::MOST }>,
+    /// Sums of all of it up to each node.
+    sums: ArrayVec<f64, { Cut::MOST }>,
 }
-
-/// Items of a cut at most.
-const ROOM: usize = 256;
 
 /// Nodes are replaced from this square of the sine of half the angle on that the sphere around them fills.
 const NEAR: f32 = 0.05;
 
 impl<'a> Cut<'a> {
-    /// For a point of a surface with this normal.
+    /// Nodes of any cut at most.
+    pub const MOST: usize = 64;
+
+    /// Through a tree, of so many nodes at most; for no point yet.
     #[inline(always)]
-    pub fn new(tree: &'a LightTree, point: Vec3, normal: Vec3) -> Self {
-        let mut cut =
-            Self { tree, point, normal, count: 0, sums: [0.0; ROOM], items: [Child::Node(ROOT); ROOM] };
-        // Nodes to be replaced, in the order in which they were found: the larger ones first.
-        let mut open = [ROOT; ROOM / LANES];
-        let (mut first, mut end) = (0, 1);
-        let mut sum = 0.0;
-        while first < end {
-            let node = &tree.nodes[open[first] as usize];
-            first += 1;
-            let Expected { importance, nearness } = node.expected(point, normal);
-            for i in 0..node.count as usize {
-                if !(importance[i] > 0.0) {
-                    continue;
-                }
-                match node.children[i] {
-                    Child::Node(below) if nearness[i] > NEAR && end < open.len() => {
-                        open[end] = below;
-                        end += 1;
-                    }
-                    item @ (Child::Node(_) | Child::Light(_)) => {
-                        sum += f64::from(importance[i]);
-                        (cut.sums[cut.count], cut.items[cut.count]) = (sum, item);
-                        cut.count += 1;
-                    }
-                }
-            }
+    pub fn new(tree: &'a LightTree, room: usize) -> Self {
+        let receiver = Receiver::plain(Vec3::ZERO, Vec3::ZERO);
+        let room = room.clamp(1, Self::MOST);
+        Self {
+            tree,
+            room,
+            receiver,
+            nodes: ArrayVec::new(),
+            importance: ArrayVec::new(),
+            sums: ArrayVec::new(),
         }
-        cut
     }
 
-    /// [`LightTree::pick`] by the cut, for numbers that increase.
+    /// For a point of a surface.
     #[inline(always)]
-    pub fn pick<const N: usize>(&self, u: &[f64; N]) -> [Option<Pick>; N] {
-        let mut picks = [None; N];
-        if self.count == 0 {
-            return picks;
+    pub fn go_to(&mut self, receiver: &Receiver) {
+        let tree = self.tree;
+        self.receiver = *receiver;
+        self.nodes.clear();
+        self.importance.clear();
+        self.sums.clear();
+        let mut sum = 0.0;
+        if tree.over_lights.len() <= self.room {
+            for &node in &tree.over_lights {
+                let importance = tree.nodes[node as usize].expected(receiver).importance;
+                sum += total(&importance);
+                self.nodes.push(node);
+                self.importance.push(importance);
+                self.sums.push(sum);
+            }
+            return;
         }
-        let total = self.sums[self.count - 1];
+        self.nodes.push(ROOT);
+        while self.sums.len() < self.nodes.len() {
+            let node = &tree.nodes[self.nodes[self.sums.len()] as usize];
+            let Expected { mut importance, nearness } = node.expected(receiver);
+            for i in 0..node.count as usize {
+                if let Child::Node(below) = node.children[i]
+                    && importance[i] > 0.0
+                    && nearness[i] > NEAR
+                    && self.nodes.len() < self.room
+                {
+                    self.nodes.push(below);
+                    importance[i] = 0.0;
+                }
+            }
+            sum += total(&importance);
+            self.importance.push(importance);
+            self.sums.push(sum);
+        }
+    }
+
+    /// Of the importance of all nodes.
+    #[inline(always)]
+    fn total(&self) -> f64 {
+        self.sums.last().copied().unwrap_or(0.0)
+    }
+
+    /// [`LightTree::pick`] by the cut, for numbers that increase: each pick is told with the place of its number.
+    #[inline(always)]
+    pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, Pick)) {
+        let all = self.total();
+        if !(all > 0.0) {
+            return;
+        }
         let (mut index, mut way) = (0, Way::NEW);
-        for (pick, u) in picks.iter_mut().zip(u) {
-            let target = target(*u, total);
+        let (mut of, mut shares) = (usize::MAX, Shares::NONE);
+        for (place, u) in u.enumerate() {
+            let target = target(u, all);
             while self.sums[index] <= target {
                 index += 1;
             }
+            if of != index {
+                (of, shares) = (index, Shares::new(&self.importance[index]));
+            }
             let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
-            let rest = rest(target - before, self.sums[index] - before);
-            let probability = self.share(index);
-            *pick = match self.items[index] {
+            let mut rest = rest(target - before, self.sums[index] - before);
+            let Some((child, _)) = shares.find(&mut rest) else { continue };
+            let probability = self.share(index, child);
+            let pick = match self.tree.nodes[self.nodes[index] as usize].children[child] {
                 Child::Light(light) => Some(Pick { light, probability, rest }),
                 Child::Node(node) => {
                     let so_far = Pick { light: 0, probability, rest };
-                    self.tree.pick_under(node, self.point, self.normal, so_far, &mut way)
+                    self.tree.pick_under(node, &self.receiver, so_far, &mut way)
                 }
             };
+            if let Some(pick) = pick {
+                picked(place, pick);
+            }
         }
-        picks
     }
 
-    /// The probability of an item.
+    /// The probability of a child of a node.
     #[inline(always)]
-    fn share(&self, index: usize) -> f32 {
-        let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
-        ((self.sums[index] - before) / self.sums[self.count - 1]) as f32
+    fn share(&self, index: usize, child: usize) -> f32 {
+        (f64::from(self.importance[index][child]) / self.total()) as f32
     }
 
     /// The probability with which [`Cut::pick`] picks a light.
     pub fn probability(&self, light: u32) -> f32 {
         let place = self.tree.places[light as usize];
-        if place == NOWHERE {
+        if place == NOWHERE || !(self.total() > 0.0) {
             return 0.0;
         }
-        // Down to where the cut goes.
-        let mut node = ROOT;
+        // The last node of the cut on the way to the light.
+        let (mut node, mut last) = (ROOT, None);
         loop {
             let one = &self.tree.nodes[node as usize];
-            let item = one.children[one.child_over(place)];
-            let index = self.items[..self.count].iter().position(|&other| other == item);
-            match (index, item) {
-                (Some(index), Child::Light(_)) => return self.share(index),
-                (Some(index), Child::Node(below)) => {
-                    let share = self.share(index);
-                    return self.tree.probability_under(below, (self.point, self.normal), place, share);
-                }
-                // Nothing arrives, or the cut is farther down.
-                (None, Child::Light(_)) => return 0.0,
-                (None, Child::Node(below)) => node = below,
+            let child = one.child_over(place);
+            if let Some(index) = self.nodes.iter().position(|&other| other == node) {
+                last = Some((index, child));
+            }
+            match one.children[child] {
+                Child::Light(_) => break,
+                Child::Node(below) => node = below,
             }
         }
+        let Some((index, child)) = last else { return 0.0 };
+        let share = self.share(index, child);
+        match self.tree.nodes[self.nodes[index] as usize].children[child] {
+            Child::Node(below) if share > 0.0 => {
+                self.tree.probability_under(below, &self.receiver, place, share)
+            }
+            Child::Node(_) | Child::Light(_) => share,
+        }
     }
+}
+
+/// The sum of a row, in one order on all machines.
+#[inline(always)]
+fn total(importance: &Lanes) -> f64 {
+    let mut row = [0.0; LANES];
+    for i in 0..LANES {
+        row[i] = f64::from(importance[i]);
+    }
+    for i in 0..8 {
+        row[i] += row[i + 8];
+    }
+    for i in 0..4 {
+        row[i] += row[i + 4];
+    }
+    (row[0] + row[2]) + (row[1] + row[3])
 }

@@ -9,9 +9,8 @@ mod node;
 
 pub use bounds::{EmissionCone, LightBounds};
 pub use cut::Cut;
-pub use node::{Child, Node};
+pub use node::{Child, Lobe, Node, Receiver};
 
-use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes};
 
 /// A tree over lights.
@@ -19,6 +18,8 @@ use crate::math::lanes::{LANES, Lanes};
 pub struct LightTree {
     /// The first is the root.
     nodes: Vec<Node>,
+    /// Those whose children are lights, in the order of the tree; the others' are nodes.
+    over_lights: Vec<u32>,
     /// Place of each light in the order of the tree; [`NOWHERE`] of those that have no light.
     places: Vec<u32>,
 }
@@ -44,37 +45,30 @@ pub struct Pick {
 }
 
 impl LightTree {
-    /// Pick a light for a point of a surface with this normal, by a number in [0, 1); none where no light arrives.
+    /// Pick a light for a point of a surface, by a number in [0, 1); none where no light arrives.
     #[inline(always)]
-    pub fn pick(&self, point: Vec3, normal: Vec3, u: f64) -> Option<Pick> {
+    pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<Pick> {
         let mut way = Way::NEW;
-        self.pick_under(ROOT, point, normal, Pick { light: 0, probability: 1.0, rest: u }, &mut way)
+        self.pick_under(ROOT, receiver, Pick { light: 0, probability: 1.0, rest: u }, &mut way)
     }
 
     /// The probability with which [`LightTree::pick`] picks this light.
-    pub fn probability(&self, point: Vec3, normal: Vec3, light: u32) -> f32 {
+    pub fn probability(&self, receiver: &Receiver, light: u32) -> f32 {
         match self.places[light as usize] {
             NOWHERE => 0.0,
-            place => self.probability_under(ROOT, (point, normal), place, 1.0),
+            place => self.probability_under(ROOT, receiver, place, 1.0),
         }
     }
 
     /// Pick a light under a node, which was picked itself; `way` is that of the pick before for the same point.
     #[inline(always)]
-    fn pick_under(
-        &self,
-        mut node: u32,
-        point: Vec3,
-        normal: Vec3,
-        mut pick: Pick,
-        way: &mut Way,
-    ) -> Option<Pick> {
+    fn pick_under(&self, mut node: u32, receiver: &Receiver, mut pick: Pick, way: &mut Way) -> Option<Pick> {
         let mut level = 0;
         loop {
             let one = &self.nodes[node as usize];
             if way.nodes[level] != node {
                 way.nodes[level] = node;
-                way.shares[level] = Shares::new(&one.expected(point, normal).importance);
+                way.shares[level] = Shares::new(&one.expected(receiver).importance);
             }
             let (child, share) = way.shares[level].find(&mut pick.rest)?;
             pick.probability *= share;
@@ -87,22 +81,22 @@ impl LightTree {
     }
 
     /// The probability of the light at a place of the tree's order, by that of a node above it.
-    fn probability_under(
-        &self,
-        mut node: u32,
-        (point, normal): (Vec3, Vec3),
-        place: u32,
-        mut probability: f32,
-    ) -> f32 {
+    fn probability_under(&self, mut node: u32, receiver: &Receiver, place: u32, mut probability: f32) -> f32 {
         loop {
             let one = &self.nodes[node as usize];
             let child = one.child_over(place);
-            probability *= Shares::new(&one.expected(point, normal).importance).share(child);
+            probability *= Shares::new(&one.expected(receiver).importance).share(child);
             match one.children[child] {
                 Child::Node(below) if probability > 0.0 => node = below,
                 Child::Node(_) | Child::Light(_) => return probability,
             }
         }
+    }
+
+    /// The place of a light in the order of the tree, in which those that are close together follow one another.
+    #[inline(always)]
+    pub fn place_of(&self, light: u32) -> u32 {
+        self.places[light as usize]
     }
 
     /// How many nodes it has.
@@ -112,7 +106,7 @@ impl LightTree {
 
     /// Bytes that it holds.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(&*self.nodes) + size_of_val(&*self.places)
+        size_of_val(&*self.nodes) + size_of_val(&*self.over_lights) + size_of_val(&*self.places)
     }
 }
 
@@ -126,7 +120,7 @@ struct Way {
 }
 
 impl Way {
-    const NEW: Self = Self { nodes: [u32::MAX; LEVELS], shares: [Shares([0.0; LANES]); LEVELS] };
+    const NEW: Self = Self { nodes: [u32::MAX; LEVELS], shares: [Shares::NONE; LEVELS] };
 }
 
 /// Sums of the importance of children up to each.
@@ -134,12 +128,26 @@ impl Way {
 struct Shares([f64; LANES]);
 
 impl Shares {
+    const NONE: Self = Self([0.0; LANES]);
+
+    /// Four runs of four side by side, and then one after the other.
     #[inline(always)]
     fn new(importance: &Lanes) -> Self {
-        let (mut sums, mut sum) = ([0.0; LANES], 0.0);
+        const RUN: usize = 4;
+        let mut sums = [0.0; LANES];
         for i in 0..LANES {
-            sum += f64::from(importance[i]);
-            sums[i] = sum;
+            sums[i] = f64::from(importance[i]);
+        }
+        for i in 1..RUN {
+            for run in (0..LANES).step_by(RUN) {
+                sums[run + i] += sums[run + i - 1];
+            }
+        }
+        for run in (RUN..LANES).step_by(RUN) {
+            let before = sums[run - 1];
+            for i in 0..RUN {
+                sums[run + i] += before;
+            }
         }
         Self(sums)
     }

@@ -48,6 +48,52 @@ const LEAST_COSINE: f32 = 1e-3;
 const LEAST: f32 = 1e-36;
 const MOST: f32 = 1e30;
 
+/// A point of a surface that lights are expected to bring light to.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Where.
+    pub point: Vec3,
+    /// Unit normal that the cosines are of.
+    pub normal: Vec3,
+    /// The glossy lobe; none of a surface that has none, or of which nothing is known.
+    pub lobe: Option<Lobe>,
+}
+
+/// A glossy lobe beside a diffuse one.
+#[derive(Clone, Copy, Debug)]
+pub struct Lobe {
+    /// The unit direction that it is around.
+    pub axis: Vec3,
+    /// The exponent of its cosine.
+    pub shininess: f32,
+    /// Its peak by the value of the diffuse lobe beside it, or by 1 where `diffuse` is 0.
+    pub peak: f32,
+    /// 1, or 0 where there is no other lobe.
+    pub diffuse: f32,
+}
+
+impl Receiver {
+    /// Of a surface of which nothing but this is known.
+    #[inline(always)]
+    pub fn plain(point: Vec3, normal: Vec3) -> Self {
+        Self { point, normal, lobe: None }
+    }
+}
+
+impl Lobe {
+    /// What a surface makes of light from within an angle of a direction, at most and about: cosⁿ δ lies below
+    /// (1 + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and has no end.
+    #[inline(always)]
+    fn value(&self, cos: f32, sin: f32) -> f32 {
+        let short = 1.0 - cos - sin;
+        let short = if short > 0.0 { short } else { 0.0 };
+        let root = 1.0 / (1.0 + 0.125 * self.shininess * short);
+        let square = root * root;
+        let fourth = square * square;
+        self.diffuse + self.peak * (fourth * fourth)
+    }
+}
+
 /// What children are expected to bring to a point.
 pub struct Expected {
     /// In a unit of the tree; 0 where certainly nothing.
@@ -96,12 +142,20 @@ impl Node {
         };
     }
 
-    /// What its children are expected to bring to a point of a surface with this normal: power by distance, by the least angle
-    /// between the normal and a direction to the sphere, and by the least angle between the cone and one from there (section 4.2,
-    /// with bounds of all cosines). Never 0 where a light of the child might arrive.
+    /// What its children are expected to bring to a point of a surface: power by distance, by the mean cosine at the surface, by the
+    /// least angle between the cone of emission and a direction from there (section 4.2, with bounds of cosines), and by what a lobe
+    /// makes of it. Never 0 where a light of the child might arrive.
     #[inline(always)]
-    pub fn expected(&self, point: Vec3, normal: Vec3) -> Expected {
-        let (mut importance, mut nearness) = ([0.0; LANES], [0.0; LANES]);
+    pub fn expected(&self, receiver: &Receiver) -> Expected {
+        let Receiver { point, normal, lobe } = *receiver;
+        let (mut importance, mut nearness, mut reflected) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
+        if let Some(lobe) = lobe {
+            for i in 0..LANES {
+                let offset = lane(&self.center, i) - point * self.is_place[i];
+                let inverse = 1.0 / at_least(offset.length_squared(), LEAST).sqrt();
+                reflected[i] = lobe.value(lobe.axis.dot(offset) * inverse, self.radius[i] * inverse);
+            }
+        }
         for i in 0..LANES {
             let offset = lane(&self.center, i) - point * self.is_place[i];
             let radius = self.radius[i];
@@ -109,14 +163,18 @@ impl Node {
             let inverse = 1.0 / at_least(d2, r2).sqrt();
             // cos(θ − β) ≤ cos θ + sin β, with β half of the angle that the sphere fills.
             let sin = radius * inverse;
-            let towards = normal.dot(offset) * inverse + sin;
+            let straight = normal.dot(offset) * inverse;
+            let towards = straight + sin;
             let cos = -lane(&self.axis, i).dot(offset) * inverse;
             let beyond = cos * self.cos[i] + one_without(cos) * self.sin[i];
             let away = (if cos >= self.cos[i] { 1.0 } else { beyond }) + sin;
             let arrives =
                 (towards > -LEAST_COSINE) & (away > self.end[i] - LEAST_COSINE) & (self.power[i] > 0.0);
             let weakened = if self.weakens[i] > 0.0 { inverse * inverse } else { 1.0 };
-            let value = self.power[i] * weakened * cosine(towards) * cosine(away);
+            // Cosines at the points of a sphere are uniform between the least and the greatest; those below 0 bring nothing.
+            let cut = towards * towards / (4.0 * at_least(sin, LEAST));
+            let mean = if straight > sin { straight } else { cut };
+            let value = self.power[i] * weakened * cosine(mean) * cosine(away) * reflected[i];
             let value = at_least(value, LEAST);
             let value = if value < MOST { value } else { MOST };
             importance[i] = if arrives { value } else { 0.0 };

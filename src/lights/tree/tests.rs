@@ -2,6 +2,7 @@ use proptest::prelude::*;
 
 use super::bounds::{Edge, Space};
 use super::*;
+use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::geometry::cuboid::Cuboid;
 use crate::geometry::cylinder::Cylinder;
@@ -12,8 +13,8 @@ use crate::geometry::triangle::Triangle;
 use crate::lights::emitter::{AreaLight, Emitter, Part, area_light};
 use crate::lights::mesh::MeshEmitter;
 use crate::lights::point::Falloff;
-use crate::lights::{DirectionalLight, Environment, Light, PointLight, SpotLight};
-use crate::math::{DVec3, random};
+use crate::lights::{DirectionalLight, Environment, Light, Lights, PointLight, SpotLight};
+use crate::math::{DVec3, Vec3, random};
 
 /// A light of some kind, of some size, somewhere.
 fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
@@ -49,13 +50,34 @@ fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
 }
 
 fn tree_of(lights: &[Light]) -> LightTree {
-    LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>()).expect("some light")
+    LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>(), &CancelToken::new())
+        .expect("nobody cancels")
+        .expect("some light")
 }
 
 /// A point of a surface and its normal.
 fn place(next: &mut impl FnMut() -> f32) -> (Vec3, Vec3) {
     let mut vector = |scale: f32| Vec3::from_array(std::array::from_fn(|_| (next() * 2.0 - 1.0) * scale));
     (vector(5.0), vector(1.0).normalize())
+}
+
+/// Of cuts: enough for some trees, and too few for others.
+const NODES: usize = 12;
+
+/// A cut for a point.
+fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> Cut<'_> {
+    let mut cut = Cut::new(tree, nodes);
+    // What it was for before leaves nothing behind.
+    cut.go_to(&Receiver::plain(normal, point));
+    cut.go_to(&Receiver::plain(point, normal));
+    cut
+}
+
+/// [`Cut::pick`], by place.
+fn picks_of<const N: usize>(cut: &Cut<'_>, u: &[f64; N]) -> [Option<Pick>; N] {
+    let mut picks = [None; N];
+    cut.pick(u.iter().copied(), |place, pick| picks[place] = Some(pick));
+    picks
 }
 
 /// Evenly spread numbers.
@@ -73,18 +95,18 @@ proptest! {
         let tree = tree_of(&lights);
         for _ in 0..4 {
             let (point, normal) = place(&mut next);
-            let cut = Cut::new(&tree, point, normal);
+            let cut = cut_for(&tree, point, normal, NODES);
             let mut dark = [0.0; 2];
             for (k, u) in even::<512>().into_iter().enumerate() {
-                let alone = tree.pick(point, normal, u);
+                let alone = tree.pick(&Receiver::plain(point, normal), u);
                 if let Some(pick) = alone {
-                    prop_assert_eq!(pick.probability, tree.probability(point, normal, pick.light));
+                    prop_assert_eq!(pick.probability, tree.probability(&Receiver::plain(point, normal), pick.light));
                     prop_assert!(pick.probability > 0.0 && (0.0..1.0).contains(&pick.rest));
                 } else {
                     dark[0] += 1.0 / 512.0;
                 }
                 if k == 0 {
-                    for pick in cut.pick(&even::<512>()) {
+                    for pick in picks_of(&cut, &even::<512>()) {
                         if let Some(pick) = pick {
                             prop_assert_eq!(pick.probability, cut.probability(pick.light));
                             prop_assert!(pick.probability > 0.0 && (0.0..1.0).contains(&pick.rest));
@@ -95,7 +117,7 @@ proptest! {
                 }
             }
             // What is not picked goes to nodes whose bounds promise what none of their lights sends.
-            let alone: f32 = (0..count).map(|light| tree.probability(point, normal, light)).sum();
+            let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::plain(point, normal), light)).sum();
             let cut: f32 = (0..count).map(|light| cut.probability(light)).sum();
             prop_assert!((alone + dark[0] - 1.0).abs() < 0.02, "{} {}", alone, dark[0]);
             prop_assert!((cut + dark[1] - 1.0).abs() < 0.02, "{} {}", cut, dark[1]);
@@ -113,14 +135,14 @@ proptest! {
             if let (true, Some((crate::lights::Middle::At(middle), _))) = (next() < 0.5, lights[0].middle()) {
                 point = middle + point * 0.01;
             }
-            let cut = Cut::new(&tree, point, normal);
+            let cut = cut_for(&tree, point, normal, NODES);
             for (number, light) in (0..).zip(&lights) {
                 let arrives = (0..8).any(|_| {
                     let sample = light.sample(point, normal, [next(), next()]);
                     sample.is_some_and(|sample| sample.direction.dot(normal) > 0.0 && sample.weight.element_sum() > 0.0)
                 });
                 if arrives {
-                    prop_assert!(tree.probability(point, normal, number) > 0.0, "{:?} from {}, {}", light, point, normal);
+                    prop_assert!(tree.probability(&Receiver::plain(point, normal), number) > 0.0, "{:?} from {}, {}", light, point, normal);
                     prop_assert!(cut.probability(number) > 0.0, "{:?} from {}, {}", light, point, normal);
                 }
             }
@@ -135,17 +157,17 @@ fn picks_come_as_often_as_their_probabilities_say() {
     let tree = tree_of(&lights);
     for round in 0..4 {
         let (point, normal) = place(&mut next);
-        let cut = Cut::new(&tree, point, normal);
+        let cut = cut_for(&tree, point, normal, NODES);
         const N: usize = 100_000;
         let mut counts = vec![[0.0_f64; 2]; lights.len()];
         for _ in 0..N / 20 {
             let mut u: [f64; 20] =
                 std::array::from_fn(|_| f64::from(next()) + f64::from(next()) / f64::from(1 << 24));
-            for pick in u.iter().filter_map(|&u| tree.pick(point, normal, u)) {
+            for pick in u.iter().filter_map(|&u| tree.pick(&Receiver::plain(point, normal), u)) {
                 counts[pick.light as usize][0] += 1.0;
             }
             u.sort_by(f64::total_cmp);
-            for pick in cut.pick(&u).into_iter().flatten() {
+            for pick in picks_of(&cut, &u).into_iter().flatten() {
                 counts[pick.light as usize][1] += 1.0;
             }
         }
@@ -157,8 +179,11 @@ fn picks_come_as_often_as_their_probabilities_say() {
                 }
             };
             for (number, counts) in (0..).zip(&counts) {
-                let probability =
-                    if way == 0 { tree.probability(point, normal, number) } else { cut.probability(number) };
+                let probability = if way == 0 {
+                    tree.probability(&Receiver::plain(point, normal), number)
+                } else {
+                    cut.probability(number)
+                };
                 let expected = f64::from(probability) * N as f64;
                 if expected < 5.0 {
                     few = (few.0 + counts[way], few.1 + expected);
@@ -202,12 +227,12 @@ fn lights_that_send_nothing_are_not_picked() {
         lights.push(disk(at(x, 1.2), DVec3::NEG_Y));
     }
     let tree = tree_of(&lights);
-    let cut = Cut::new(&tree, point, normal);
+    let cut = cut_for(&tree, point, normal, NODES);
     let mut sum = 0.0;
     for (number, _) in (0..).zip(&lights) {
         let probability = cut.probability(number);
         assert!((probability > 0.0) == (number % 5 > 2), "{number}: {probability}");
-        assert!(number % 5 > 2 || tree.probability(point, normal, number) == 0.0);
+        assert!(number % 5 > 2 || tree.probability(&Receiver::plain(point, normal), number) == 0.0);
         sum += probability;
     }
     // Hardly anything goes to nodes without light.
@@ -224,7 +249,7 @@ fn what_is_nearer_and_stronger_is_picked_in_proportion() {
     let lights: Vec<Light> =
         (0..200_u16).map(|i| at(1.0 + f64::from(i) * 0.05, f32::from(i % 3) + 1.0)).collect();
     let tree = tree_of(&lights);
-    let cut = Cut::new(&tree, Vec3::ZERO, Vec3::Y);
+    let cut = cut_for(&tree, Vec3::ZERO, Vec3::Y, NODES);
     let irradiance = |i: u32| (f64::from(i % 3) + 1.0) / (1.0 + f64::from(i) * 0.05).powi(2);
     let total: f64 = (0..200).map(irradiance).sum();
     for i in 0..200 {
@@ -264,10 +289,23 @@ fn lights_in_one_place_and_lights_far_apart_have_a_tree() {
         (0..120).map(|i| Light::Point(point(DVec3::splat(1e-18 * 2_f64.powi(i))))).collect();
     for lights in [same, apart] {
         let tree = tree_of(&lights);
-        let sum: f32 = (0..lights.len() as u32).map(|i| tree.probability(Vec3::NEG_ONE, Vec3::ONE, i)).sum();
+        let sum: f32 = (0..lights.len() as u32)
+            .map(|i| tree.probability(&Receiver::plain(Vec3::NEG_ONE, Vec3::ONE), i))
+            .sum();
         assert!((sum - 1.0).abs() < 1e-3, "{sum}");
     }
-    assert_eq!(LightTree::new(&[None, None]), None);
+    assert_eq!(LightTree::new(&[None, None], &CancelToken::new()), Ok(None));
+}
+
+#[test]
+fn a_tree_that_nobody_waits_for_is_not_built() {
+    let mut next = random::unit(2);
+    let bounds: Vec<_> = lights_of(100, &mut next).iter().map(Light::bounds).collect();
+    let token = CancelToken::new();
+    assert!(LightTree::new(&bounds, &token).is_ok_and(|tree| tree.is_some()));
+    token.cancel();
+    assert_eq!(LightTree::new(&bounds, &token), Err(Cancelled));
+    assert_eq!(Lights::new(lights_of(100, &mut next), &token), Err(Cancelled));
 }
 
 /// A wide and a near mesh of uneven triangles.
@@ -278,7 +316,7 @@ fn uneven_mesh(count: u32) -> MeshEmitter {
         let (place, size) = (corner(2.0), 0.02 * 1.5_f64.powi((i % 12) as i32));
         ([place, place + corner(size), place + corner(size)], 2 * i)
     });
-    MeshEmitter::new(triangles.collect()).expect("an area")
+    MeshEmitter::new(triangles.collect(), &CancelToken::new()).expect("nobody cancels").expect("an area")
 }
 
 #[test]

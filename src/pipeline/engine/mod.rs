@@ -268,7 +268,7 @@ impl Engine {
         let build = || accel(scene, (&of, origin), &meshes, &mut self.accel, &reading);
         let built = table.run(Stage::Accel, build)?;
         let memos = (&mut self.lights, &mut self.sky);
-        let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos));
+        let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos, token)?);
         let lights = table.run(Stage::Lights, gather)?;
         let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
         let surfaces = keys::surfaces(scene, &of, &textures.keys);

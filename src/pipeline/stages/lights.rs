@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::super::cache::Memo;
 use super::textures::Textures;
 use super::{Staged, keys};
+use crate::control::{CancelToken, Cancelled};
 use crate::lights::{Lights, SkyMap};
 use crate::scene::description::{Scene, TextureUse};
 use crate::scene::fingerprint::{Key, Referents};
@@ -20,31 +21,31 @@ pub(in crate::pipeline) fn lights(
     geometry: &Geometry,
     textures: &Textures,
     (memo, skies): (&mut Memo<Arc<Lights>>, &mut SkyMemo),
-) -> Staged<Arc<Lights>> {
+    token: &CancelToken,
+) -> Result<Staged<Arc<Lights>>, Cancelled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
     let declared = patterns(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Key> = declared.chain(&textures.of_files).collect();
     let key = keys::lights(scene, of, geometry.origin(), (map, &patterns));
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
-        return Staged::reused(lights.clone(), "no light changed");
+        return Ok(Staged::reused(lights.clone(), "no light changed"));
     }
-    let lights = world::lights(scene, geometry, &textures.images, sky(textures, skies));
+    let lights = world::lights(scene, geometry, &textures.images, sky(textures, skies), token)?;
     memo.set(key, lights.clone());
-    match lights.len() {
+    Ok(match lights.len() {
         0 => Staged::skipped(lights, "the scene has no light"),
         1 => Staged::done(lights, "1 light"),
         count => {
             let tree = lights.tree().map_or_else(String::new, |_| picked(&lights));
             Staged::done(lights, format!("{count} lights{tree}"))
         }
-    }
+    })
 }
 
 /// What is said of lights that are too many to look at all of them.
 fn picked(lights: &Lights) -> String {
     format!(
-        ", of which {} are picked at a time; their tree has {} kB",
-        Lights::PICKS,
+        ", of which some are picked at a time; their tree has {} kB",
         lights.memory_bytes().div_ceil(1000)
     )
 }

@@ -295,16 +295,7 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
     }
     let environment = loaded.scene.environment.as_ref().and_then(|environment| environment.file.as_ref());
     if let Some(file) = environment.filter(|file| known.insert(file.value.clone())) {
-        let source = TextureSource { path: file.value.clone(), encoding: ImageEncoding::Color };
-        let name = "environment".to_owned();
-        wanted.push(NeededTexture {
-            source,
-            name,
-            declared: None,
-            mesh_file: None,
-            is_environment: true,
-            has_mipmaps: false,
-        });
+        wanted.push(NeededTexture::of_environment(&file.value));
     }
 }
 

@@ -187,8 +187,8 @@ fn a_hundred_points_over_a_floor_light_it_as_their_sum() {
         let values = build.values(4, 64);
         let (mean, error) = mean_and_error(&values);
         assert!(error < 2e-3 * exact, "{what}: {error} of {exact}");
-        assert!((mean - exact).abs() < 4.5 * error, "{what}: {mean} ± {error} is not {exact}");
-        // Picks in proportion to what arrives: 128 of them scatter by a few hundredths at most.
-        assert!(error * 8.0 < 0.05 * exact, "{what}: {}", error * 8.0 / exact);
+        assert!((mean - exact).abs() < 4.5 * error + 1e-5 * exact, "{what}: {mean} ± {error} is not {exact}");
+        // Points that are few enough to look at each are picked in proportion to what arrives: hardly anything is random.
+        assert!(error * 8.0 < 1e-3 * exact, "{what}: {}", error * 8.0 / exact);
     }
 }

@@ -228,7 +228,9 @@ impl Build {
         let origin = origin(&self.scene.camera, None);
         let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("nobody cancels"));
-        let lights = lights(&self.scene, &geometry, &parts.images, self.sky.as_ref().and_then(sky));
+        let sky = self.sky.as_ref().and_then(sky);
+        let lights =
+            lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new()).expect("nobody cancels");
         World::new(&self.scene, &parts, geometry, lights)
     }
 
