@@ -172,7 +172,8 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         let (lights, used) = pick.lights();
         let u = sampler.pairs(&row.path, Decision::Picked, number, count);
         let at = (&row.from, &row.normal);
-        let (mut samples, mut inverse) = self.shot.world.lights.sample_each(&lights, at, used, &u);
+        let (mut samples, mut inverse, lookups) = self.shot.world.lights.sample_each(&lights, at, used, &u);
+        sums.rays.lookups += lookups;
         for i in 0..LANES {
             let weight = lane(&samples.weights, i) * pick.shares[i];
             set_lane(&mut samples.weights, i, weight);

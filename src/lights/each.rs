@@ -9,8 +9,8 @@ use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
 impl Lights {
-    /// [`Light::sample`] of a light of its own for each point whose bit is set, by numbers of its own; and one over the densities
-    /// in sr⁻¹, as [`Light::inverse_densities`]. Side by side where all are points, or balls.
+    /// [`Light::sample`] of a light of its own for each point whose bit is set, by numbers of its own; one over the densities
+    /// in sr⁻¹, as [`Light::inverse_densities`]; and how many texture look-ups that took. Side by side where all are points, or balls.
     #[inline(always)]
     pub fn sample_each(
         &self,
@@ -18,7 +18,7 @@ impl Lights {
         (points, normals): (&Lanes3, &Lanes3),
         used: u32,
         u: &[Lanes; 2],
-    ) -> (LightRow, Lanes) {
+    ) -> (LightRow, Lanes, u64) {
         let mut lights = [self.get(picked[0]); LANES];
         for i in 1..LANES {
             lights[i] = self.get(picked[i]);
@@ -48,13 +48,16 @@ impl Lights {
             inverse[i] = lights[i].inverse_density(lane(&row.directions, i), lane(&row.weights, i));
         }
         // Densities are those of plain lamps.
+        let mut lookups = 0;
         for i in lanes(used) {
-            if let Some(pattern) = lights[i].pattern() {
-                let weight = lane(&row.weights, i) * pattern.at(lane(&row.targets, i), row.sources.part[i]);
+            let weight = lane(&row.weights, i);
+            if let Some(pattern) = lights[i].pattern().filter(|_| weight != Vec3::ZERO) {
+                let weight = weight * pattern.at(lane(&row.targets, i), row.sources.part[i]);
                 set_lane(&mut row.weights, i, weight);
+                lookups += 1;
             }
         }
-        (row, inverse)
+        (row, inverse, lookups)
     }
 }
 

@@ -161,13 +161,15 @@ impl Node {
             let radius = self.radius[i];
             let (d2, r2) = (offset.length_squared(), at_least(radius * radius, LEAST));
             let inverse = 1.0 / at_least(d2, r2).sqrt();
-            // cos(θ − β) ≤ cos θ + sin β, with β half of the angle that the sphere fills.
+            // Positive where θ − β < 90°, and above 1 where θ < β, with β half of the angle that the sphere fills. From inside there is
+            // light in every direction.
             let sin = radius * inverse;
+            let is_inside = d2 <= r2;
             let straight = normal.dot(offset) * inverse;
-            let towards = straight + sin;
+            let towards = if is_inside { 1.0 } else { straight + sin };
             let cos = -lane(&self.axis, i).dot(offset) * inverse;
             let beyond = cos * self.cos[i] + one_without(cos) * self.sin[i];
-            let away = (if cos >= self.cos[i] { 1.0 } else { beyond }) + sin;
+            let away = (if (cos >= self.cos[i]) | is_inside { 1.0 } else { beyond }) + sin;
             let arrives =
                 (towards > -LEAST_COSINE) & (away > self.end[i] - LEAST_COSINE) & (self.power[i] > 0.0);
             let weakened = if self.weakens[i] > 0.0 { inverse * inverse } else { 1.0 };

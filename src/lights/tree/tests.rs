@@ -151,6 +151,34 @@ proptest! {
 }
 
 #[test]
+fn spotlights_above_each_other_are_picked_from_between_them() {
+    // In columns, all down, as a node holds those of one column: a point below the first of them is above the middle of the node.
+    let mut next = random::unit(8);
+    let spot = |i: u32| {
+        let position = DVec3::new(f64::from(i % 16), 0.5 + f64::from(i / 16), 0.0);
+        let point = PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
+        Light::Spot(SpotLight { point, axis: Vec3::NEG_Y, half_angle: 20.0_f32.to_radians(), blend: 0.2 })
+    };
+    let lights: Vec<Light> = (0..48).map(spot).collect();
+    let tree = tree_of(&lights);
+    let mut arrived = 0;
+    for _ in 0..2000 {
+        let point = Vec3::new(16.0 * next(), 3.0 * next(), 0.2 * next() - 0.1);
+        let receiver = Receiver::plain(point, Vec3::Y);
+        let cut = cut_for(&tree, point, Vec3::Y, 8);
+        for (number, light) in (0..).zip(&lights) {
+            let sample = light.sample(point, Vec3::Y, [0.5; 2]);
+            if sample.is_some_and(|sample| sample.direction.y > 0.0 && sample.weight.x > 0.0) {
+                arrived += 1;
+                assert!(tree.probability(&receiver, number) > 0.0, "{light:?} from {point}");
+                assert!(cut.probability(number) > 0.0, "{light:?} from {point}");
+            }
+        }
+    }
+    assert!(arrived > 500, "{arrived}");
+}
+
+#[test]
 fn picks_come_as_often_as_their_probabilities_say() {
     let mut next = random::unit(3);
     let lights = lights_of(300, &mut next);
