@@ -167,7 +167,7 @@ impl LitRow {
         medium: u32,
     ) {
         let LitVertex { path, place, vertex, shading, bsdf } = lit;
-        let outlook = vertex.outlook(shot);
+        let outlook = vertex.outlook(shot, path.history.is_seen);
         set_lane(&mut self.from, i, outlook.point);
         set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
         self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;

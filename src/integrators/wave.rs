@@ -45,7 +45,7 @@ pub fn trace(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, crossing, camera, hits, by_object } = queues;
+    let Queues { rays, next, lit, crossing, camera, hits, by_direction, by_object } = queues;
     next.clear();
     let is_path = match shot.settings.render.integrator {
         Integrator::Whitted => false,
@@ -70,8 +70,9 @@ pub fn trace(
     while !rays.is_empty() {
         wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
         if wave.is_path {
-            shot.closest_hits(rays, hits)?;
-            by_object.sort(hits);
+            by_direction.sort(rays);
+            shot.closest_hits_in(by_direction.places(), rays, hits)?;
+            by_object.sort(hits, by_direction.places());
             for places in by_object.places().chunks(PACKET) {
                 wave.shade_packet(Rays::Traced(rays, hits, places))?;
             }
@@ -135,13 +136,15 @@ impl Wave<'_, '_> {
         if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
             shot.token.check()?;
         }
-        let met = shot.meet(rays, self.sink.measure, self.lit.spare());
+        let are_lit = self.depth < shot.settings.render.max_depth && self.sink.takes_reflected();
+        let met = shot.meet(rays, self.sink.measure, are_lit, self.lit.spare());
+        self.counters.texture_lookups += met.lookups;
         if self.sink.measure == Measure::Work {
             for lane in 0..rays.count() {
                 self.add_work(&met.path(shot, &rays, lane), met.hit(lane));
             }
         }
-        if self.depth < shot.settings.render.max_depth && self.sink.takes_reflected() {
+        if are_lit {
             self.lit.keep();
             if shot.pixel_spread > 0.0 {
                 for (lane, hit) in lanes(met.plain).filter_map(|lane| Some((lane, met.hit(lane)?))) {
@@ -185,12 +188,13 @@ impl Wave<'_, '_> {
 
     /// What a plain surface sends to the eye by itself.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
-        let Some((material, bsdf)) = self.shot.world.plain_phong(hit.object) else { return };
+        let Some((material, phong)) = self.shot.plain_phong(hit.object) else { return };
         if is_shining {
             self.add_emitted(path, material.emission.scale, self.shot.lamp_weight(path, hit));
         }
         let render = &self.shot.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
+            let Some(bsdf) = phong.constant() else { return };
             self.sink.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient);
         }
     }
