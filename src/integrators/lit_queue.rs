@@ -97,10 +97,19 @@ impl LitQueue {
         if used == 0 {
             return;
         }
-        let row = self.rows[self.count].clone();
-        for lane in lanes(used) {
-            let (own, i) = self.open_row();
-            own.copy(i, &row, lane);
+        let (kept, spare) = self.rows.split_at_mut(self.count);
+        let row = &mut spare[0];
+        let mut left = used;
+        if let Some(open) = kept.get_mut(self.open) {
+            for lane in lanes(used).take(open.used.count_zeros() as usize - (u32::BITS as usize - LANES)) {
+                open.copy(open.used.trailing_ones() as usize, row, lane);
+                left &= !(1 << lane);
+            }
+        }
+        if left != 0 {
+            row.keep(left);
+            self.open = self.count;
+            self.count += 1;
         }
     }
 

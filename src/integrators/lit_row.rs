@@ -129,6 +129,13 @@ impl LitRow {
         self.bend = [UNBENT; LANES];
     }
 
+    /// Keep these of its vertices.
+    pub(super) fn keep(&mut self, these: u32) {
+        self.used &= these;
+        self.is_bounded &= these;
+        self.may_lift &= these;
+    }
+
     /// Take a vertex of another row.
     pub(super) fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [

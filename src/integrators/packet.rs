@@ -48,9 +48,18 @@ impl Rays<'_> {
         }
     }
 
+    /// Of the camera: the path in a lane.
+    #[inline(always)]
+    pub fn camera_path(&self, shot: &Shot<'_>, lane: usize) -> Option<PathRay> {
+        match self {
+            Self::Camera(row, first, ..) => Some(shot.camera_path(row.rays.ray(lane), first + lane as u32)),
+            Self::Paths(..) | Self::Traced(..) => None,
+        }
+    }
+
     /// Of a queue: the path in a lane.
     #[inline(always)]
-    fn of_queue(&self, lane: usize) -> Option<&PathRay> {
+    pub fn of_queue(&self, lane: usize) -> Option<&PathRay> {
         match self {
             Self::Camera(..) => None,
             Self::Paths(paths, _) => paths.get(lane),

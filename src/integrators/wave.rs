@@ -161,16 +161,17 @@ impl Wave<'_, '_> {
         wanted |= if is_dark_beyond { 0 } else { all & !met.any };
         // In the order of the paths: what a sample gets by several is added in that.
         for lane in lanes(wanted) {
-            let (path, bit) = (met.path(shot, &rays, lane), 1 << lane);
+            let (of_camera, bit) = (rays.camera_path(shot, lane), 1 << lane);
+            let Some(path) = of_camera.as_ref().or_else(|| rays.of_queue(lane)) else { continue };
             match met.hit(lane) {
-                Some(hit) if met.plain & bit != 0 => self.add_own_light(&path, &hit, met.shining & bit != 0),
+                Some(hit) if met.plain & bit != 0 => self.add_own_light(path, &hit, met.shining & bit != 0),
                 Some(hit) => {
                     self.place = rays.place(lane);
-                    self.shade(path, hit);
+                    self.shade(*path, hit);
                 }
                 None => {
                     let sky = shot.world.lights.environment().map(|_| met.sky(lane));
-                    self.add_beyond(&path, shot.light_beyond_with(sky, &path));
+                    self.add_beyond(path, shot.light_beyond_with(sky, path));
                 }
             }
         }

@@ -227,7 +227,11 @@ impl SkyMap {
                 places[corner][i] = own[corner];
             }
         }
-        places.map(|places| self.texels.row(&places))
+        let mut corners = [[[0.0; LANES]; 3]; 4];
+        for corner in 0..4 {
+            self.texels.fill_row(&places[corner], &mut corners[corner]);
+        }
+        corners
     }
 
     /// The density in sr⁻¹ of a cell, were it the same all over it.

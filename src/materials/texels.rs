@@ -51,31 +51,29 @@ impl Texels {
         }
     }
 
-    /// Linear values at places in the data.
+    /// Linear values at places in the data, side by side. In place: rows are larger than what compilers like to return.
     #[inline(always)]
-    pub fn row(&self, places: &[usize; LANES]) -> Lanes3 {
-        let mut values = [[0.0; LANES]; 3];
+    pub fn fill_row(&self, places: &[usize; LANES], values: &mut Lanes3) {
         match &self.data {
             TexelData::Srgb8(bytes) => {
                 let table = &*SRGB;
                 for i in 0..LANES {
                     let [r, g, b] = bytes[places[i]];
                     let decoded = |byte: u8| table[usize::from(byte)];
-                    set_lane(&mut values, i, Vec3::new(decoded(r), decoded(g), decoded(b)));
+                    set_lane(values, i, Vec3::new(decoded(r), decoded(g), decoded(b)));
                 }
             }
             TexelData::Linear8(bytes) => {
                 for i in 0..LANES {
-                    set_lane(&mut values, i, of_linear(bytes[places[i]]));
+                    set_lane(values, i, of_linear(bytes[places[i]]));
                 }
             }
             TexelData::Float(floats) => {
                 for i in 0..LANES {
-                    set_lane(&mut values, i, floats[places[i]]);
+                    set_lane(values, i, floats[places[i]]);
                 }
             }
         }
-        values
     }
 
     /// Linear values of all texels.

@@ -122,18 +122,18 @@ impl Texture {
         }
         let columns = self.wrap.index_row(&first[0], 0, extent[0]);
         let rows = self.wrap.index_row(&first[1], 0, extent[1]);
+        let mut colors = [[0.0; LANES]; 3];
         if shift == 0.0 {
-            return texels.row(&places(&columns, &rows, extent));
+            texels.fill_row(&places(&columns, &rows, extent), &mut colors);
+            return colors;
         }
         let right = self.wrap.index_row(&first[0], 1, extent[0]);
         let upper = self.wrap.index_row(&first[1], 1, extent[1]);
-        let corners = [
-            texels.row(&places(&columns, &rows, extent)),
-            texels.row(&places(&right, &rows, extent)),
-            texels.row(&places(&columns, &upper, extent)),
-            texels.row(&places(&right, &upper, extent)),
-        ];
-        let mut colors = [[0.0; LANES]; 3];
+        let mut corners = [[[0.0; LANES]; 3]; 4];
+        texels.fill_row(&places(&columns, &rows, extent), &mut corners[0]);
+        texels.fill_row(&places(&right, &rows, extent), &mut corners[1]);
+        texels.fill_row(&places(&columns, &upper, extent), &mut corners[2]);
+        texels.fill_row(&places(&right, &upper, extent), &mut corners[3]);
         for i in 0..LANES {
             let corner = |number: usize| lane(&corners[number], i);
             let lower = corner(0).lerp(corner(1), part[0][i]);
