@@ -80,86 +80,15 @@ pub struct Queues {
     pub lit: LitQueue,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
-    /// Their order by where they go.
-    pub by_direction: ByDirection,
     /// Their order by what they hit.
     pub by_object: ByObject,
     /// What is near to a hit of glass.
     pub crossing: CrossingMemory,
 }
 
-/// Places in a queue, those together whose rays go much the same way: so packets of them meet the same boxes, and what they hit is
-/// close together. The samples of a pixel, as they come, are as far apart as they can be.
-#[derive(Default)]
-pub struct ByDirection {
-    kinds: Vec<u16>,
-    places: Vec<u32>,
-}
-
-impl ByDirection {
-    /// Steps along each side of the square that directions are mapped to.
-    const STEPS: u32 = 1 << 5;
-
-    /// Of these rays; those that are alike in the order of the queue.
-    pub fn sort(&mut self, rays: &[PathRay]) {
-        self.kinds.clear();
-        self.kinds.extend(rays.iter().map(|path| Self::kind(path.ray.direction)));
-        sort(
-            &self.kinds,
-            0..rays.len() as u32,
-            Self::STEPS as usize * Self::STEPS as usize,
-            &mut self.places,
-        );
-    }
-
-    /// Number of the cell of a unit direction (Meyer et al., *On Floating-Point Normal Vectors*, 2010, section 3), along a
-    /// curve of cells that are close together.
-    fn kind(direction: Vec3) -> u16 {
-        let [x, y, z] = direction.to_array();
-        let scale = 1.0 / (x.abs() + y.abs() + z.abs());
-        let (x, y) = (x * scale, y * scale);
-        let folded = |a: f32, b: f32| if z < 0.0 { (1.0 - b.abs()).copysign(a) } else { a };
-        let step = |x: f32| ((x * 0.5 + 0.5) * Self::STEPS as f32) as u32;
-        let spread = |x: u32| {
-            let x = x.min(Self::STEPS - 1);
-            let x = (x | x << 4) & 0x0f0f;
-            let x = (x | x << 2) & 0x3333;
-            (x | x << 1) & 0x5555
-        };
-        (spread(step(folded(x, y))) | spread(step(folded(y, x))) << 1) as u16
-    }
-
-    /// Each place once.
-    pub fn places(&self) -> &[u32] {
-        &self.places
-    }
-}
-
-/// Sort places in `order` by what kind they are of; those of one kind stay as they were.
-fn sort(kinds: &[u16], order: impl Iterator<Item = u32> + Clone, count: usize, places: &mut Vec<u32>) {
-    let mut starts = [0_u32; MOST_KINDS + 1];
-    for kind in kinds {
-        starts[usize::from(*kind) + 1] += 1;
-    }
-    for i in 1..=count {
-        starts[i] += starts[i - 1];
-    }
-    places.clear();
-    places.resize(kinds.len(), 0);
-    for place in order {
-        let start = &mut starts[usize::from(kinds[place as usize])];
-        places[*start as usize] = place;
-        *start += 1;
-    }
-}
-
-/// Kinds that places are sorted by.
-const MOST_KINDS: usize = 1 << 10;
-
 /// Places in a queue, those together whose rays hit the same object, so that packets of them are shaded by few loops.
 #[derive(Default)]
 pub struct ByObject {
-    kinds: Vec<u16>,
     places: Vec<u32>,
 }
 
@@ -167,12 +96,23 @@ impl ByObject {
     /// Objects are told apart by so many of their last bits.
     const KINDS: usize = 64;
 
-    /// Of these hits; what hits nothing is last, and what is alike as in `order`.
-    pub fn sort(&mut self, hits: &[Option<Hit>], order: &[u32]) {
+    /// Of these hits; what hits nothing is last, and what is alike in the order of the queue.
+    pub fn sort(&mut self, hits: &[Option<Hit>]) {
         let kind = |hit: &Option<Hit>| hit.map_or(Self::KINDS, |hit| hit.object as usize % Self::KINDS);
-        self.kinds.clear();
-        self.kinds.extend(hits.iter().map(|hit| kind(hit) as u16));
-        sort(&self.kinds, order.iter().copied(), Self::KINDS + 1, &mut self.places);
+        let mut starts = [0_u32; Self::KINDS + 2];
+        for hit in hits {
+            starts[kind(hit) + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        self.places.clear();
+        self.places.resize(hits.len(), 0);
+        for (place, hit) in (0..).zip(hits) {
+            let start = &mut starts[kind(hit)];
+            self.places[*start as usize] = place;
+            *start += 1;
+        }
     }
 
     /// Each place once.
@@ -203,7 +143,6 @@ mod tests {
 
     use super::*;
     use crate::geometry::ShapeHit;
-    use crate::math::random::signed;
     use crate::sampling::CAMERA_PATH;
 
     #[test]
@@ -212,12 +151,10 @@ mod tests {
         let hits: Vec<Option<Hit>> = [5, 9, 0, 5, 63, 9, 0, 5].map(hit).to_vec();
         let mut by_object = ByObject::default();
         for _ in 0..2 {
-            by_object.sort(&hits, &[0, 1, 2, 3, 4, 5, 6, 7]);
+            by_object.sort(&hits);
             assert_eq!(by_object.places(), [2, 6, 0, 3, 7, 4, 1, 5]);
-            by_object.sort(&hits, &[7, 6, 5, 4, 3, 2, 1, 0]);
-            assert_eq!(by_object.places(), [6, 2, 7, 3, 0, 4, 5, 1]);
         }
-        by_object.sort(&[], &[]);
+        by_object.sort(&[]);
         assert!(by_object.places().is_empty());
     }
 
@@ -232,29 +169,6 @@ mod tests {
             history: History::CAMERA,
             cone: Cone::default(),
         }
-    }
-
-    #[test]
-    fn rays_that_go_the_same_way_are_together() {
-        let mut next = signed(3);
-        let towards = |direction: Vec3| PathRay { ray: Ray::new(Vec3::ONE, direction), ..numbered(0) };
-        let axes = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
-        let any = (0..1018).map(|_| Vec3::new(next(), next(), next()).normalize());
-        let rays: Vec<PathRay> = axes.into_iter().chain(any).map(towards).collect();
-        let mut by_direction = ByDirection::default();
-        by_direction.sort(&rays);
-        let mut once = by_direction.places().to_vec();
-        once.sort_unstable();
-        assert!(once.into_iter().eq(0..1024));
-        // The mean distance of neighbours is far below that of any two, which is 4/3.
-        let ends = |pair: &[u32]| {
-            let [a, b] = [pair[0], pair[1]].map(|place| rays[place as usize].ray.direction);
-            f64::from((a - b).length())
-        };
-        let mean = by_direction.places().windows(2).map(ends).sum::<f64>() / 1023.0;
-        assert!(mean < 0.15, "{mean}");
-        by_direction.sort(&[towards(Vec3::NAN), towards(Vec3::ZERO)]);
-        assert_eq!(by_direction.places(), [0, 1]);
     }
 
     #[test]

@@ -45,7 +45,7 @@ pub fn trace(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, crossing, camera, hits, by_direction, by_object } = queues;
+    let Queues { rays, next, lit, crossing, camera, hits, by_object } = queues;
     next.clear();
     let is_path = match shot.settings.render.integrator {
         Integrator::Whitted => false,
@@ -70,9 +70,8 @@ pub fn trace(
     while !rays.is_empty() {
         wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
         if wave.is_path {
-            by_direction.sort(rays);
-            shot.closest_hits_in(by_direction.places(), rays, hits)?;
-            by_object.sort(hits, by_direction.places());
+            shot.closest_hits(rays, hits)?;
+            by_object.sort(hits);
             for places in by_object.places().chunks(PACKET) {
                 wave.shade_packet(Rays::Traced(rays, hits, places))?;
             }
