@@ -1,7 +1,7 @@
 //! Quads: squares and any other parallelograms, in double precision.
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
-use super::surface_rows::{Exact, ExactPoint};
+use super::surface_rows::{Exact, ExactPoint, Mapped};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{TRUE, bits};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -78,8 +78,7 @@ impl Parallelogram {
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
-        let [s, t] = self.coordinates(ray, hit);
-        SurfacePoint::exact(point, normal, Vec2::new(s as f32, t as f32), self.u, self.v, reach)
+        SurfacePoint::exact(point, normal, self.uv(ray, hit).as_vec2(), self.u, self.v, reach)
     }
 
     /// Of a hit along the edges, in [0, 1].
@@ -143,6 +142,14 @@ impl Exact for Parallelogram {
         let [s, t] = self.coordinates(ray, hit);
         let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
         ExactPoint { point: self.corner + self.u * s + self.v * t, normal: self.normal, reach }
+    }
+}
+
+impl Mapped for Parallelogram {
+    #[inline(always)]
+    fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
+        let [s, t] = self.coordinates(ray, hit);
+        Vec2::new(s as f32, t as f32).as_dvec2()
     }
 }
 

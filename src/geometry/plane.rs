@@ -2,7 +2,7 @@
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface::flat_axes;
-use super::surface_rows::{Exact, ExactPoint};
+use super::surface_rows::{Exact, ExactPoint, Mapped};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{TRUE, bits};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -55,8 +55,7 @@ impl Plane {
     /// The surface at a hit; one texture tile per unit of length.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
-        let [s, t] = self.coordinates(ray, hit);
-        let uv = DVec2::new(s, t);
+        let uv = self.uv(ray, hit);
         SurfacePoint { uv, ..SurfacePoint::exact(point, normal, uv.as_vec2(), self.u, self.v, reach) }
     }
 
@@ -114,6 +113,13 @@ impl Exact for Plane {
         let [s, t] = self.coordinates(ray, hit);
         let reach = self.point.abs().max_element() + s.abs() + t.abs();
         ExactPoint { point: self.point + self.u * s + self.v * t, normal: self.normal, reach }
+    }
+}
+
+impl Mapped for Plane {
+    #[inline(always)]
+    fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
+        DVec2::from_array(self.coordinates(ray, hit))
     }
 }
 

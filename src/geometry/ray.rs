@@ -32,6 +32,7 @@ impl Ray {
     }
 
     /// A segment, longer by what its ends may be off.
+    #[inline(always)]
     pub fn beyond(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
         Self { t_max: self.t_max + relative, ..self }

@@ -1,12 +1,12 @@
 //! Surfaces at the hits of a packet, side by side, for the shapes that are most seen.
 
-use super::rows::{HitRows, PACKET, RayRows};
+use super::rows::{HitRows, PACKET, RayRows, lanes};
 use super::surface::error;
 use super::{RayF64, Shape, ShapeHit};
-use crate::math::DVec3;
 use crate::math::lanes::{Lanes3, set_lane, take, truths};
+use crate::math::{DVec2, DVec3};
 
-/// What of [`SurfacePoint`](super::SurfacePoint)s lights need, side by side; without shading normals.
+/// What of [`SurfacePoint`](super::SurfacePoint)s lights need, side by side.
 #[derive(Clone, Debug)]
 pub struct SurfaceRow {
     /// The points.
@@ -15,6 +15,14 @@ pub struct SurfaceRow {
     pub error: Lanes3,
     /// Unit geometric normals of the front sides.
     pub normal: Lanes3,
+    /// A bit for each with the two that follow.
+    pub smooth: u32,
+    /// Unit interpolated normals on the same sides.
+    pub shading_normal: Lanes3,
+    /// [`SurfacePoint::shadow_point`](super::SurfacePoint::shadow_point)s.
+    pub shadow_point: Lanes3,
+    /// Texture coordinates, where they were asked for.
+    pub uv: [[f64; PACKET]; 2],
 }
 
 /// A point of a surface before it is rounded.
@@ -33,10 +41,23 @@ pub trait Exact {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint;
 }
 
+/// A shape whose texture coordinates are found without branches.
+pub trait Mapped {
+    /// Texture coordinates of a hit.
+    fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
+}
+
 impl SurfaceRow {
     /// Nothing known.
-    pub const EMPTY: Self =
-        Self { point: [[0.0; PACKET]; 3], error: [[0.0; PACKET]; 3], normal: [[0.0; PACKET]; 3] };
+    pub const EMPTY: Self = Self {
+        point: [[0.0; PACKET]; 3],
+        error: [[0.0; PACKET]; 3],
+        normal: [[0.0; PACKET]; 3],
+        smooth: 0,
+        shading_normal: [[0.0; PACKET]; 3],
+        shadow_point: [[0.0; PACKET]; 3],
+        uv: [[0.0; PACKET]; 2],
+    };
 
     /// The surfaces of those hits of a packet whose bits are set, all of one shape; whether there is a loop for it.
     #[inline(always)]
@@ -50,6 +71,38 @@ impl SurfaceRow {
             Shape::Disk(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => return false,
         }
         true
+    }
+
+    /// Texture coordinates of those hits of a packet whose bits are set, all of one shape.
+    #[inline(always)]
+    pub fn fill_uv(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) {
+        match shape {
+            Shape::Quad(quad) => self.uv_from(quad, rays, hits, of),
+            Shape::Plane(plane) => self.uv_from(plane, rays, hits, of),
+            Shape::Sphere(_)
+            | Shape::Box(_)
+            | Shape::Triangle(_)
+            | Shape::Disk(_)
+            | Shape::Cylinder(_)
+            | Shape::Cone(_)
+            | Shape::Torus(_) => {
+                for lane in lanes(of) {
+                    let Some(hit) = hits.get(lane) else { continue };
+                    let uv = shape.surface(&rays.line(lane), &hit).uv;
+                    (self.uv[0][lane], self.uv[1][lane]) = (uv.x, uv.y);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn uv_from(&mut self, shape: &impl Mapped, rays: &RayRows, hits: &HitRows, of: u32) {
+        for lane in 0..PACKET {
+            let uv = shape.uv(&rays.line(lane), &ShapeHit::at(hits.t[lane]));
+            let is_own = of & 1 << lane != 0;
+            self.uv[0][lane] = if is_own { uv.x } else { self.uv[0][lane] };
+            self.uv[1][lane] = if is_own { uv.y } else { self.uv[1][lane] };
+        }
     }
 
     #[inline(always)]
@@ -68,11 +121,28 @@ impl SurfaceRow {
             set_lane(&mut found.error, lane, error(point, reach));
             set_lane(&mut found.normal, lane, normal.normalize().as_vec3());
         }
+        self.take(of, &found);
+    }
+
+    /// Take points, errors and normals of another row.
+    #[inline(always)]
+    pub fn take(&mut self, of: u32, found: &Self) {
         let of = truths(of);
         for axis in 0..3 {
             take(&of, &found.point[axis], &mut self.point[axis]);
             take(&of, &found.error[axis], &mut self.error[axis]);
             take(&of, &found.normal[axis], &mut self.normal[axis]);
+        }
+    }
+
+    /// Take shading normals and shadow points of another row.
+    #[inline(always)]
+    pub fn take_smooth(&mut self, of: u32, found: &Self) {
+        self.smooth |= of;
+        let of = truths(of);
+        for axis in 0..3 {
+            take(&of, &found.shading_normal[axis], &mut self.shading_normal[axis]);
+            take(&of, &found.shadow_point[axis], &mut self.shadow_point[axis]);
         }
     }
 }

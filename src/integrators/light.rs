@@ -98,6 +98,9 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
         let mut sampler = None;
         let mut sums = Sums::NOTHING;
         for (number, light) in self.shot.world.lights.iter() {
+            if WEIGHED && self.shot.leaves_sky && light.is_from_all_around() {
+                continue;
+            }
             // Where one ray decides for all of a light, what it could send waits for that.
             let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
             let waits = match render.shadows {

@@ -100,18 +100,24 @@ impl LitQueue {
 
     /// Keep the vertices of the spare row.
     pub fn keep(&mut self) {
-        let used = self.rows[self.count].used;
-        if used.count_ones() >= Self::WORTH_A_ROW {
+        let (kept, spare) = self.rows.split_at_mut(self.count);
+        let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
+        row.keep(row.used);
+        if row.used.count_ones() >= Self::WORTH_A_ROW {
             self.count += 1;
             return;
         }
-        if used == 0 {
-            return;
+        let mut left = row.used;
+        if let Some(open) = kept.get_mut(self.open) {
+            for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
+                open.copy(open.used.trailing_ones() as usize, row, lane);
+                left &= !(1 << lane);
+            }
         }
-        let row = self.rows[self.count].clone();
-        for lane in lanes(used) {
-            let (own, i) = self.open_row();
-            own.copy(i, &row, lane);
+        if left != 0 {
+            row.keep(left);
+            self.open = self.count;
+            self.count += 1;
         }
     }
 

@@ -72,7 +72,7 @@ pub struct LitRow {
 }
 
 /// In place of the cosine between two normals that are one.
-const UNBENT: f32 = -2.0;
+pub(super) const UNBENT: f32 = -2.0;
 
 impl LitRow {
     /// The least α of lobes that are worth rays of their own.
@@ -146,6 +146,13 @@ impl LitRow {
         self.bend = [UNBENT; LANES];
     }
 
+    /// Keep these of its vertices.
+    pub(super) fn keep(&mut self, these: u32) {
+        self.used &= these;
+        self.is_bounded &= these;
+        self.may_lift &= these;
+    }
+
     /// Take a vertex of another row.
     pub(super) fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
@@ -189,7 +196,7 @@ impl LitRow {
         medium: u32,
     ) {
         let LitVertex { path, place, vertex, shading, bsdf } = lit;
-        let outlook = vertex.outlook(shot);
+        let outlook = vertex.outlook(shot, path.history.is_seen);
         set_lane(&mut self.from, i, outlook.point);
         set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
         self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;

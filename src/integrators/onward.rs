@@ -198,6 +198,8 @@ impl Shot<'_> {
         if density.is_nan() || density <= 0.0 {
             return lights.beyond_with(sky, path.ray.direction, |_, _| 1.0);
         }
+        // No light sample finds it.
+        let sky = sky.map(|(radiance, of_sky)| (radiance, if self.leaves_sky { 0.0 } else { of_sky }));
         let share = |of_light: f32| weight(of_light * samples / density);
         self.shared_beyond(sky, &path.ray, path.history.normal, share)
     }

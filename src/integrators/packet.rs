@@ -2,17 +2,20 @@
 //! the light.
 
 use super::camera::CameraRow;
-use super::lit_row::{LitRow, bsdf_parts};
+use super::lit_row::{LitRow, UNBENT, bsdf_parts};
 use super::queues::PathRay;
 use super::shot::Shot;
+use super::vertices::way_up;
 use super::view::Measure;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::phong::PhongBsdf;
+use crate::materials::{Material, Phong};
 use crate::math::Vec3;
 use crate::math::lanes::{Lanes, Lanes3, TRUE, bits, lane, set_lane, take, truths};
 use crate::sampling::CAMERA_PATH;
+use crate::scene::description::Shadows;
 use crate::world::{Hit, Loops, Object, PACKET};
 
 /// Rays that go through the scene together.
@@ -45,9 +48,18 @@ impl Rays<'_> {
         }
     }
 
+    /// Of the camera: the path in a lane.
+    #[inline(always)]
+    pub fn camera_path(&self, shot: &Shot<'_>, lane: usize) -> Option<PathRay> {
+        match self {
+            Self::Camera(row, first, ..) => Some(shot.camera_path(row.rays.ray(lane), first + lane as u32)),
+            Self::Paths(..) | Self::Traced(..) => None,
+        }
+    }
+
     /// Of a queue: the path in a lane.
     #[inline(always)]
-    fn of_queue(&self, lane: usize) -> Option<&PathRay> {
+    pub fn of_queue(&self, lane: usize) -> Option<&PathRay> {
         match self {
             Self::Camera(..) => None,
             Self::Paths(paths, _) => paths.get(lane),
@@ -56,7 +68,7 @@ impl Rays<'_> {
     }
 }
 
-/// The hits of a packet. A surface is plain where its shape has a loop for its surface, its material is Phong without textures,
+/// The hits of a packet. A surface is plain where there is a loop for its shape and for the look-ups of its material, a Phong,
 /// and its ray is in no glass.
 pub struct Met {
     hits: HitRows,
@@ -67,6 +79,8 @@ pub struct Met {
     pub plain: u32,
     /// A bit for each plain surface that sends out light towards the ray.
     pub shining: u32,
+    /// Look-ups of textures of plain surfaces.
+    pub lookups: u64,
     /// [`Environment::arriving_row`](crate::lights::Environment::arriving_row) where any ray meets nothing.
     sky: (Lanes3, Lanes),
 }
@@ -93,10 +107,19 @@ impl Met {
 }
 
 impl Shot<'_> {
-    /// What at most [`PACKET`] rays meet. The plain surfaces are put into the row, ready to be lit; those that reflect light are
-    /// `used` in it.
-    pub fn meet(&self, rays: Rays<'_>, measure: Measure, row: &mut LitRow) -> Met {
-        self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, row })
+    /// What at most [`PACKET`] rays meet. The plain surfaces are put into the row, ready to be lit if they are to be; those that
+    /// reflect light are `used` in it.
+    pub fn meet(&self, rays: Rays<'_>, measure: Measure, are_lit: bool, row: &mut LitRow) -> Met {
+        self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, are_lit, row })
+    }
+
+    /// The material of an object, and its Phong, where the object is plain.
+    #[inline(always)]
+    pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {
+        let (material, phong) = self.world.plain_phong(object)?;
+        // Ambient light is looked up for each by itself.
+        let has_ambient = self.settings.render.ambient != Vec3::ZERO;
+        (!has_ambient || phong.constant().is_some()).then_some((material, phong))
     }
 }
 
@@ -104,6 +127,7 @@ struct Meeting<'a> {
     shot: &'a Shot<'a>,
     rays: Rays<'a>,
     measure: Measure,
+    are_lit: bool,
     row: &'a mut LitRow,
 }
 
@@ -112,7 +136,7 @@ impl Loops for Meeting<'_> {
 
     #[inline(always)]
     fn run(self) -> Met {
-        let Self { shot, rays, measure, row } = self;
+        let Self { shot, rays, measure, are_lit, row } = self;
         let world = shot.world;
         row.reset();
         let (of_paths, traced);
@@ -152,7 +176,7 @@ impl Loops for Meeting<'_> {
         let mut surface = SurfaceRow::EMPTY;
         let any = hits.any();
         let (mut left, mut plain, mut shining) = (any, 0, 0);
-        let (mut seen, mut from_gloss) = (!0, 0);
+        let (mut seen, mut from_gloss, mut lookups) = (!0, 0, 0);
         match rays {
             Rays::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
             Rays::Paths(..) | Rays::Traced(..) => {
@@ -172,49 +196,168 @@ impl Loops for Meeting<'_> {
             }
             let of = bits(of) & left;
             left &= !of;
-            let Object::Shape(shape) = &world.geometry.objects()[id as usize] else { continue };
-            let Some((material, bsdf)) = world.plain_phong(id) else { continue };
-            if surface.fill(shape, rows, &hits, of) {
-                plain |= of;
-                shining |= if material.emission.shines() { of } else { 0 };
-                row.used |= if bsdf.is_black() { 0 } else { of };
-                let seen = seen & of;
-                row.set_bsdf(of, &bsdf, measure);
-                if seen != of && measure != Measure::ALL {
-                    row.set_bsdf(of & !seen, &bsdf, Measure::ALL);
+            let Some((material, phong)) = shot.plain_phong(id) else { continue };
+            let Some(specular) = phong.specular.constant() else { continue };
+            let texture = phong.diffuse.texture().filter(|_| are_lit);
+            match &world.geometry.objects()[id as usize] {
+                Object::Shape(shape) => {
+                    if !surface.fill(shape, rows, &hits, of) {
+                        continue;
+                    }
+                    if texture.is_some() {
+                        surface.fill_uv(shape, rows, &hits, of);
+                    }
                 }
+                Object::Mesh(mesh) => mesh.fill_surfaces(&mut surface, rows, &hits, of, texture.is_some()),
+            }
+            plain |= of;
+            shining |= if material.emission.shines() { of } else { 0 };
+            let bsdf = match texture {
+                Some(texture) => {
+                    lookups += u64::from(of.count_ones());
+                    let diffuse = texture.lookup_row(&surface.uv);
+                    PhongRow { diffuse, specular, shininess: phong.shininess }
+                }
+                None => {
+                    let Vec3 { x, y, z } = phong.diffuse.constant().unwrap_or(Vec3::ZERO);
+                    let diffuse = [[x; PACKET], [y; PACKET], [z; PACKET]];
+                    PhongRow { diffuse, specular, shininess: phong.shininess }
+                }
+            };
+            row.used |= of & !bsdf.black();
+            let seen = seen & of;
+            row.set_bsdf(of, &bsdf, measure);
+            if seen != of && measure != Measure::ALL {
+                row.set_bsdf(of & !seen, &bsdf, Measure::ALL);
             }
         }
         (row.seen, row.from_gloss) = (seen, from_gloss);
-        let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface) };
+        let lifts = match shot.settings.render.shadows {
+            Shadows::Off => Lifts::All,
+            Shadows::Hard | Shadows::Soft => Lifts::IfFree(seen),
+        };
+        let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface, lifts) };
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
         };
-        Met { hits, object, any, plain, shining: shining & front, sky }
+        Met { hits, object, any, plain, shining: shining & front, lookups, sky }
     }
+}
+
+/// [`PhongBsdf`](crate::materials::phong::PhongBsdf)s side by side, of one glossy lobe.
+struct PhongRow {
+    diffuse: Lanes3,
+    specular: Vec3,
+    shininess: f32,
+}
+
+impl PhongRow {
+    /// A bit for each that reflects nothing.
+    #[inline(always)]
+    fn black(&self) -> u32 {
+        if self.specular != Vec3::ZERO {
+            return 0;
+        }
+        let mut black = [0; PACKET];
+        for i in 0..PACKET {
+            let Vec3 { x, y, z } = lane(&self.diffuse, i);
+            black[i] = if (x == 0.0) & (y == 0.0) & (z == 0.0) { TRUE } else { 0 };
+        }
+        bits(black)
+    }
+}
+
+/// Which vertices of smooth meshes are lifted above their facets.
+#[derive(Clone, Copy)]
+enum Lifts {
+    /// All.
+    All,
+    /// Those whose bits are set, if nothing is on the way.
+    IfFree(u32),
 }
 
 impl LitRow {
     /// The lobes of some lanes.
     #[inline(always)]
-    fn set_bsdf(&mut self, of: u32, bsdf: &PhongBsdf, measure: Measure) {
-        let [diffuse, specular] = bsdf_parts(bsdf, measure);
+    fn set_bsdf(&mut self, of: u32, bsdf: &PhongRow, measure: Measure) {
+        let PhongRow { diffuse, specular, shininess } = bsdf;
+        let white =
+            PhongBsdf { diffuse: Vec3::ONE, specular: *specular, shininess: *shininess, ambient: Vec3::ZERO };
+        let [of_white, glossy] = bsdf_parts(&white, measure);
+        let (mut shown, mut greatest) = ([[of_white.x; PACKET]; 3], [0.0; PACKET]);
+        if measure != Measure::ArrivingShare {
+            for i in 0..PACKET {
+                set_lane(&mut shown, i, lane(diffuse, i) * of_white);
+            }
+        }
+        for i in 0..PACKET {
+            greatest[i] = lane(diffuse, i).max_element();
+        }
         let of = truths(of);
         for axis in 0..3 {
-            take(&of, &[diffuse[axis]; PACKET], &mut self.diffuse[axis]);
-            take(&of, &[specular[axis]; PACKET], &mut self.specular[axis]);
+            take(&of, &shown[axis], &mut self.diffuse[axis]);
+            take(&of, &[glossy[axis]; PACKET], &mut self.specular[axis]);
         }
-        take(&of, &[bsdf.shininess; PACKET], &mut self.shininess);
-        take(&of, &[bsdf.diffuse.max_element(); PACKET], &mut self.albedos[0]);
-        take(&of, &[bsdf.specular.max_element(); PACKET], &mut self.albedos[1]);
-        self.is_glossy |= bsdf.specular != Vec3::ZERO;
+        take(&of, &[*shininess; PACKET], &mut self.shininess);
+        take(&of, &greatest, &mut self.albedos[0]);
+        take(&of, &[specular.max_element(); PACKET], &mut self.albedos[1]);
+        self.is_glossy |= *specular != Vec3::ZERO;
+    }
+
+    /// What normals and points above their facets change for the lanes of smooth surfaces.
+    #[inline(always)]
+    fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts) {
+        let [mut normals, mut mirrored] = [[[0.0; PACKET]; 3]; 2];
+        let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
+        for i in 0..PACKET {
+            let (geometric, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
+            let shading = lane(&surface.shading_normal, i);
+            let is_bent =
+                (shading.x != geometric.x) | (shading.y != geometric.y) | (shading.z != geometric.z);
+            bent[i] = if is_bent { TRUE } else { 0 };
+            let normal = shading * if geometric.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+            set_lane(&mut normals, i, normal);
+            let to_eye = -direction;
+            set_lane(&mut mirrored, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
+        }
+        for i in 0..PACKET {
+            let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
+            let (is_above, end) = way_up(from, to, lane(&self.normal, i), lane(&surface.error, i));
+            above[i] = if is_above { TRUE } else { 0 };
+            ends[i] = end;
+        }
+        let of = truths(surface.smooth);
+        let above = bits(above) & surface.smooth;
+        let rises = match lifts {
+            Lifts::All => truths(above),
+            Lifts::IfFree(seen) => {
+                self.is_bounded |= bits(bent) & surface.smooth;
+                self.may_lift |= above & seen;
+                [0; PACKET]
+            }
+        };
+        for axis in 0..3 {
+            // Geometric normals, before they are replaced.
+            let horizon = self.normal[axis];
+            take(&of, &horizon, &mut self.horizon[axis]);
+            take(&of, &horizon, &mut self.facet[axis]);
+            take(&of, &surface.point[axis], &mut self.point[axis]);
+            take(&of, &normals[axis], &mut self.smooth_normal[axis]);
+            take(&of, &surface.shadow_point[axis], &mut self.lifted[axis]);
+            take(&rises, &surface.shadow_point[axis], &mut self.from[axis]);
+            take(&of, &normals[axis], &mut self.normal[axis]);
+            take(&of, &mirrored[axis], &mut self.mirrored_eye[axis]);
+        }
+        take(&of, &ends, &mut self.lift_end);
+        take(&of, &[UNBENT; PACKET], &mut self.bend);
+        self.apart |= surface.smooth;
     }
 
     /// Where paths meet plain surfaces; a bit for each that comes to the front.
     #[inline(always)]
-    fn place(&mut self, paths: &Rays<'_>, rays: &RayRows, surface: &SurfaceRow) -> u32 {
+    fn place(&mut self, paths: &Rays<'_>, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts) -> u32 {
         let mut front = [0; PACKET];
         self.medium = [0; PACKET];
         for i in 0..PACKET {
@@ -227,6 +370,9 @@ impl LitRow {
             set_lane(&mut self.normal, i, normal);
             let to_eye = -direction;
             set_lane(&mut self.mirrored_eye, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
+        }
+        if surface.smooth != 0 {
+            self.smooth(rays, surface, lifts);
         }
         match paths {
             Rays::Camera(_, slot, ..) => {

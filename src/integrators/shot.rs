@@ -4,9 +4,12 @@ use std::ops::Range;
 
 use super::RenderSettings;
 use super::photons::PhotonMaps;
+use super::view::Measure;
 use crate::control::CancelToken;
 use crate::film::Rect;
+use crate::lights::Environment;
 use crate::sampling::PixelSampler;
+use crate::scene::description::{Integrator, Shadows};
 use crate::world::{PACKET, World};
 
 /// A world, how it is rendered, and the samples that are asked for.
@@ -23,6 +26,9 @@ pub struct Shot<'a> {
     pub pixel_spread: f32,
     /// The photons of the samples, where they are gathered.
     pub photons: Option<&'a PhotonMaps>,
+    /// Whether paths find light that is the same from all around without samples of it: the ray that goes on anyway is as good as
+    /// one of those, or better, as nothing but what is in its way tells one direction from the other.
+    pub leaves_sky: bool,
 }
 
 impl<'a> Shot<'a> {
@@ -35,7 +41,19 @@ impl<'a> Shot<'a> {
     ) -> Self {
         let pixel_spread =
             if world.is_mipmapped() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
-        Self { world, settings, block, token, pixel_spread, photons: None }
+        let render = &settings.render;
+        let is_even = match world.lights.environment() {
+            Some(Environment::Constant(_)) => true,
+            Some(Environment::Map { .. }) | None => false,
+        };
+        let leaves_sky = is_even
+            && render.integrator == Integrator::Path
+            && settings.view.shown().measure() != Measure::ArrivingShare
+            && render.shadows == Shadows::Soft
+            && render.shadow_samples == 1
+            && render.clamp == 0.0
+            && world.lights.tree().is_none();
+        Self { world, settings, block, token, pixel_spread, photons: None, leaves_sky }
     }
 
     /// The random numbers of a slot.

@@ -150,23 +150,32 @@ impl<'a> Vertex<'a> {
 
     /// Where light is looked for. A facet of a smooth mesh looks from a point above it, so that its neighbours do not shadow
     /// what the normals say is lit, if nothing is on the way there: what arrives at that point reaches the facet around no
-    /// corner of a closed surface. Else it looks from the facet itself, and sees nothing behind that.
-    pub fn outlook(&self, shot: &Shot<'_>) -> Outlook {
+    /// corner of a closed surface. Else it looks from the facet itself, and sees nothing behind that; so does one that the eye
+    /// does not see, where the way up would cost a ray and nobody tell the difference.
+    pub fn outlook(&self, shot: &Shot<'_>, is_seen: bool) -> Outlook {
         if let Some(sides) = self.sides {
             return Outlook { point: sides.before, horizon: None, lift: None };
         }
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = shot.settings.render.shadows != Shadows::Off;
-        let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, shadow_point - on_facet) };
-        let is_above = lift.direction.dot(self.normal) > LEAST_LIFT * self.normal.abs().dot(error);
+        let (is_above, end) = way_up(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
             return Outlook { point: shadow_point, horizon: None, lift: None };
         }
         let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
-        let lift = is_above.then(|| Lift { to: shadow_point, end: lift.beyond(error).t_max });
+        let lift = (is_above && is_seen).then(|| Lift { to: shadow_point, end });
         Outlook { point: on_facet, horizon, lift }
     }
+}
+
+/// Whether the way from a facet to a point is one up from it that is worth going, and the end of the way: 1 at the point, and
+/// what that may be off.
+#[inline(always)]
+pub fn way_up(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
+    let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
+    let is_above = lift.direction.dot(normal) > LEAST_LIFT * normal.abs().dot(error);
+    (is_above, lift.beyond(error).t_max)
 }
 
 /// How many times its own error a point is to be lifted at least, or the facet serves as well.

@@ -148,13 +148,15 @@ impl Wave<'_, '_> {
         if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
             shot.token.check()?;
         }
-        let met = shot.meet(rays, self.sink.measure, self.lit.spare());
+        let are_lit = self.depth < shot.settings.render.max_depth && self.sink.takes_reflected();
+        let met = shot.meet(rays, self.sink.measure, are_lit, self.lit.spare());
+        self.counters.texture_lookups += met.lookups;
         if self.sink.measure == Measure::Work {
             for lane in 0..rays.count() {
                 self.add_work(&met.path(shot, &rays, lane), met.hit(lane));
             }
         }
-        if self.depth < shot.settings.render.max_depth && self.sink.takes_reflected() {
+        if are_lit {
             self.lit.keep();
             if shot.pixel_spread > 0.0 {
                 for (lane, hit) in lanes(met.plain).filter_map(|lane| Some((lane, met.hit(lane)?))) {
@@ -171,16 +173,17 @@ impl Wave<'_, '_> {
         wanted |= if is_dark_beyond { 0 } else { all & !met.any };
         // In the order of the paths: what a sample gets by several is added in that.
         for lane in lanes(wanted) {
-            let (path, bit) = (met.path(shot, &rays, lane), 1 << lane);
+            let (of_camera, bit) = (rays.camera_path(shot, lane), 1 << lane);
+            let Some(path) = of_camera.as_ref().or_else(|| rays.of_queue(lane)) else { continue };
             match met.hit(lane) {
-                Some(hit) if met.plain & bit != 0 => self.add_own_light(&path, &hit, met.shining & bit != 0),
+                Some(hit) if met.plain & bit != 0 => self.add_own_light(path, &hit, met.shining & bit != 0),
                 Some(hit) => {
                     self.place = rays.place(lane);
-                    self.shade(path, hit);
+                    self.shade(*path, hit);
                 }
                 None => {
                     let sky = shot.world.lights.environment().map(|_| met.sky(lane));
-                    self.add_beyond(&path, shot.light_beyond_with(sky, &path));
+                    self.add_beyond(path, shot.light_beyond_with(sky, path));
                 }
             }
         }
@@ -198,12 +201,13 @@ impl Wave<'_, '_> {
 
     /// What a plain surface sends to the eye by itself.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
-        let Some((material, bsdf)) = self.shot.world.plain_phong(hit.object) else { return };
+        let Some((material, phong)) = self.shot.plain_phong(hit.object) else { return };
         if is_shining {
             self.add_emitted(path, material.emission.scale, self.shot.lamp_weight(path, hit));
         }
         let render = &self.shot.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
+            let Some(bsdf) = phong.constant() else { return };
             self.sink.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient);
         }
     }

@@ -90,21 +90,28 @@ impl Environment {
     /// Ways for its light to arrive at surfaces of these normals, side by side.
     #[inline(always)]
     pub fn sample_row(&self, normals: &Lanes3, u: &[Lanes; 2]) -> SkyRow {
-        let directions = match self {
+        let (directions, mut weights, densities) = match self {
             Self::Constant(_) => {
                 let mut directions = [[0.0; LANES]; 3];
                 for i in 0..LANES {
                     let frame = Frame::from_normal(lane(normals, i));
                     set_lane(&mut directions, i, frame.to_world(warp::cone([u[0][i], u[1][i]], 1.0)));
                 }
-                directions
+                let (radiance, densities) = self.arriving_row(&directions);
+                (directions, radiance, densities)
             }
-            Self::Map { sky, turn, .. } => sky.sample_row(u, *turn),
+            Self::Map { sky, factor, turn } => {
+                let (directions, mut colors, densities) = sky.sample_row(u, *turn);
+                for i in 0..LANES {
+                    let color = lane(&colors, i) * *factor;
+                    set_lane(&mut colors, i, color);
+                }
+                (directions, colors, densities)
+            }
         };
-        let (mut weights, densities) = self.arriving_row(&directions);
         let mut inverse_densities = [0.0; LANES];
         for i in 0..LANES {
-            // At the edge of a dark cell rounding may lead into it.
+            // In the corner of a cell that is dark but for the others.
             inverse_densities[i] = if densities[i] > 0.0 { 1.0 / densities[i] } else { 0.0 };
             let weight = lane(&weights, i) * inverse_densities[i];
             set_lane(&mut weights, i, weight);
@@ -124,9 +131,8 @@ impl Environment {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, turn } => {
-                let direction = sky.sample(u, *turn);
-                let (color, density) = sky.lookup(direction, *turn);
-                // At the edge of a dark cell rounding may lead into it.
+                let (direction, color, density) = sky.sample(u, *turn);
+                // In the corner of a cell that is dark but for the others.
                 (direction, color * *factor * if density > 0.0 { 1.0 / density } else { 0.0 })
             }
         }
@@ -142,11 +148,15 @@ impl Environment {
 
     /// A way for its light to arrive at a surface of this normal.
     pub fn sample(&self, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let direction = match self {
-            Self::Constant(_) => Frame::from_normal(normal).to_world(warp::cone(u, 1.0)),
-            Self::Map { sky, turn, .. } => sky.sample(u, *turn),
+        let (direction, radiance, density) = match self {
+            Self::Constant(radiance) => {
+                (Frame::from_normal(normal).to_world(warp::cone(u, 1.0)), *radiance, HEMISPHERE)
+            }
+            Self::Map { sky, factor, turn } => {
+                let (direction, color, density) = sky.sample(u, *turn);
+                (direction, color * *factor, density)
+            }
         };
-        let (radiance, density) = self.arriving(direction);
         let weight = radiance * if density > 0.0 { 1.0 / density } else { 0.0 };
         let is_light = weight != Vec3::ZERO;
         is_light.then_some(LightSample { end: End::Beyond, direction, weight, source: Source::Nothing })

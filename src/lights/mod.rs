@@ -172,6 +172,14 @@ impl Light {
         }
     }
 
+    /// Whether it is light from all around.
+    pub fn is_from_all_around(&self) -> bool {
+        match self {
+            Self::Environment(_) => true,
+            Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Area(_) => false,
+        }
+    }
+
     /// Whether there is but one way.
     pub fn is_single(&self) -> bool {
         match self {

@@ -9,10 +9,12 @@ use crate::math::elementary::{atan2, sin_cos};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
+use crate::sampling::warp;
 
 /// A map, top row at +y, the middle of it towards −z, its right quarter towards +x, with the distribution that its directions
 /// are sampled by. It is interpolated between the centres of its texels: its cells lie between four of those, and above the
-/// first row and below the last one between two.
+/// first row and below the last one between two. Samples in a cell are as dense as the luminance interpolated along the row and
+/// the height.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkyMap {
     texels: Arc<Texels>,
@@ -30,8 +32,10 @@ pub struct SkyMap {
 struct Place {
     column: u32,
     row: u32,
-    /// From the left texels to the right ones, and from the upper to the lower ones.
+    /// From the left texels to the right ones, and from the upper to the lower ones by angles.
     between: [f32; 2],
+    /// The same, from the upper to the lower ones by heights.
+    along: [f32; 2],
 }
 
 impl SkyMap {
@@ -96,92 +100,183 @@ impl SkyMap {
     #[inline(always)]
     pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
         let place = self.place(direction, turn);
-        (self.color(&place), self.density(&place))
+        let corners = self.corner_places(place.column, place.row).map(|index| self.texels.at(index));
+        let density = self.density(place.column, place.row);
+        (color(&corners, place.between), density * share(&luminances(&corners), place.along))
     }
 
-    /// A unit direction.
+    /// A unit direction, with what [`SkyMap::lookup`] tells of it.
     #[inline(always)]
-    pub fn sample(&self, u: [f32; 2], turn: f32) -> Vec3 {
-        self.direction(&self.cells.sample(u), turn)
+    pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
+        let InGrid { column, row, rest } = self.cells.sample(u);
+        let corners = self.corner_places(column as u32, row as u32).map(|index| self.texels.at(index));
+        let luminances = luminances(&corners);
+        let along = warp::bilinear(rest, &luminances);
+        let (direction, down) = self.towards(column as f32, row, along, turn);
+        let density = self.density(column as u32, row as u32);
+        (direction, color(&corners, [along[0], down]), density * share(&luminances, along))
     }
 
+    /// A unit direction of a cell, so far along its row and across it by heights; and how far across it by angles.
     #[inline(always)]
-    fn direction(&self, at: &InGrid, turn: f32) -> Vec3 {
-        let InGrid { column, row, rest } = *at;
+    fn towards(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
-        self.towards(column as f32, self.heights[row] + extent * f64::from(rest[1]), rest[0], turn)
+        self.by_height(column, row as f32, self.heights[row] + extent * f64::from(along[1]), along[0], turn)
     }
 
-    /// A unit direction of a height in a column, so far along it.
+    /// A unit direction of a height in a cell, so far along its row; and how far across the row by angles.
     #[inline(always)]
-    fn towards(&self, column: f32, y: f64, along: f32, turn: f32) -> Vec3 {
+    fn by_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
         let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
         let turns = (column + 0.5 + along) / self.texels.width as f32 - 0.5 - turn;
         let (sin, cos) = sin_cos(2.0 * PI * turns);
-        Vec3::new(across * sin, y as f32, -across * cos)
+        let direction = Vec3::new(across * sin, y as f32, -across * cos);
+        let down = atan2(across, y as f32) * (1.0 / PI) * self.texels.height as f32 + 0.5 - row;
+        (direction, down.max(0.0).min(1.0))
     }
 
-    /// [`SkyMap::sample`] side by side. What is looked up is looked up between loops without branches.
+    /// [`SkyMap::sample`] side by side: unit directions, colours and densities. What is looked up is looked up between loops
+    /// without branches.
     #[inline(always)]
-    pub fn sample_row(&self, u: &[Lanes; 2], turn: f32) -> Lanes3 {
-        let (mut columns, mut along, mut heights) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    pub fn sample_row(&self, u: &[Lanes; 2], turn: f32) -> (Lanes3, Lanes3, Lanes) {
+        let (mut columns, mut rows, mut rest) = ([0; LANES], [0; LANES], [[0.0; LANES]; 2]);
+        let (mut tops, mut extents) = ([0.0; LANES], [0.0; LANES]);
+        let mut densities = [0.0; LANES];
         for i in 0..LANES {
-            let InGrid { column, row, rest } = self.cells.sample([u[0][i], u[1][i]]);
-            let extent = self.heights[row + 1] - self.heights[row];
-            heights[i] = self.heights[row] + extent * f64::from(rest[1]);
-            (columns[i], along[i]) = (column as f32, rest[0]);
+            let at = self.cells.sample([u[0][i], u[1][i]]);
+            (columns[i], rows[i]) = (at.column as u32, at.row as u32);
+            (rest[0][i], rest[1][i]) = (at.rest[0], at.rest[1]);
+            tops[i] = self.heights[at.row];
+            extents[i] = self.heights[at.row + 1] - tops[i];
+            densities[i] = self.density(at.column as u32, at.row as u32);
         }
-        let mut directions = [[0.0; LANES]; 3];
+        let corners = self.corner_rows(&columns, &rows);
+        let [mut directions, mut colors] = [[[0.0; LANES]; 3]; 2];
         for i in 0..LANES {
-            set_lane(&mut directions, i, self.towards(columns[i], heights[i], along[i], turn));
+            let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
+            let luminances = luminances(&corners);
+            let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
+            let y = tops[i] + extents[i] * f64::from(along[1]);
+            let (direction, down) =
+                self.by_height(columns[i] as i32 as f32, rows[i] as i32 as f32, y, along[0], turn);
+            set_lane(&mut directions, i, direction);
+            set_lane(&mut colors, i, color(&corners, [along[0], down]));
+            densities[i] *= share(&luminances, along);
         }
-        directions
+        (directions, colors, densities)
     }
 
     /// [`SkyMap::lookup`] side by side.
     #[inline(always)]
     pub fn lookup_row(&self, directions: &Lanes3, turn: f32) -> (Lanes3, Lanes) {
-        let (mut columns, mut rows, mut between) = ([0; LANES], [0; LANES], [[0.0; LANES]; 2]);
+        let (mut columns, mut rows) = ([0; LANES], [0; LANES]);
+        let (mut between, mut angles) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            let place = self.place(lane(directions, i), turn);
-            (columns[i], rows[i]) = (place.column, place.row);
-            (between[0][i], between[1][i]) = (place.between[0], place.between[1]);
+            let (x, y) = self.coordinates(lane(directions, i), turn);
+            (columns[i], rows[i]) = self.cell(x, y);
+            between[i] = x - columns[i] as i32 as f32;
+            angles[i] = y - rows[i] as i32 as f32;
         }
-        let (mut colors, mut densities) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        let corners = self.corner_rows(&columns, &rows);
+        let (mut heights, mut densities) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            let place = Place { column: columns[i], row: rows[i], between: [between[0][i], between[1][i]] };
-            set_lane(&mut colors, i, self.color(&place));
-            densities[i] = self.density(&place);
+            densities[i] = self.density(columns[i], rows[i]);
+            heights[i] = self.part_of_height(rows[i], directions[1][i]);
+        }
+        let mut colors = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
+            set_lane(&mut colors, i, color(&corners, [between[i], angles[i]]));
+            densities[i] *= share(&luminances(&corners), [between[i], heights[i]]);
         }
         (colors, densities)
     }
 
     #[inline(always)]
     fn place(&self, direction: Vec3, turn: f32) -> Place {
+        let (x, y) = self.coordinates(direction, turn);
+        let (column, row) = self.cell(x, y);
+        let between = [x - column as f32, y - row as f32];
+        Place { column, row, between, along: [between[0], self.part_of_height(row, direction.y)] }
+    }
+
+    /// Coordinates of a unit direction among the cells.
+    #[inline(always)]
+    fn coordinates(&self, direction: Vec3, turn: f32) -> (f32, f32) {
         let (width, height) = (self.texels.width as f32, self.texels.height as f32);
         let turns = 0.5 + atan2(direction.x, -direction.z) * (0.5 / PI) + turn;
         let x = (turns - turns.floor()) * width - 0.5;
         let x = if x < 0.0 { x + width } else { x };
-        // A number just below 0 is rounded up to the width.
-        let column = (x as u32).min(self.texels.width - 1);
         let across = (direction.x * direction.x + direction.z * direction.z).sqrt();
-        let y = atan2(across, direction.y) * (1.0 / PI) * height + 0.5;
-        let row = (y as u32).min(self.texels.height);
-        Place { column, row, between: [x - column as f32, y - row as f32] }
+        (x, atan2(across, direction.y) * (1.0 / PI) * height + 0.5)
     }
 
+    /// Column and row of coordinates.
     #[inline(always)]
-    fn color(&self, place: &Place) -> Vec3 {
-        let Place { column, row, between } = *place;
-        let right = if column + 1 == self.texels.width { 0 } else { column + 1 };
-        let (upper, lower) = (row.saturating_sub(1), row.min(self.texels.height - 1));
-        let between_in = |row| self.texels.get(column, row).lerp(self.texels.get(right, row), between[0]);
-        between_in(upper).lerp(between_in(lower), between[1])
+    fn cell(&self, x: f32, y: f32) -> (u32, u32) {
+        // A number just below 0 was rounded up to the width.
+        ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
 
+    /// The part of a row's extent in height that is above a direction in it.
     #[inline(always)]
-    fn density(&self, place: &Place) -> f32 {
-        let row = place.row as usize;
-        self.densities[row] * self.cells.column_probability(row, place.column as usize)
+    fn part_of_height(&self, row: u32, y: f32) -> f32 {
+        let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
+        (((top - f64::from(y)) / (top - bottom)) as f32).max(0.0).min(1.0)
     }
+
+    /// Places of the texels around a cell: the upper left one, the upper right one, the lower left one, the lower right one.
+    #[inline(always)]
+    fn corner_places(&self, column: u32, row: u32) -> [usize; 4] {
+        let (width, column) = (self.texels.width as usize, column as usize);
+        let right = if column + 1 == width { 0 } else { column + 1 };
+        let upper = row.saturating_sub(1) as usize * width;
+        let lower = row.min(self.texels.height - 1) as usize * width;
+        [upper + column, upper + right, lower + column, lower + right]
+    }
+
+    /// The texels around cells. Each loop waits once for what is not in the cache.
+    #[inline(always)]
+    fn corner_rows(&self, columns: &[u32; LANES], rows: &[u32; LANES]) -> [Lanes3; 4] {
+        let mut places = [[0; LANES]; 4];
+        for i in 0..LANES {
+            let own = self.corner_places(columns[i], rows[i]);
+            for corner in 0..4 {
+                places[corner][i] = own[corner];
+            }
+        }
+        let mut corners = [[[0.0; LANES]; 3]; 4];
+        for corner in 0..4 {
+            self.texels.fill_row(&places[corner], &mut corners[corner]);
+        }
+        corners
+    }
+
+    /// The density in sr⁻¹ of a cell, were it the same all over it.
+    #[inline(always)]
+    fn density(&self, column: u32, row: u32) -> f32 {
+        self.densities[row as usize] * self.cells.column_probability(row as usize, column as usize)
+    }
+}
+
+/// Between the texels around a cell.
+#[inline(always)]
+fn color(corners: &[Vec3; 4], between: [f32; 2]) -> Vec3 {
+    corners[0].lerp(corners[1], between[0]).lerp(corners[2].lerp(corners[3], between[0]), between[1])
+}
+
+#[inline(always)]
+fn luminances(corners: &[Vec3; 4]) -> [f32; 4] {
+    corners.map(luminance)
+}
+
+/// How many times the density of a cell a place in it has.
+#[inline(always)]
+fn share(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
+    let [a, b, c, d] = *luminances;
+    let upper = a + (b - a) * along[0];
+    let lower = c + (d - c) * along[0];
+    let sum = (a + b) + (c + d);
+    let share = 4.0 * (upper + (lower - upper) * along[1]) / sum;
+    if sum > 0.0 { share.max(0.0) } else { 0.0 }
 }

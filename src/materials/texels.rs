@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use crate::math::color::srgb_to_linear;
+use crate::math::lanes::{LANES, Lanes3, set_lane};
 use crate::math::{DVec3, Vec3};
 
 /// Every sRGB byte decoded.
@@ -37,11 +38,41 @@ impl Texels {
     /// Linear value of column `x`, row `y` from the top; both in range.
     #[inline]
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
-        let index = y as usize * self.width as usize + x as usize;
+        self.at(y as usize * self.width as usize + x as usize)
+    }
+
+    /// Linear value at a place in the data.
+    #[inline]
+    pub fn at(&self, place: usize) -> Vec3 {
         match &self.data {
-            TexelData::Srgb8(bytes) => of_srgb(bytes[index]),
-            TexelData::Linear8(bytes) => of_linear(bytes[index]),
-            TexelData::Float(floats) => floats[index],
+            TexelData::Srgb8(bytes) => of_srgb(bytes[place]),
+            TexelData::Linear8(bytes) => of_linear(bytes[place]),
+            TexelData::Float(floats) => floats[place],
+        }
+    }
+
+    /// Linear values at places in the data, side by side. In place: rows are larger than what compilers like to return.
+    #[inline(always)]
+    pub fn fill_row(&self, places: &[usize; LANES], values: &mut Lanes3) {
+        match &self.data {
+            TexelData::Srgb8(bytes) => {
+                let table = &*SRGB;
+                for i in 0..LANES {
+                    let [r, g, b] = bytes[places[i]];
+                    let decoded = |byte: u8| table[usize::from(byte)];
+                    set_lane(values, i, Vec3::new(decoded(r), decoded(g), decoded(b)));
+                }
+            }
+            TexelData::Linear8(bytes) => {
+                for i in 0..LANES {
+                    set_lane(values, i, of_linear(bytes[places[i]]));
+                }
+            }
+            TexelData::Float(floats) => {
+                for i in 0..LANES {
+                    set_lane(values, i, floats[places[i]]);
+                }
+            }
         }
     }
 
@@ -92,6 +123,7 @@ fn of_srgb(bytes: [u8; 3]) -> Vec3 {
     Vec3::from_array(bytes.map(|byte| SRGB[usize::from(byte)]))
 }
 
+#[inline(always)]
 fn of_linear(bytes: [u8; 3]) -> Vec3 {
     Vec3::from_array(bytes.map(|byte| f32::from(byte) / 255.0))
 }

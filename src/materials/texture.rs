@@ -7,6 +7,7 @@ use super::mipmaps::Mipmaps;
 use super::texels::Texels;
 use crate::choice;
 use crate::math::elementary::log2;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::{Vec2, Vec3};
 
 choice! {
@@ -89,9 +90,8 @@ impl Color {
 impl Texture {
     /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
-        let tile = |x: f64| if x.is_finite() { x } else { 0.0 };
         let tiles = at.uv * self.repeat.as_dvec2();
-        let folded = [tiles.x, tiles.y].map(|x| self.wrap.fold(tile(x)) as f32);
+        let folded = [tiles.x, tiles.y].map(|x| self.wrap.fold(finite(x)) as f32);
         match self.filter {
             TextureFilter::Nearest => self.nearest(folded),
             TextureFilter::Bilinear => self.bilinear(&self.texels, folded),
@@ -103,6 +103,50 @@ impl Texture {
     pub fn texels_across(&self) -> [f64; 2] {
         let across = size(&self.texels).as_dvec2() * self.repeat.as_dvec2();
         across.abs().to_array()
+    }
+
+    /// [`Texture::lookup`] side by side, of a texture without levels.
+    #[inline(always)]
+    pub fn lookup_row(&self, uv: &[[f64; LANES]; 2]) -> Lanes3 {
+        let (texels, size) = (&*self.texels, size(&self.texels));
+        let folded = [
+            self.wrap.fold_row(&uv[0], f64::from(self.repeat.x)),
+            self.wrap.fold_row(&uv[1], f64::from(self.repeat.y)),
+        ];
+        let extent = [texels.width as i32, texels.height as i32];
+        let (mut first, mut part) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
+        let shift = match self.filter {
+            TextureFilter::Nearest => 0.0,
+            TextureFilter::Bilinear | TextureFilter::Mipmap => 0.5,
+        };
+        for axis in 0..2 {
+            for i in 0..LANES {
+                let x = folded[axis][i] * size[axis] - shift;
+                first[axis][i] = x.floor() as i32;
+                part[axis][i] = x - x.floor();
+            }
+        }
+        let columns = self.wrap.index_row(&first[0], 0, extent[0]);
+        let rows = self.wrap.index_row(&first[1], 0, extent[1]);
+        let mut colors = [[0.0; LANES]; 3];
+        if shift == 0.0 {
+            texels.fill_row(&places(&columns, &rows, extent), &mut colors);
+            return colors;
+        }
+        let right = self.wrap.index_row(&first[0], 1, extent[0]);
+        let upper = self.wrap.index_row(&first[1], 1, extent[1]);
+        let mut corners = [[[0.0; LANES]; 3]; 4];
+        texels.fill_row(&places(&columns, &rows, extent), &mut corners[0]);
+        texels.fill_row(&places(&right, &rows, extent), &mut corners[1]);
+        texels.fill_row(&places(&columns, &upper, extent), &mut corners[2]);
+        texels.fill_row(&places(&right, &upper, extent), &mut corners[3]);
+        for i in 0..LANES {
+            let corner = |number: usize| lane(&corners[number], i);
+            let lower = corner(0).lerp(corner(1), part[0][i]);
+            let upper = corner(2).lerp(corner(3), part[0][i]);
+            set_lane(&mut colors, i, lower.lerp(upper, part[1][i]));
+        }
+        colors
     }
 
     /// The mean of its image, which is that of all of it where a whole number of tiles fits into u and v.
@@ -149,10 +193,20 @@ impl Texture {
 
     /// A texel by whole numbers, counted from the left and from the bottom, that may lie one outside.
     fn texel(&self, texels: &Texels, x: f32, y: f32) -> Vec3 {
-        let column = self.wrap.index(x as i64, i64::from(texels.width));
-        let row_from_bottom = self.wrap.index(y as i64, i64::from(texels.height));
-        texels.get(column, texels.height - 1 - row_from_bottom)
+        let column = self.wrap.index(x as i32, texels.width as i32);
+        let row_from_bottom = self.wrap.index(y as i32, texels.height as i32);
+        texels.get(column as u32, texels.height - 1 - row_from_bottom as u32)
     }
+}
+
+/// Places of texels by their columns, and their rows from the bottom.
+#[inline(always)]
+fn places(columns: &[i32; LANES], rows: &[i32; LANES], [width, height]: [i32; 2]) -> [usize; LANES] {
+    let mut places = [0; LANES];
+    for i in 0..LANES {
+        places[i] = (height - 1 - rows[i]) as usize * width as usize + columns[i] as usize;
+    }
+    places
 }
 
 /// Columns and rows.
@@ -161,7 +215,46 @@ fn size(texels: &Texels) -> Vec2 {
 }
 
 impl Wrap {
+    /// Into [0, 1] what fits so often there.
+    #[inline(always)]
+    fn fold_row(self, x: &[f64; LANES], repeat: f64) -> Lanes {
+        let mut folded = [0.0; LANES];
+        macro_rules! by {
+            ($wrap:expr) => {
+                for i in 0..LANES {
+                    folded[i] = $wrap.fold(finite(x[i] * repeat)) as f32;
+                }
+            };
+        }
+        match self {
+            Self::Repeat => by!(Self::Repeat),
+            Self::Clamp => by!(Self::Clamp),
+            Self::Mirror => by!(Self::Mirror),
+        }
+        folded
+    }
+
+    /// [`Wrap::index`] of numbers and one more or not.
+    #[inline(always)]
+    fn index_row(self, numbers: &[i32; LANES], more: i32, size: i32) -> [i32; LANES] {
+        let mut indices = [0; LANES];
+        macro_rules! by {
+            ($wrap:expr) => {
+                for i in 0..LANES {
+                    indices[i] = $wrap.index(numbers[i] + more, size);
+                }
+            };
+        }
+        match self {
+            Self::Repeat => by!(Self::Repeat),
+            Self::Clamp => by!(Self::Clamp),
+            Self::Mirror => by!(Self::Mirror),
+        }
+        indices
+    }
+
     /// Into [0, 1].
+    #[inline(always)]
     fn fold(self, x: f64) -> f64 {
         match self {
             Self::Repeat => x - x.floor(),
@@ -173,15 +266,21 @@ impl Wrap {
         }
     }
 
-    /// An index at most a little outside 0 … size − 1 to one inside.
-    fn index(self, i: i64, size: i64) -> u32 {
-        let inside = match self {
-            Self::Repeat => i.rem_euclid(size),
+    /// An index at most one outside 0 … size − 1 to one inside.
+    #[inline(always)]
+    fn index(self, i: i32, size: i32) -> i32 {
+        match self {
+            Self::Repeat => i + if i < 0 { size } else { 0 } - if i >= size { size } else { 0 },
             // A mirrored border repeats its own texel.
-            Self::Clamp | Self::Mirror => i.clamp(0, size - 1),
-        };
-        inside as u32
+            Self::Clamp | Self::Mirror => i.max(0).min(size - 1),
+        }
     }
+}
+
+/// Coordinates that are not finite count as 0.
+#[inline(always)]
+fn finite(x: f64) -> f64 {
+    if x.is_finite() { x } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -238,6 +337,44 @@ mod tests {
                         ),
                         "{filter:?} {wrap:?} {bad}"
                     );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn look_ups_side_by_side_get_the_bits_that_each_gets_alone() {
+        let bytes: Vec<[u8; 3]> = (0..35_u8).map(|i| [i * 7, 255 - i, i.wrapping_mul(41)]).collect();
+        let floats = bytes.iter().map(|[r, g, b]| Vec3::new(f32::from(*r), f32::from(*g), f32::from(*b)));
+        let images = [
+            (7, 5, TexelData::Srgb8(bytes.clone())),
+            (5, 7, TexelData::Linear8(bytes.clone())),
+            (35, 1, TexelData::Float(floats.collect())),
+            (1, 1, TexelData::Srgb8(vec![[200, 100, 50]])),
+        ];
+        let hostile =
+            [f64::NAN, f64::INFINITY, -1e300, 1e300, 0.0, -0.0, 1.0, 1.0_f64.next_down(), -1e-20, 7.0];
+        let number = |i: usize| match i % 3 {
+            0 => hostile[i / 3 % hostile.len()],
+            _ => (i as f64 * 0.618_033_988).fract() * 6.0 - 3.0,
+        };
+        for (width, height, data) in images {
+            let texels = Arc::new(Texels { width, height, data, unusable: 0 });
+            for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
+                for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+                    for repeat in [Vec2::ONE, Vec2::new(2.5, -3.0)] {
+                        let texels = Arc::clone(&texels);
+                        let texture = Texture { texels, mipmaps: None, filter, wrap, repeat };
+                        for first in 0..60 {
+                            let u = std::array::from_fn(|i| number(first + i));
+                            let v = std::array::from_fn(|i| number(first + 5 * i));
+                            let row = texture.lookup_row(&[u, v]);
+                            for i in 0..LANES {
+                                let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(u[i], v[i])));
+                                assert_eq!(lane(&row, i), alone, "{filter:?} {wrap:?} {} {}", u[i], v[i]);
+                            }
+                        }
+                    }
                 }
             }
         }

@@ -99,9 +99,14 @@ fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The last share that does not start beyond `u`, of those from one on.
+/// The last share that does not start beyond `u`, of those from one on. It is mostly that one or the next: these steps are made
+/// without a branch, which nobody could foresee.
 #[inline(always)]
 fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
+    for _ in 0..2 {
+        let next = (place + 1).min(sums.len() - 2);
+        place = if sums[next] <= u { next } else { place };
+    }
     while place + 2 < sums.len() && sums[place + 1] <= u {
         place += 1;
     }

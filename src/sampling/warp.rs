@@ -47,6 +47,25 @@ pub fn cosine(u: [f32; 2]) -> Vec3 {
     at.extend((1.0 - at.length_squared()).max(0.0).sqrt())
 }
 
+/// In the unit square by a density that is bilinear between values ≥ 0 at its corners (0, 0), (1, 0), (0, 1), (1, 1), not all 0
+/// (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition, A.5.1).
+#[inline(always)]
+pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
+    let [a, b, c, d] = *corners;
+    let y = linear(u[1], a + b, c + d);
+    [linear(u[0], a + (c - a) * y, b + (d - b) * y), y]
+}
+
+/// In [0, 1] by a density that is linear between values ≥ 0 at both ends.
+#[inline(always)]
+fn linear(u: f32, first: f32, last: f32) -> f32 {
+    let sum = first + last;
+    let first = if sum > 0.0 { first / sum } else { 0.5 };
+    let square = first * first + u * (1.0 - 2.0 * first);
+    // Where the first is 0 and u too, that is 0.
+    (u / (first + square.max(f32::MIN_POSITIVE).sqrt())).min(1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,6 +111,32 @@ mod tests {
             assert!(one_minus_cos < 1e-6 || (z / (c / 2.0) - 1.0).abs() < 1e-3);
             // ∫(2c − c²) over the cone.
             assert!((sin2 / (c - c * c / 3.0) - 1.0).abs() < 1e-3, "{one_minus_cos}");
+        }
+    }
+
+    #[test]
+    fn bilinear_densities_are_met() {
+        // Shares of strips and cells by integrals of the density.
+        for corners in
+            [[1.0, 1.0, 1.0, 1.0], [0.0, 3.0, 0.0, 1.0], [5.0, 0.0, 0.0, 0.0], [1e30, 2e30, 3e30, 0.5e30]]
+        {
+            let [a, b, c, d] = corners.map(f64::from);
+            let mean = (a + b + c + d) / 4.0;
+            let below = |x: f64, y: f64| {
+                // ∫∫ of (1−s)(1−t)a + s(1−t)b + (1−s)t c + st d up to x and y.
+                let (s1, s0) = (x * x / 2.0, x - x * x / 2.0);
+                let (t1, t0) = (y * y / 2.0, y - y * y / 2.0);
+                (s0 * t0 * a + s1 * t0 * b + s0 * t1 * c + s1 * t1 * d) / mean
+            };
+            for (x, y) in [(0.25, 1.0), (1.0, 0.25), (0.5, 0.5), (0.8, 0.3)] {
+                let inside = |at: [f32; 2]| f64::from(at[0]) < x && f64::from(at[1]) < y;
+                let count = grid().filter(|u| inside(bilinear(u.to_array(), &corners))).count() as f64;
+                assert!((count / 1e4 - below(x, y)).abs() < 0.012, "{corners:?} {x} {y}: {count}");
+            }
+            let ends = [[0.0, 0.0], [1.0_f32.next_down(), 0.0], [0.0, 1.0_f32.next_down()]];
+            for at in ends.map(|u| bilinear(u, &corners)) {
+                assert!(at.iter().all(|x| (0.0..=1.0).contains(x)), "{at:?}");
+            }
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::mesh_rows::uv_between;
 use super::mesh_tree::MeshTree;
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
@@ -19,6 +20,22 @@ pub struct MeshInstance {
     pub transform: Transform,
     /// Interpolate vertex normals.
     pub smooth: bool,
+}
+
+/// A point of a triangle of an instance.
+pub(super) struct Facet {
+    /// The triangle's corners, in the mesh's coordinates.
+    corners: [DVec3; 3],
+    /// The point in the mesh's coordinates.
+    local: DVec3,
+    /// The point in the world.
+    pub(super) point: Vec3,
+    /// [`SurfacePoint::error`].
+    pub(super) error: Vec3,
+    /// [`SurfacePoint::normal`].
+    pub(super) normal: Vec3,
+    /// Weights of the corners.
+    pub(super) barycentric: Vec3,
 }
 
 impl MeshInstance {
@@ -93,29 +110,28 @@ impl MeshInstance {
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
-        let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
-        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-        let (ab, ac) = (b - a, c - a);
-        let local = a + ab * u + ac * v;
-        let normal = self.transform.normal(ab.cross(ac)).normalize().as_vec3();
-        let point = self.transform.point(local).as_vec3();
-        let barycentric = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+        let facet = self.facet(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
+        let Facet { corners: [a, b, c], local: _, point, error, normal, barycentric } = facet;
         let (uv, dpdu, dpdv) = if asked.uv {
-            self.parametrisation(vertices, barycentric, ab, ac)
+            self.parametrisation(vertices, barycentric, b - a, c - a)
         } else {
             (Vec2::ZERO, Vec3::ZERO, Vec3::ZERO)
         };
-        let shadow_point = if asked.shadow_point {
-            self.shadow_point(vertices, barycentric, normal, local, ray.direction)
-        } else {
-            point
-        };
+        let (mut shading_normal, mut shadow_point) = (normal, point);
+        if self.smooth {
+            let normals = self.tree.normals();
+            let normals = vertices.map(|vertex| normals[vertex]);
+            shading_normal = self.shading_normal(&facet, &normals);
+            if asked.shadow_point {
+                shadow_point = self.shadow_point(&facet, &normals, ray.direction);
+            }
+        }
         SurfacePoint {
             point,
             shadow_point,
-            error: self.error(point, local, [a, b, c]),
+            error,
             normal,
-            shading_normal: self.shading_normal(vertices, barycentric, normal),
+            shading_normal,
             uv: uv.as_dvec2(),
             dpdu,
             dpdv,
@@ -125,54 +141,66 @@ impl MeshInstance {
 
     /// Rounding of a point of a triangle, of the next ray's origin in the mesh's coordinates, and of what it is computed from;
     /// where all of these are near 0, that of the double precision in which sides of the triangle are told apart.
-    pub(super) fn error(&self, point: Vec3, local: DVec3, corners: [DVec3; 3]) -> Vec3 {
+    #[inline(always)]
+    pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
         let reach = self.transform.reach(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.transform.translation.abs().as_vec3();
-        let greatest = corners.into_iter().fold(DVec3::ZERO, |greatest, corner| greatest.max(corner.abs()));
+        let greatest = a.abs().max(b.abs()).max(c.abs());
         let of_double = double_error(self.transform.reach(greatest).max_element());
         parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE)
     }
 
-    /// Interpolated and on the side of the geometric normal.
-    fn shading_normal(&self, vertices: [usize; 3], barycentric: Vec3, normal: Vec3) -> Vec3 {
-        if !self.smooth {
-            return normal;
-        }
-        let normals = self.tree.normals();
-        let [a, b, c] = vertices.map(|vertex| normals[vertex]);
-        let interpolated = a * barycentric.x + b * barycentric.y + c * barycentric.z;
-        let bent = self.transform.normal(interpolated.as_dvec3()).as_vec3();
-        match bent.try_normalize() {
-            Some(bent) if bent.dot(normal) < 0.0 => -bent,
-            Some(bent) => bent,
-            None => normal,
+    /// A point of a triangle, by its corners in the mesh's coordinates and the weights of the second and the third.
+    #[inline(always)]
+    pub(super) fn facet(&self, corners: [Vec3; 3], [u, v]: [f32; 2]) -> Facet {
+        let corners = corners.map(|corner| corner.as_dvec3());
+        let [a, b, c] = corners;
+        let (ab, ac) = (b - a, c - a);
+        let local = a + ab * f64::from(u) + ac * f64::from(v);
+        let point = self.transform.point(local).as_vec3();
+        Facet {
+            corners,
+            local,
+            point,
+            error: self.error(point, local, corners),
+            normal: self.transform.normal(ab.cross(ac)).normalize().as_vec3(),
+            barycentric: Vec3::new(1.0 - u - v, u, v),
         }
     }
 
-    /// The point, lifted towards the eye to the tangent planes of the vertices where those are above it, so that the
-    /// facets of a smooth-shaded surface do not shadow what its normals say is lit (Hanika, *Hacking the Shadow
+    /// Of a smooth mesh: interpolated between those of the corners and on the side of the geometric normal.
+    #[inline(always)]
+    pub(super) fn shading_normal(&self, facet: &Facet, [a, b, c]: &[Vec3; 3]) -> Vec3 {
+        let Facet { normal, barycentric, .. } = *facet;
+        let interpolated = *a * barycentric.x + *b * barycentric.y + *c * barycentric.z;
+        let bent = self.transform.normal(interpolated.as_dvec3()).as_vec3();
+        let reciprocal = bent.length_recip();
+        let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
+        let bent = bent * reciprocal;
+        let bent = if bent.dot(normal) < 0.0 { -bent } else { bent };
+        let choose = |bent: f32, normal: f32| if is_told { bent } else { normal };
+        Vec3::new(choose(bent.x, normal.x), choose(bent.y, normal.y), choose(bent.z, normal.z))
+    }
+
+    /// Of a smooth mesh: the point, lifted towards the eye to the tangent planes of the vertices where those are above it, so that
+    /// the facets of a smooth-shaded surface do not shadow what its normals say is lit (Hanika, *Hacking the Shadow
     /// Terminator*, Ray Tracing Gems II, chapter 4).
-    fn shadow_point(
-        &self,
-        vertices: [usize; 3],
-        barycentric: Vec3,
-        normal: Vec3,
-        local: DVec3,
-        direction: DVec3,
-    ) -> Vec3 {
-        let point = self.transform.point(local);
-        if !self.smooth {
-            return point.as_vec3();
-        }
-        let (normal, normals) = (normal.as_dvec3(), self.tree.normals());
+    #[inline(always)]
+    pub(super) fn shadow_point(&self, facet: &Facet, normals: &[Vec3; 3], direction: DVec3) -> Vec3 {
+        let point = self.transform.point(facet.local);
+        let normal = facet.normal.as_dvec3();
         let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
-        let lift = |(vertex, weight): (usize, f32)| {
-            let own = self.transform.normal(normals[vertex].as_dvec3()).normalize_or_zero();
+        let weights = facet.barycentric.to_array();
+        let mut lifted = DVec3::ZERO;
+        for i in 0..3 {
+            let own = self.transform.normal(normals[i].as_dvec3());
+            let reciprocal = own.length_recip();
+            let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
+            let own = own * if is_told { reciprocal } else { 0.0 };
             let own = own * side * if own.dot(normal) < 0.0 { -1.0 } else { 1.0 };
-            let corner = self.transform.point(self.tree.loaded().mesh.positions[vertex].as_dvec3());
-            own * (f64::from(weight) * (corner - point).dot(own).max(0.0))
-        };
-        let lifted = vertices.into_iter().zip(barycentric.to_array()).map(lift).sum::<DVec3>();
+            let height = (self.transform.point(facet.corners[i]) - point).dot(own);
+            lifted += own * (f64::from(weights[i]) * if height > 0.0 { height } else { 0.0 });
+        }
         (point + lifted).as_vec3()
     }
 
@@ -190,7 +218,7 @@ impl MeshInstance {
             return (Vec2::new(barycentric.y, barycentric.z), world(ab), world(ac));
         }
         let [a, b, c] = vertices.map(|vertex| uvs[vertex]);
-        let uv = a * barycentric.x + b * barycentric.y + c * barycentric.z;
+        let uv = uv_between([a, b, c], barycentric);
         let (duv_b, duv_c) = ((b - a).as_dvec2(), (c - a).as_dvec2());
         let determinant = duv_b.perp_dot(duv_c);
         if determinant == 0.0 || !determinant.is_finite() {

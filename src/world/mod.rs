@@ -8,6 +8,7 @@ mod emitters;
 pub mod geometry;
 mod lower;
 mod mesh_instance;
+mod mesh_rows;
 pub mod mesh_tree;
 mod object;
 mod origin;
@@ -31,9 +32,8 @@ pub use textures::{NeededTexture, TextureSource, declared_source, environment_so
 
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
-use crate::materials::phong::PhongBsdf;
 use crate::materials::texels::Texels;
-use crate::materials::{Bsdf, Material, Mipmaps};
+use crate::materials::{Bsdf, Material, Mipmaps, Phong};
 
 /// The images of a scene.
 pub type Images = HashMap<TextureSource, Image>;
@@ -103,8 +103,9 @@ impl World {
         }
     }
 
-    /// The material of an object, and what it makes of light, where that is the same everywhere on it and no δ.
-    pub fn plain_phong(&self, object: u32) -> Option<(&Material, PhongBsdf)> {
+    /// The material of an object and its Phong, where nothing bends its normals, it sends out the same everywhere, and its
+    /// textures have no levels and are not of its glossy lobe.
+    pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {
         let material = match self.object_materials[object as usize] {
             ObjectMaterial::One(index) => &self.materials[index as usize],
             ObjectMaterial::OfFile { .. } => return None,
@@ -113,7 +114,10 @@ impl World {
             return None;
         }
         match &material.bsdf {
-            Bsdf::Phong(phong) => Some((material, phong.constant()?)),
+            Bsdf::Phong(phong) => {
+                let is_level = phong.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
+                (is_level && phong.specular.texture().is_none()).then_some((material, phong))
+            }
             Bsdf::Mirror(_) | Bsdf::Glass(_) => None,
         }
     }

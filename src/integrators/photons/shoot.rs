@@ -160,7 +160,7 @@ impl Flight<'_> {
     /// What each photon of a packet meets.
     fn meet(&mut self, rays: &[PathRay], row: &mut LitRow) {
         let shot = self.shooting.shot;
-        let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, row);
+        let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, true, row);
         if self.depth == 0 {
             // What comes straight throws no caustic.
             row.seen = 0;

@@ -1,0 +1,200 @@
+//! Surfaces of a mesh at the hits of a packet, side by side.
+
+use super::MeshInstance;
+use crate::accel::PACKET;
+use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::surface_rows::SurfaceRow;
+use crate::math::lanes::{Lanes3, lane, set_lane};
+use crate::math::{Vec2, Vec3};
+
+impl MeshInstance {
+    /// The surfaces of those hits of a packet whose bits are set, all of this instance; with their texture coordinates where
+    /// these are asked for.
+    #[inline(always)]
+    pub fn fill_surfaces(
+        &self,
+        surface: &mut SurfaceRow,
+        rays: &RayRows,
+        hits: &HitRows,
+        of: u32,
+        asks_uv: bool,
+    ) {
+        let mesh = &self.tree.loaded().mesh;
+        // The other lanes look at a triangle as well, which counts nothing.
+        let filler = hits.primitive[of.trailing_zeros() as usize % PACKET];
+        let mut vertices = [[0; 3]; PACKET];
+        for i in 0..PACKET {
+            let triangle = if of & 1 << i != 0 { hits.primitive[i] } else { filler };
+            vertices[i] = mesh.triangles[triangle as usize];
+        }
+        let corners = of_vertices(&vertices, &mesh.positions);
+        let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
+        let mut found = SurfaceRow::EMPTY;
+        for i in 0..PACKET {
+            let facet = self.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+            set_lane(&mut found.point, i, facet.point);
+            set_lane(&mut found.error, i, facet.error);
+            set_lane(&mut found.normal, i, facet.normal);
+        }
+        surface.take(of, &found);
+        if self.smooth {
+            let normals = of_vertices(&vertices, self.tree.normals());
+            let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
+            for i in 0..PACKET {
+                let facet = self.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                set_lane(&mut found.shading_normal, i, self.shading_normal(&facet, &normals_of(i)));
+            }
+            for i in 0..PACKET {
+                let facet = self.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                let direction = lane(&rays.direction, i).as_dvec3();
+                set_lane(&mut found.shadow_point, i, self.shadow_point(&facet, &normals_of(i), direction));
+            }
+            surface.take_smooth(of, &found);
+        }
+        if asks_uv {
+            for i in 0..PACKET {
+                let uvs = match mesh.uvs.as_slice() {
+                    [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
+                    uvs => vertices[i].map(|vertex| uvs[vertex as usize]),
+                };
+                let uv = uv_between(uvs, Vec3::new(1.0 - hits.u[i] - hits.v[i], hits.u[i], hits.v[i]));
+                let is_own = of & 1 << i != 0;
+                surface.uv[0][i] = if is_own { f64::from(uv.x) } else { surface.uv[0][i] };
+                surface.uv[1][i] = if is_own { f64::from(uv.y) } else { surface.uv[1][i] };
+            }
+        }
+    }
+}
+
+/// Texture coordinates of a point of a triangle, by those of its corners and their weights.
+#[inline(always)]
+pub(super) fn uv_between([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
+    a * barycentric.x + b * barycentric.y + c * barycentric.z
+}
+
+/// What the first, the second and the third vertices of triangles have.
+#[inline(always)]
+fn of_vertices(vertices: &[[u32; 3]; PACKET], all: &[Vec3]) -> [Lanes3; 3] {
+    let mut each = [[[0.0; PACKET]; 3]; 3];
+    for i in 0..PACKET {
+        for corner in 0..3 {
+            set_lane(&mut each[corner], i, all[vertices[i][corner] as usize]);
+        }
+    }
+    each
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::accel::{Instructions, Loops};
+    use crate::assets::LoadedMesh;
+    use crate::control::CancelToken;
+    use crate::geometry::mesh::TriangleMesh;
+    use crate::geometry::{Asked, Ray, ShapeHit};
+    use crate::math::DVec3;
+    use crate::math::random::signed as random;
+    use crate::math::transform::Transform;
+    use crate::scene::description::Accel;
+    use crate::world::MeshTree;
+
+    struct Filling<'a> {
+        mesh: &'a MeshInstance,
+        rays: &'a [Ray],
+        hits: &'a HitRows,
+        of: u32,
+    }
+
+    impl Loops for Filling<'_> {
+        type Done = SurfaceRow;
+
+        #[inline(always)]
+        fn run(self) -> SurfaceRow {
+            let mut surface = SurfaceRow::EMPTY;
+            let (rows, _) = RayRows::new(self.rays);
+            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, true);
+            surface
+        }
+    }
+
+    /// Triangles of all sizes with normals of all directions, one of length 0.
+    fn meshes() -> Vec<MeshInstance> {
+        let mut next = random(5);
+        let mut vector = || Vec3::new(next(), next(), next());
+        let mut mesh = TriangleMesh {
+            positions: (0..60).map(|_| vector()).collect(),
+            normals: (0..60).map(|_| vector().normalize()).collect(),
+            triangles: (0..20).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            ..TriangleMesh::default()
+        };
+        mesh.normals[4] = Vec3::ZERO;
+
+        let with_uvs = TriangleMesh {
+            uvs: (0..60).map(|i| Vec2::new(i as f32 * 0.3, -(i as f32))).collect(),
+            ..mesh.clone()
+        };
+        let placed = |scale: DVec3| {
+            Transform::scale_rotate_translate(
+                scale,
+                DVec3::new(20.0, 50.0, -10.0),
+                DVec3::new(0.3, 8.0, -2.0),
+            )
+        };
+        let mut instances = Vec::new();
+        for mesh in [mesh, with_uvs] {
+            let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+            let tree = Arc::new(tree);
+            for transform in
+                [Transform::IDENTITY, placed(DVec3::splat(1.3)), placed(DVec3::new(0.2, -1.0, 3.0))]
+            {
+                for smooth in [false, true] {
+                    instances.push(MeshInstance { tree: Arc::clone(&tree), transform, smooth });
+                }
+            }
+        }
+        instances
+    }
+
+    #[test]
+    fn surfaces_side_by_side_have_the_bits_that_each_has_alone() {
+        let mut next = random(9);
+        let number = |x: f32| (x * 0.5 + 0.5).clamp(0.0, 0.999);
+        for mesh in meshes() {
+            for round in 0..40_u32 {
+                let rays: Vec<Ray> = (0..PACKET)
+                    .map(|_| Ray::new(Vec3::splat(9.0), Vec3::new(next(), next(), next()).normalize()))
+                    .collect();
+                let mut hits = HitRows::none();
+                for i in 0..PACKET {
+                    let (u, v) = (number(next()), number(next()));
+                    let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                    let primitive = (number(next()) * 20.0) as u32;
+                    hits.put(i, &ShapeHit { t: 1.0, primitive, u, v });
+                }
+                let of = round.wrapping_mul(0x9e37_79b9) >> 16 | 1 << (round % 16);
+                for instructions in Instructions::ALL {
+                    let row = instructions.run(Filling { mesh: &mesh, rays: &rays, hits: &hits, of });
+                    assert_eq!(row.smooth, if mesh.smooth { of } else { 0 });
+                    for i in (0..PACKET).filter(|i| of & 1 << i != 0) {
+                        let hit = hits.get(i).expect("a hit");
+                        let alone = mesh.surface(&rays[i].to_f64(), &hit, Asked::ALL);
+                        let bits = |v: Vec3| v.to_array().map(f32::to_bits);
+                        let what = || format!("{instructions:?}, {hit:?}, {alone:?}");
+                        assert_eq!(bits(lane(&row.point, i)), bits(alone.point), "{}", what());
+                        assert_eq!(bits(lane(&row.error, i)), bits(alone.error), "{}", what());
+                        assert_eq!(bits(lane(&row.normal, i)), bits(alone.normal), "{}", what());
+                        assert_eq!([row.uv[0][i], row.uv[1][i]], alone.uv.to_array(), "{}", what());
+                        if mesh.smooth {
+                            let (normal, shadow) = (lane(&row.shading_normal, i), lane(&row.shadow_point, i));
+                            assert_eq!(bits(normal), bits(alone.shading_normal), "{}", what());
+                            assert_eq!(bits(shadow), bits(alone.shadow_point), "{}", what());
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
