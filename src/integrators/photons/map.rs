@@ -241,7 +241,7 @@ mod tests {
                     let (point, normal) = place();
                     let mut found = Vec::new();
                     map.visit((point, normal), 1, |photon, density| {
-                        found.push((photon.point.to_array(), density))
+                        found.push((photon.point.to_array(), density));
                     });
                     let near = |photon: &&Photon| {
                         let way = photon.point - point;
@@ -277,7 +277,7 @@ mod tests {
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
             map.visit((Vec3::new(0.1, 0.5, -0.2), normal), most_depth, |_, density| {
-                sum += density * step * step
+                sum += density * step * step;
             });
             sum
         };
