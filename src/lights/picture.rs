@@ -68,7 +68,7 @@ impl PictureEmitter {
         let rest = (u[0] - before) / share;
         const LAST: f32 = 1.0_f32.next_down();
         let u = [if rest < LAST { rest } else { LAST }, u[1]];
-        let to_corner = self.quad.to_corner(point);
+        let to_corner = self.quad.corner_from(point);
         let InGrid { column, row, rest } = self.cells.sample(u);
         let at =
             [(column as f32 + rest[0]) / self.size[0] as f32, (row as f32 + rest[1]) / self.size[1] as f32];
@@ -91,7 +91,7 @@ impl PictureEmitter {
 
     /// [`Light::pdf`](super::Light::pdf).
     pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
-        let to_corner = self.quad.to_corner(from);
+        let to_corner = self.quad.corner_from(from);
         let of_quad = self.quad.pdf(from, met);
         if of_quad > 0.0 { self.density(met.direction * met.distance, to_corner, of_quad) } else { 0.0 }
     }

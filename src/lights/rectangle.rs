@@ -55,7 +55,7 @@ impl QuadEmitter {
     /// Uniform over the solid angle of a rectangle, over the area of another parallelogram.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let to_corner = self.to_corner(point);
+        let to_corner = self.corner_from(point);
         let by_area = self.by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
@@ -77,7 +77,7 @@ impl QuadEmitter {
 
     /// From a point to the corner.
     #[inline(always)]
-    pub(super) fn to_corner(&self, point: Vec3) -> Vec3 {
+    pub(super) fn corner_from(&self, point: Vec3) -> Vec3 {
         (self.corner - point.as_dvec3()).as_vec3()
     }
 
@@ -117,7 +117,7 @@ impl QuadEmitter {
 
     /// [`Light::pdf`](super::Light::pdf).
     pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
-        let to_corner = self.to_corner(from);
+        let to_corner = self.corner_from(from);
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
