@@ -115,8 +115,8 @@ impl World {
         }
         match &material.bsdf {
             Bsdf::Phong(phong) => {
-                let is_level = phong.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
-                (is_level && phong.specular.texture().is_none()).then_some((material, phong))
+                let has_no_levels = phong.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
+                (has_no_levels && phong.specular.texture().is_none()).then_some((material, phong))
             }
             Bsdf::Mirror(_) | Bsdf::Glass(_) => None,
         }
