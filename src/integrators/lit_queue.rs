@@ -21,7 +21,7 @@ use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::lights::{Source, SourceRow};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, lane};
+use crate::math::lanes::{LANES, Lanes3, lane};
 use crate::scene::description::Shadows;
 use crate::world::{Geometry, Loops};
 
@@ -177,7 +177,7 @@ impl LitQueue {
                 if let Some(maps) = shot.photons {
                     let arrived = self.lit_and_gathered(number, shot, maps, measure, (depth, onward));
                     rays += arrived.rays;
-                    self.note(number, measure, arrived);
+                    self.note(number, measure, &arrived.light);
                 } else {
                     let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
                     let sums = self.sums(asked, shot, measure, group.len() as u32);
@@ -193,7 +193,7 @@ impl LitQueue {
                 let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
                 let arrived = self.arrived(asked, shot, measure, sums);
                 rays += arrived.rays;
-                self.note(number, measure, arrived);
+                self.note(number, measure, &arrived.light);
             }
             if let Some(onward) = scatters {
                 for row in &self.rows[first..end] {
@@ -291,11 +291,11 @@ impl LitQueue {
     }
 
     /// Note what arrives at a row.
-    fn note(&mut self, number: usize, measure: Measure, arrived: Arrived) {
+    fn note(&mut self, number: usize, measure: Measure, arrived: &Lanes3) {
         let row = &self.rows[number];
         let light = match measure {
-            Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(&arrived.light),
-            Measure::Work => arrived.light,
+            Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(arrived),
+            Measure::Work => *arrived,
         };
         match row.run() {
             Some(first) => {

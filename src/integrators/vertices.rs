@@ -164,7 +164,7 @@ impl<'a> Vertex<'a> {
             return Outlook { point: shadow_point, horizon: None, lift: None };
         }
         let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
-        let lift = (is_above && is_seen).then(|| Lift { to: shadow_point, end });
+        let lift = (is_above && is_seen).then_some(Lift { to: shadow_point, end });
         Outlook { point: on_facet, horizon, lift }
     }
 }
