@@ -128,7 +128,7 @@ impl Writes {
                 heard.is_last_stage = stage.name == Stage::Write && stage.status == Status::Running;
             }
             Event::Done { .. } | Event::Failed { .. } | Event::Cancelled { .. } => {
-                heard.is_last_stage = false
+                heard.is_last_stage = false;
             }
             Event::Started { .. }
             | Event::Asset { .. }
