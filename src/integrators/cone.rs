@@ -11,7 +11,7 @@ pub struct Cone {
     pub spread: f32,
 }
 
-/// Radius of the cone of a lobe that one path stands for, in radii of the lobe's own: as if a hundred paths shared it.
+/// Part of a lobe's radius that the cone of one path takes: as if a hundred paths shared the lobe.
 const SHARE: f32 = 0.1;
 
 /// What a surface does to a beam that leaves it: changes with the width there.

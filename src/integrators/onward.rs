@@ -40,8 +40,7 @@ impl Onward {
         Self { leads_on, is_risked: depth >= Self::SURE }
     }
 
-    /// The chance of a path to go on: the root of what it carries, as its part of the variance is in proportion to the square of
-    /// that (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
+    /// The chance of a path to go on: the root of its throughput, as its part of the variance goes with the square of that (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
     #[inline(always)]
     fn chance(self, carried: f32) -> f32 {
         if self.is_risked & (carried < 1.0) { carried.sqrt() } else { 1.0 }

@@ -7,7 +7,7 @@ use crate::math::{DVec3, Vec3};
 /// with Adaptive Tree Splitting*, 2018, section 4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBounds {
-    /// What the sphere is in.
+    /// How distance acts on the light.
     pub space: Space,
     /// Centre of a sphere around them.
     pub center: DVec3,
@@ -65,7 +65,7 @@ impl EmissionCone {
         Self { axis, cos: libm::cos(half_angle), edge: Edge::Sharp }
     }
 
-    /// Around all, and around no more than needed if their axes are spread evenly about the sum of these.
+    /// A cone around all of these, about the mean of their axes.
     fn around<'a>(cones: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(Edge::Sharp);
         let sum: DVec3 = cones.clone().map(|cone| cone.axis).sum();
@@ -87,7 +87,7 @@ fn sine(cos: f64) -> f64 {
 }
 
 impl LightBounds {
-    /// Where the light is so strong.
+    /// Scaled by a colour.
     pub fn times(self, color: Vec3) -> Self {
         Self { power: self.power * strength(color), ..self }
     }
@@ -126,8 +126,8 @@ impl LightBounds {
     }
 }
 
-/// What some lights send into a direction, in the mean over those that their axes are spread about. What sends by the cosine sends
-/// all of its power into one direction where all axes are the same, and a quarter of it where they are anywhere.
+/// Expected intensity of several lights, averaged over directions within the spread of their axes: emitters by the cosine give all
+/// of their power where the axes agree, a quarter of it where these are uniform.
 fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     let (mut everywhere, mut by_cosine, mut axes) = (0.0, 0.0, DVec3::ZERO);
     for LightBounds { power, cone, .. } in all {

@@ -1,5 +1,5 @@
-//! A tree over many lights, from which each point picks those that are expected to bring it most (Conty Estevez and Kulla,
-//! *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018). Its nodes have sixteen children, whose importance
+//! A tree over many lights. Each point picks lights at random, in proportion to bounds of what they contribute (Conty Estevez and
+//! Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018). Its nodes have sixteen children, whose importance
 //! is computed side by side.
 
 pub mod bounds;
@@ -24,10 +24,10 @@ pub struct LightTree {
     places: Vec<u32>,
 }
 
-/// Lights, or triangles of a light, that are too few for a tree.
+/// At most so many lights, or triangles of a light, are all sampled, without a tree.
 pub const MOST_WITHOUT: usize = 32;
 
-/// In place of a place.
+/// Marks a light without a place in the tree.
 const NOWHERE: u32 = u32::MAX;
 
 /// The number of the root.

@@ -7,9 +7,9 @@ use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 /// Children of a tree's node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// Of the spheres around them.
+    /// Centres of the bounding spheres of the children.
     center: Lanes3,
-    /// Of the same, with all that roundings may take from it.
+    /// Radii of the same, with the rounding errors of the centres.
     radius: Lanes,
     /// 1 where the spheres are in the scene, 0 where they are among directions.
     is_place: Lanes,
@@ -41,10 +41,10 @@ pub enum Child {
     Node(u32),
 }
 
-/// What the cosines of bounds may be off by rounding, and the least that they count.
+/// Rounding error allowed for cosine bounds, and the least cosine that enters an importance.
 const LEAST_COSINE: f32 = 1e-3;
 
-/// What bounds are worth that can send anything at all.
+/// Least and greatest importance of a child that may contribute.
 const LEAST: f32 = 1e-36;
 const MOST: f32 = 1e30;
 
