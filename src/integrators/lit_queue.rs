@@ -8,7 +8,6 @@ use super::light::{Arrived, LightRays, Lighting, Sums, add_where};
 use super::lit_row::{ALL, LitRow};
 use super::medium::Medium;
 use super::onward::{Onward, Scattering};
-use super::photons::PhotonMaps;
 use super::photons::gather::Gathering;
 use super::picking::Picking;
 use super::pool::Pool;
@@ -164,7 +163,9 @@ impl LitQueue {
         let mut rays = LightRays::default();
         let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
         let together = if shot.world.lights.tree().is_some() { ROWS } else { 1 };
-        let by_paths = onward.is_some();
+        // Hard shadows are by light samples alone.
+        let by_paths =
+            onward.is_some() && (shot.photons.is_none() || shot.settings.render.shadows == Shadows::Soft);
         let scatters = onward.filter(|onward| onward.leads_on);
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
@@ -174,31 +175,32 @@ impl LitQueue {
                 if row.may_lift != 0 {
                     shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
                 }
-                if let Some(maps) = shot.photons {
-                    let arrived = self.lit_and_gathered(number, shot, maps, measure, (depth, onward));
-                    rays += arrived.rays;
-                    self.note(number, measure, &arrived.light);
-                } else {
-                    let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
-                    let sums = self.sums(asked, shot, measure, group.len() as u32);
-                    group.push(sums);
-                    if self.pool.is_full() {
-                        self.pool.trace(&shot.world.geometry, &mut group);
-                    }
+                let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
+                let sums = self.sums(asked, shot, measure, group.len() as u32);
+                group.push(sums);
+                if self.pool.is_full() {
+                    self.pool.trace(&shot.world.geometry, &mut group);
                 }
             }
             self.pool.trace(&shot.world.geometry, &mut group);
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
                 let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
-                let arrived = self.arrived(asked, shot, measure, sums);
+                let mut arrived = self.arrived(asked, shot, measure, sums);
+                if let Some(maps) = shot.photons {
+                    let gathering = Gathering { shot, row, maps, depth, measure };
+                    add_where(
+                        row.used,
+                        &shot.world.geometry.instructions().run(gathering),
+                        &mut arrived.light,
+                    );
+                }
                 rays += arrived.rays;
                 self.note(number, measure, &arrived.light);
             }
             if let Some(onward) = scatters {
                 for row in &self.rows[first..end] {
-                    let used = if shot.photons.is_some() { row.used & row.seen } else { row.used };
-                    Scattering { shot, row, used, onward }.scatter(&self.media, &self.cones, next);
+                    Scattering { shot, row, used: row.used, onward }.scatter(&self.media, &self.cones, next);
                 }
             }
         }
@@ -254,40 +256,6 @@ impl LitQueue {
             }
             Others::Nothing | Others::Paths => arrived,
         }
-    }
-
-    /// What comes straight from lights, without waiting for other rows.
-    fn lit(&mut self, asked: Asked, shot: &Shot<'_>, measure: Measure) -> Arrived {
-        let mut sums = [self.sums(asked, shot, measure, 0)];
-        self.pool.trace(&shot.world.geometry, &mut sums);
-        let [sums] = sums;
-        self.arrived(asked, shot, measure, sums)
-    }
-
-    /// The same and what photons bring. Paths go on from vertices that the eye sees alone: one step, to where light is looked up.
-    fn lit_and_gathered(
-        &mut self,
-        number: usize,
-        shot: &Shot<'_>,
-        maps: &PhotonMaps,
-        measure: Measure,
-        (depth, onward): (u32, Option<Onward>),
-    ) -> Arrived {
-        let row = &self.rows[number];
-        let shown = row.used & shown(row, measure);
-        let (first, second) = (shown & row.seen, shown & !row.seen);
-        let is_shared = onward.is_some() && shot.settings.render.shadows == Shadows::Soft;
-        let mut arrived = self.lit(Asked { number, used: first, by_paths: is_shared }, shot, measure);
-        if second != 0 {
-            let Arrived { light, rays } =
-                self.lit(Asked { number, used: second, by_paths: false }, shot, measure);
-            add_where(second, &light, &mut arrived.light);
-            arrived.rays += rays;
-        }
-        let row = &self.rows[number];
-        let gathering = Gathering { shot, row, maps, depth, measure };
-        add_where(row.used, &shot.world.geometry.instructions().run(gathering), &mut arrived.light);
-        arrived
     }
 
     /// Note what arrives at a row.

@@ -148,9 +148,10 @@ impl LitRow {
 
     /// Keep these of its vertices.
     pub(super) fn keep(&mut self, these: u32) {
-        self.used &= these;
-        self.is_bounded &= these;
-        self.may_lift &= these;
+        let Self { used, is_bounded, may_lift, apart, seen, from_gloss, .. } = self;
+        for bits in [used, is_bounded, may_lift, apart, seen, from_gloss] {
+            *bits &= these;
+        }
     }
 
     /// Take a vertex of another row.

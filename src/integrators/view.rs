@@ -30,7 +30,7 @@ choice! {
         Indirect = "indirect",
         /// Light that comes there by mirrors and glass alone.
         Caustic = "caustic",
-        /// How many photons the first pass has around a point, where photons are on.
+        /// How many photons a pass has around a point, within its kernel, where photons are on.
         Photons = "photons",
         /// Fraction of the lights' radiance that arrives.
         Shadow = "shadow",

@@ -25,7 +25,7 @@ pub fn shade(
             FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
             FirstHit::Depth => Vec3::splat(distance(shot, surface)),
             FirstHit::Barycentric => surface.barycentric,
-            FirstHit::Photons => Vec3::splat(photons(shot, &vertex)),
+            FirstHit::Photons => Vec3::splat(photons(shot, path.slot, &vertex)),
             FirstHit::Uv => fraction(surface.uv).as_vec2().extend(0.0),
             FirstHit::Albedo => {
                 vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups)
@@ -36,12 +36,16 @@ pub fn shade(
     Ok(())
 }
 
-/// Photons of the first map at hand around a point.
-fn photons(shot: &Shot<'_>, vertex: &Vertex<'_>) -> f32 {
+/// Photons around a point, of the pass of a sample.
+fn photons(shot: &Shot<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let mut count = 0.0;
     if let Some(maps) = shot.photons {
         let place = (vertex.surface.point, vertex.normal);
-        maps.passes[0].all.visit(place, u32::MAX, |_, _| count += 1.0);
+        let (_, _, sample) = shot.block.place(slot);
+        let pass = maps.pass(sample);
+        for map in [&pass.caustic, &pass.bounced] {
+            map.visit(place, u32::MAX, |_, _| count += 1.0);
+        }
     }
     count
 }

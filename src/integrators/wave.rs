@@ -1,6 +1,6 @@
 //! Rays from the eye, round by round over queues instead of recursion. In whitted they are split at glass and end at Phong
 //! surfaces, which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). In path each
-//! stays one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986).
+//! stays one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986); so it does from Phong surfaces in whitted with photons.
 
 use std::ops::Range;
 
@@ -55,7 +55,7 @@ pub fn trace(
     let mut wave = Wave {
         depth: 0,
         is_path,
-        has_steps: is_path || shot.photons.is_some(),
+        goes_on: is_path || shot.photons.is_some(),
         onward: None,
         shot,
         lit,
@@ -80,7 +80,7 @@ pub fn trace(
     wave.next_round(rays);
     while !rays.is_empty() {
         wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
-        if wave.has_steps {
+        if wave.goes_on {
             shot.closest_hits(rays, hits)?;
             by_object.sort(hits);
             for places in by_object.places().chunks(PACKET) {
@@ -104,8 +104,8 @@ struct Wave<'a, 's> {
     /// Scatterings before the hits of this round.
     depth: u32,
     is_path: bool,
-    /// Whether rays go on from diffuse and glossy surfaces: paths, or one step to where photons are gathered.
-    has_steps: bool,
+    /// Whether rays go on from diffuse and glossy surfaces: those of path, and those by which whitted finds what photons do not bring.
+    goes_on: bool,
     /// How paths go on from Phong surfaces; none: they end there.
     onward: Option<Onward>,
     shot: &'a Shot<'a>,
@@ -131,7 +131,7 @@ impl Wave<'_, '_> {
     }
 
     fn begin_round(&mut self) {
-        self.onward = self.has_steps.then(|| Onward::new(self.shot, self.depth));
+        self.onward = self.goes_on.then(|| Onward::new(self.shot, self.depth));
     }
 
     /// The rays of the next round are those that were found; what is in their place is memory.
@@ -224,11 +224,11 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// Whether the light that a step meets is found in another way: by photons behind mirrors and glass, and by light samples alone
+    /// Whether the light that a path meets is found in another way: by photons behind mirrors and glass, and by light samples alone
     /// where these make hard shadows.
     fn is_gathered(&self, path: &PathRay) -> bool {
-        let is_step = self.shot.photons.is_some() && !path.history.is_seen;
-        is_step && !(path.history.density > 0.0 && self.shot.settings.render.shadows == Shadows::Soft)
+        let goes_on = self.shot.photons.is_some() && !path.history.is_seen;
+        goes_on && !(path.history.density > 0.0 && self.shot.settings.render.shadows == Shadows::Soft)
     }
 
     fn leave(&mut self, path: &PathRay) {

@@ -100,9 +100,9 @@ pub(super) fn warnings(scene: &Scene, settings: &RenderSettings) -> Vec<String> 
                 .to_owned(),
         );
     }
-    if photons.is_some() && scene.lights.iter().any(is_steady) {
+    if photons.is_some() && specular() && scene.lights.iter().any(is_steady) {
         warnings.push(
-            "photons carry no light of `falloff = \"none\"`: it bounces no further than to the next surface"
+            "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces"
                 .to_owned(),
         );
     }

@@ -375,14 +375,17 @@ pub struct PhotonsReport {
     pub emitted: u64,
     /// Photons of them that were stored.
     pub stored: u64,
+    /// Texture look-ups on their ways.
+    #[serde(skip)]
+    pub lookups: u64,
     /// Seconds that it took to send and store them.
     pub seconds: f64,
     /// Photons sent in each of these seconds.
     pub per_second: f64,
     /// Radius of the first pass's kernel for caustics.
     pub caustic_radius: f32,
-    /// Radius of the first pass's kernel for all photons.
-    pub radius: f32,
+    /// Radius of the first pass's kernel for what is thrown back from caustics.
+    pub bounced_radius: f32,
     /// Bytes held by maps that are kept.
     pub kept_memory_bytes: u64,
     /// Most bytes of maps that were in use at once.

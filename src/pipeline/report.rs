@@ -116,7 +116,7 @@ fn counters(finished: &Finished<'_>) -> Counters {
         photons_stored: finished.photons.map_or(0, |photons| photons.stored),
         texels_loaded: finished.texels_loaded,
         texture_memory_bytes: finished.texture_memory_bytes,
-        texture_lookups: rays.texture_lookups,
+        texture_lookups: rays.texture_lookups + finished.photons.map_or(0, |photons| photons.lookups),
         non_finite_samples: finished.canvas.film.non_finite_samples(),
         accel_memory_bytes: world.accel_memory_bytes() as u64,
         films: finished.films.count() as u64,

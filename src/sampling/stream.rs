@@ -29,6 +29,8 @@ pub enum Decision {
     Roulette,
     /// Whether to go on at all from a mirror or glass: another decision than that of the vertex after it, which has the same path.
     Spared,
+    /// Whether photons are looked up where many look-ups are on the way.
+    Gather,
     /// Which light a photon starts at, and which piece of it.
     Lamp,
     /// Whether a photon is aimed, and at what.
@@ -59,6 +61,7 @@ impl Decision {
             Self::Start => u32::MAX - 11,
             Self::Sent => u32::MAX - 12,
             Self::Spared => u32::MAX - 13,
+            Self::Gather => u32::MAX - 14,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }

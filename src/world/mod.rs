@@ -103,6 +103,18 @@ impl World {
         }
     }
 
+    /// The materials that an object may have anywhere.
+    pub fn materials_of(&self, object: u32) -> impl Iterator<Item = &Material> {
+        let (first, count, one) = match self.object_materials[object as usize] {
+            ObjectMaterial::One(index) => (0, 0, index),
+            ObjectMaterial::OfFile { first, fallback } => {
+                let mesh = self.geometry.objects()[object as usize].mesh();
+                (first, mesh.map_or(0, |mesh| mesh.tree.loaded().materials.len()), fallback)
+            }
+        };
+        self.materials[first as usize..][..count].iter().chain(self.materials.get(one as usize))
+    }
+
     /// The material of an object and its Phong, where nothing bends its normals, it sends out the same everywhere, and its
     /// textures have no levels and are not of its glossy lobe.
     pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {

@@ -5,12 +5,16 @@ use super::super::lit_row::LitRow;
 use super::super::shot::Shot;
 use super::super::view::{Measure, Ways};
 use super::PhotonMaps;
-use super::map::{Photon, Way};
+use super::map::Photon;
 use crate::geometry::rows::lanes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
 use crate::math::lanes::{Lanes3, lane, set_lane};
+use crate::sampling::Decision;
 use crate::world::Loops;
+
+/// The chance of a look-up at a vertex that the eye does not see: a path has many of them, and little of its noise is of what they bring.
+const LOOKS_UNSEEN: f32 = 0.25;
 
 /// Gathers photons at the vertices of a row.
 pub struct Gathering<'a> {
@@ -34,35 +38,38 @@ impl Loops for Gathering<'_> {
     fn run(self) -> Lanes3 {
         let Self { shot, row, maps, depth, measure } = self;
         let mut sums = [[0.0; PACKET]; 3];
+        let looks = if row.used & !row.seen == 0 || measure == Measure::Work {
+            [0.0; PACKET]
+        } else {
+            let [looks, _] = row.sampler(shot).pairs(&row.path, Decision::Gather, 0, 1);
+            looks
+        };
         let Some(most_depth) = shot.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let Ways { caustic, indirect, .. } = measure.ways();
         for i in lanes(row.used) {
             let (_, _, sample) = shot.block.place(row.slot[i]);
             let pass = maps.pass(sample);
             let is_seen = row.seen & 1 << i != 0;
+            if !is_seen && !(looks[i] < LOOKS_UNSEEN) {
+                continue;
+            }
             let place = row.place_of(i);
-            // What comes from a caustic by one more surface arrives nearly everywhere, from a small place: a step would hardly ever find
-            // it. At surfaces without a glossy lobe photons stand for it, and the step leaves it out.
-            let by_photons = row.albedos[1][i] == 0.0;
-            let without_caustics = row.from_gloss & 1 << i == 0;
+            // At a surface without a glossy lobe photons stand for what comes from a caustic, and the path from there leaves it out.
+            let gathers_bounced = row.albedos[1][i] == 0.0;
+            let gathers_caustic = if is_seen { caustic } else { indirect && row.from_gloss & 1 << i != 0 };
+            let maps = [
+                gathers_caustic.then_some(&pass.caustic),
+                (indirect && gathers_bounced).then_some(&pass.bounced),
+            ];
             let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
-            let maps = if is_seen {
-                let bounced = indirect && by_photons;
-                [caustic.then_some((&pass.caustic, false)), bounced.then_some((&pass.bounced, false))]
-            } else {
-                [indirect.then_some((&pass.all, without_caustics)), None]
-            };
             let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
             let mut sum = Vec3::ZERO;
-            for (map, leaves_caustics_out) in maps.into_iter().flatten() {
+            for map in maps.into_iter().flatten() {
                 if measure == Measure::Work {
                     map.visit(place, most_depth, |_, _| sum += Vec3::ONE);
                     continue;
                 }
                 map.visit(place, most_depth, |photon: &Photon, density| {
-                    if leaves_caustics_out && photon.way == Way::Caustic {
-                        return;
-                    }
                     let mut f = diffuse;
                     if specular != Vec3::ZERO {
                         f += specular * gloss(mirrored, photon.direction, shininess);
@@ -70,7 +77,8 @@ impl Loops for Gathering<'_> {
                     sum += f * photon.flux * (density * row.landed(i, photon.direction));
                 });
             }
-            set_lane(&mut sums, i, sum);
+            let counts = if is_seen || measure == Measure::Work { 1.0 } else { 1.0 / LOOKS_UNSEEN };
+            set_lane(&mut sums, i, sum * counts);
         }
         sums
     }

@@ -17,19 +17,6 @@ pub struct Photon {
     pub normal: Vec3,
     /// Scatterings on its way.
     pub depth: u32,
-    /// How it came.
-    pub way: Way,
-}
-
-/// How a photon came, by the mirrors and glass S and other surfaces D on its way from the light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
-    /// `L S+`.
-    Caustic,
-    /// `L S+ D S*`: thrown back from a caustic.
-    Bounced,
-    /// Any other.
-    Other,
 }
 
 /// Photons that are put into their places between two looks at the token.
@@ -221,7 +208,7 @@ mod tests {
     use crate::math::random::signed as random;
 
     fn photon(point: Vec3, normal: Vec3) -> Photon {
-        Photon { point, direction: normal, flux: Vec3::ONE, normal, depth: 1, way: Way::Caustic }
+        Photon { point, direction: normal, flux: Vec3::ONE, normal, depth: 1 }
     }
 
     #[test]

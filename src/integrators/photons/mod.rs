@@ -3,21 +3,21 @@
 //! that shrinks from pass to pass, so that their mean converges (Hachisuka, Ogaki, Jensen, *Progressive Photon Mapping*, 2008; Knaus
 //! and Zwicker, *Progressive Photon Mapping: A Probabilistic Approach*, 2011). Pass i of the photons is sample i of every pixel.
 //!
-//! Which estimator carries which paths from lights L by mirrors and glass S and other surfaces D to the eye E:
+//! Which estimator carries which paths from lights L by mirrors and glass S and other surfaces D to the eye E; paths from the
+//! eye go on from each D:
 //!
 //! | paths | estimator |
 //! | --- | --- |
 //! | `L S* E` | the path from the eye meets the light |
-//! | `L D S* E` | light samples at the first D, and the step from there that meets the light at once, weighed against each other |
-//! | `L S+ D S* E` | caustic photons at the first D |
-//! | `L S+ D S* D S* E`, the last D without a glossy lobe | photons thrown back from a caustic, there |
-//! | `L D S* D S* E` | one step from the first D, by its lobes, to the next: light samples there |
-//! | `L S+ D S* D S* E`, the last D with a glossy lobe | the same step: caustic photons there |
-//! | `L (S\|D)* D (S\|D)* D S* D S* E` | the same step: all other photons there |
+//! | `L D … E` | light samples at that D, and the path that meets the light right behind it, weighed against each other |
+//! | `L S+ D S* E` | caustic photons at that D |
+//! | `L S+ D S* D … E`, the second D without a glossy lobe | photons thrown back from a caustic, at the second D |
+//! | `L S+ D S* D … E`, the second D with a glossy lobe | caustic photons at the first D |
 //!
-//! So what the step meets of lights behind mirrors and glass counts nothing, and photons that come straight from a light are not
-//! kept. Scatterings of the eye's path, the vertex at which photons are gathered among them, and those of the photon are at most
-//! `max_depth` together.
+//! So only light that meets mirrors or glass before anything else is sent out. What paths from the eye meet of lights behind
+//! mirrors and glass, after a D, counts nothing. Light that comes from a caustic by one more surface arrives nearly everywhere, from
+//! a small place that paths hardly ever find: hence the photons that are thrown back. Scatterings of the eye's path, the vertex at which photons are
+//! gathered among them, and those of the photon are at most `max_depth` together.
 
 pub(super) mod gather;
 mod map;
@@ -37,10 +37,10 @@ use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
 use crate::lights::tree::bounds::Space;
 use crate::lights::{Ball, LightBounds, PhotonSource};
-use crate::materials::Bsdf;
+use crate::materials::{Bsdf, Material};
 use crate::scene::description::{Render, Shadows};
-use crate::world::{Hit, Object, World, photon_source};
-pub use map::{Photon, PhotonMap, Way};
+use crate::world::{Hit, World, photon_source};
+pub use map::{Photon, PhotonMap};
 use shoot::{Shooting, Shots};
 
 /// How photons are sent and gathered.
@@ -60,20 +60,24 @@ const CHUNK: u32 = 2048;
 /// α: how many of the photons of a pass the shrinking kernel keeps.
 const KEPT: f64 = 2.0 / 3.0;
 
-/// Photons that the first kernels are to hold, in the middle of the caustic ones, of those thrown back from caustics, and of all.
-const WANTED: [f32; 3] = [12.0, 32.0, 4.0];
+/// Photons that the first kernels are to hold, in the middle of the caustic ones and of those thrown back from caustics.
+const WANTED: [f32; 2] = [12.0, 8.0];
 
-/// The part of the photons that are aimed at mirrors and glass, where there are any.
-const AIMED: f32 = 0.5;
+/// The part of the photons that are aimed at mirrors and glass, where all of them are in balls, and where some have no bounds.
+const AIMED: [f32; 2] = [0.9, 0.5];
 
 /// What all passes of a picture have in common.
 #[derive(Debug)]
 pub struct Photons {
     settings: PhotonSettings,
+    /// Most scatterings of a photon before it is gathered.
+    most_depth: u32,
+    /// None where nothing mirrors or refracts light.
     emission: Option<PhotonSource>,
-    glasses: Vec<Inside>,
-    /// Of the first pass: of the kernel for caustics, of that for what is thrown back from them, and of that for all photons.
-    radii: [f32; 3],
+    /// The closed shapes of glass that lights may be in.
+    glasses: Vec<u32>,
+    /// Of the first pass: of the kernel for caustics, and of that for what is thrown back from them.
+    radii: [f32; 2],
 }
 
 /// The photons of a pass.
@@ -83,8 +87,6 @@ pub struct PhotonPass {
     pub caustic: PhotonMap,
     /// Those that were thrown back from such places and came to others.
     pub bounced: PhotonMap,
-    /// All.
-    pub all: PhotonMap,
     /// How many were sent out.
     pub emitted: u64,
     /// Texture look-ups.
@@ -94,12 +96,12 @@ pub struct PhotonPass {
 impl PhotonPass {
     /// How many were stored.
     pub fn stored(&self) -> u64 {
-        self.all.len() as u64
+        (self.caustic.len() + self.bounced.len()) as u64
     }
 
     /// Bytes that it takes.
     pub fn memory_bytes(&self) -> usize {
-        self.caustic.memory_bytes() + self.bounced.memory_bytes() + self.all.memory_bytes()
+        self.caustic.memory_bytes() + self.bounced.memory_bytes()
     }
 }
 
@@ -132,15 +134,19 @@ impl Photons {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Cancelled> {
-        let emission = photon_source(&world.geometry, &world.lights);
-        let emission = emission.map(|emission| emission.aimed_at(&targets(world), AIMED));
+        let specular = Specular::of(world);
+        let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.exists());
+        let aimed = AIMED[usize::from(specular.is_unbounded)];
+        let emission = emission.map(|emission| emission.aimed_at(&specular.balls, aimed));
         let glasses = glasses_at_lights(world);
-        let mut own = Self { settings: photons, emission, glasses, radii: [photons.radius; 3] };
+        let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
+        let mut own = Self { settings: photons, most_depth, emission, glasses, radii: [photons.radius; 2] };
         let sent = own.shoot((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
-            let kinds = [&sent.caustic, &sent.bounced, &sent.all];
+            let kinds = [&sent.caustic, &sent.bounced];
+            let size = own.emission.as_ref().map_or(1.0, |emission| emission.around().radius as f32);
             let radii = kinds.into_par_iter().zip(WANTED);
-            let radii = radii.map(|(of, wanted)| radius_to_hold(of, wanted, token));
+            let radii = radii.map(|(of, wanted)| radius_to_hold(of, wanted, size, token));
             let radii = radii.collect::<Result<Vec<_>, _>>()?;
             own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
         }
@@ -148,10 +154,14 @@ impl Photons {
         Ok((own, first))
     }
 
-    /// Radii of the first pass's kernels: of that for caustics, of that for what is thrown back from them, and of that for
-    /// all photons.
-    pub fn radii(&self) -> [f32; 3] {
+    /// Radii of the first pass's kernels: of that for caustics, and of that for what is thrown back from them.
+    pub fn radii(&self) -> [f32; 2] {
         self.radii
+    }
+
+    /// Whether any photons are sent: there are mirrors or glass, and lights that shine on them.
+    pub fn are_sent(&self) -> bool {
+        self.emission.is_some() && self.most_depth > 0
     }
 
     /// A pass. A function of its number, whatever the threads.
@@ -172,12 +182,12 @@ impl Photons {
     /// The maps of a pass.
     fn mapped(&self, sent: &Sent, number: u32, token: &CancelToken) -> Result<PhotonPass, Cancelled> {
         let shrunk = shrunk(number);
-        let [of_caustic, of_bounced, of_all] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
+        let [of_caustic, of_bounced] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
         let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
-        let few = || (map(&sent.caustic, of_caustic), map(&sent.bounced, of_bounced));
-        let ((caustic, bounced), all) = rayon::join(few, || map(&sent.all, of_all));
-        let (emitted, lookups) = (self.settings.count.into(), sent.lookups);
-        Ok(PhotonPass { caustic: caustic?, bounced: bounced?, all: all?, emitted, lookups })
+        let (caustic, bounced) =
+            rayon::join(|| map(&sent.caustic, of_caustic), || map(&sent.bounced, of_bounced));
+        let emitted = if self.are_sent() { self.settings.count.into() } else { 0 };
+        Ok(PhotonPass { caustic: caustic?, bounced: bounced?, emitted, lookups: sent.lookups })
     }
 
     /// The passes of some samples.
@@ -204,14 +214,15 @@ impl Photons {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<Sent, Cancelled> {
-        let Some(emission) = &self.emission else { return Ok(Sent::default()) };
-        let most_depth = self.settings.bounces.min(settings.render.max_depth.saturating_sub(1));
-        if most_depth == 0 {
+        let Some(emission) = self.emission.as_ref().filter(|_| self.are_sent()) else {
             return Ok(Sent::default());
-        }
+        };
         // Photons come to the facets, from where they go on in every picture alike.
         let settings =
             RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
+        let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
+        let inside = |&object: &u32| Inside { object, material: material(object) };
+        let glasses: &[Inside] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {
             // All photons of a number of passes are samples of one sequence.
@@ -222,7 +233,7 @@ impl Photons {
             let tile = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
             let block = SampleBlock { tile, samples };
             let shot = Shot { pixel_spread: 0.0, ..Shot::new(world, &settings, &block, token) };
-            let (glasses, share) = (&*self.glasses, 1.0 / count as f32);
+            let (share, most_depth) = (1.0 / count as f32, self.most_depth);
             let shots = Shooting { shot: &shot, emission, glasses, share, most_depth }.shoot()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());
@@ -233,16 +244,15 @@ impl Photons {
             .map(|number| chunk(number * CHUNK))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        let all: Vec<Photon> = chunks.into_iter().flat_map(|chunk| chunk.photons).collect();
-        let of = |way: Way| all.iter().filter(|photon| photon.way == way).copied().collect();
-        Ok(Sent { caustic: of(Way::Caustic), bounced: of(Way::Bounced), all, lookups })
+        let caustic = chunks.iter().flat_map(|chunk| &chunk.caustic).copied().collect();
+        let bounced = chunks.iter().flat_map(|chunk| &chunk.bounced).copied().collect();
+        Ok(Sent { caustic, bounced, lookups })
     }
 }
 
 /// What was stored of a pass.
 #[derive(Default)]
 struct Sent {
-    all: Vec<Photon>,
     /// Those that came by mirrors and glass alone.
     caustic: Vec<Photon>,
     /// Those that were thrown back from such places.
@@ -255,20 +265,25 @@ fn shrunk(pass: u32) -> f64 {
     (1..=pass).map(f64::from).map(|i| (i + KEPT) / (i + 1.0)).product::<f64>().sqrt()
 }
 
-/// A radius within which the photon in the middle, by how many there are, has so many others.
-fn radius_to_hold(photons: &[Photon], wanted: f32, token: &CancelToken) -> Result<f32, Cancelled> {
+/// A radius within which the median photon has so many neighbours; `size` is the radius of a ball around the scene.
+fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToken) -> Result<f32, Cancelled> {
     /// Photons that are looked at, from each of so many of them.
     const MOST: usize = 1 << 14;
     const LOOKS: usize = 256;
     /// Neighbours that are found among them.
     const NEAR: f32 = 12.0;
+    /// The largest radius, and that where photons are too few to tell, in radii of the scene.
+    const LARGEST: f32 = 0.05;
+    const BY_DEFAULT: f32 = 0.02;
     let step = photons.len().div_ceil(MOST).max(1);
     let some: Vec<Photon> = photons.iter().step_by(step).copied().collect();
     let bounds = some.iter().fold(Aabb::EMPTY, |all, one| all.union(Aabb { min: one.point, max: one.point }));
-    let mut radius = 0.05 * (bounds.max - bounds.min).length();
-    if some.is_empty() || !(radius > 0.0) {
-        return Ok(1.0);
+    let extent = (bounds.max - bounds.min).length();
+    if some.len() as f32 <= 2.0 * NEAR || !(extent > 0.0) {
+        return Ok(BY_DEFAULT * size);
     }
+    let largest = LARGEST * size;
+    let mut radius = largest.min(0.05 * extent);
     for _ in 0..12 {
         let map = PhotonMap::new(&some, radius, token)?;
         let count = |photon: &Photon| {
@@ -285,18 +300,18 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, token: &CancelToken) -> Resul
             break;
         }
     }
-    Ok(radius * (wanted / (NEAR * step as f32)).sqrt())
+    Ok(largest.min(radius * (wanted / (NEAR * step as f32)).sqrt()))
 }
 
 /// The closed shapes of glass that lights may be in.
-fn glasses_at_lights(world: &World) -> Vec<Inside> {
+fn glasses_at_lights(world: &World) -> Vec<u32> {
     let places: Vec<Aabb> =
         world.lights.iter().filter_map(|(_, light)| light.bounds()).filter_map(place).collect();
-    let inside = |(object, material): (u32, u32)| {
-        let bounds = world.geometry.objects()[object as usize].bounds()?;
-        places.iter().any(|place| place.meets(&bounds)).then_some(Inside { object, material })
+    let may_hold_light = |object: &u32| {
+        let bounds = world.geometry.objects()[*object as usize].bounds();
+        bounds.is_none_or(|bounds| places.iter().any(|place| place.meets(&bounds)))
     };
-    world.closed_glasses().filter_map(inside).collect()
+    world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect()
 }
 
 /// A box around a light; none where it is beyond the scene.
@@ -308,16 +323,33 @@ fn place(of: LightBounds) -> Option<Aabb> {
     }
 }
 
-/// Balls around mirrors and glass.
-fn targets(world: &World) -> Vec<Ball> {
-    let specular = |(id, object): (u32, &Object)| {
-        let material = world.material_index(&Hit { shape: ShapeHit::at(0.0), object: id });
-        match &world.materials[material].bsdf {
-            Bsdf::Phong(_) => None,
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => object.ball(),
+/// Mirrors and glass.
+struct Specular {
+    /// Around those that have bounds.
+    balls: Vec<Ball>,
+    /// Whether others exist.
+    is_unbounded: bool,
+}
+
+impl Specular {
+    fn of(world: &World) -> Self {
+        let mut own = Self { balls: Vec::new(), is_unbounded: false };
+        for (id, object) in (0..).zip(world.geometry.objects()) {
+            let is_specular = |material: &Material| match material.bsdf {
+                Bsdf::Phong(_) => false,
+                Bsdf::Mirror(_) | Bsdf::Glass(_) => true,
+            };
+            if world.materials_of(id).any(is_specular) {
+                own.balls.extend(object.ball());
+                own.is_unbounded |= object.ball().is_none();
+            }
         }
-    };
-    (0..).zip(world.geometry.objects()).filter_map(specular).collect()
+        own
+    }
+
+    fn exists(&self) -> bool {
+        self.is_unbounded || !self.balls.is_empty()
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! Photons on their way: from the lights over all surfaces, round by round, sixteen at a time, by the surfaces, media and lobes that
-//! paths from the eye meet.
+//! Photons on their way: from the lights over mirrors and glass to the first other surface, and thrown back from there to the next
+//! one, round by round, sixteen at a time, by the surfaces, media and lobes that paths from the eye meet.
 //!
 //! What is carried is basic flux, Φ/n². At a surface whose shading normal Nₛ is not that of its facet N₉ what goes on from there is
 //! what the adjoint of its BSDF says: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*,
@@ -17,16 +17,17 @@ use super::super::specular::{Interface, interface, reflected};
 use super::super::vertices::{LitVertex, Vertex};
 use super::super::view::Measure;
 use super::super::{PACKET, RayCounters};
-use super::map::{Photon, Way};
+use super::map::Photon;
 use crate::control::Cancelled;
-use crate::geometry::Ray;
+use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::lanes;
+use crate::geometry::{Ray, SurfacePoint};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::Bsdf;
 use crate::math::Vec3;
 use crate::math::lanes::set_lane;
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
-use crate::world::{Hit, Loops};
+use crate::world::{Hit, Loops, World};
 
 /// Surfaces where the glass stays the same that a photon passes at once.
 const MOST_HIDDEN: usize = 64;
@@ -40,7 +41,7 @@ pub struct Shooting<'a> {
     pub shot: &'a Shot<'a>,
     /// What the lights send.
     pub emission: &'a PhotonSource,
-    /// The closed shapes of glass, with their materials.
+    /// The closed shapes of glass that lights may be in, with their materials.
     pub glasses: &'a [Inside],
     /// One over the number of photons.
     pub share: f32,
@@ -51,8 +52,10 @@ pub struct Shooting<'a> {
 /// Photons of one part of a pass.
 #[derive(Default)]
 pub struct Shots {
-    /// What was stored, in the order of their numbers within each round.
-    pub photons: Vec<Photon>,
+    /// Those that came by mirrors and glass alone, in the order of their numbers within each round.
+    pub caustic: Vec<Photon>,
+    /// Those that were thrown back from such places, likewise.
+    pub bounced: Vec<Photon>,
     /// Texture look-ups.
     pub lookups: u64,
 }
@@ -94,6 +97,23 @@ impl Shooting<'_> {
         Ok(flight.shots)
     }
 
+    /// The ray of a photon from beyond all that has bounds, started where it meets the planes of glass that are on the way there; none
+    /// where something opaque is.
+    fn from_beyond(&self, ray: Ray) -> Option<Ray> {
+        let world = self.shot.world;
+        let mut start = ray.origin;
+        for _ in 0..MOST_HIDDEN {
+            let back = Ray::new(start, -ray.direction);
+            let Some(hit) = world.geometry.closest(&back) else {
+                return Some(Ray::new(start, ray.direction));
+            };
+            world.materials[world.material_index(&hit)].bsdf.glass()?;
+            let SurfacePoint { point, error, normal, .. } = world.geometry.surface(&back, &hit);
+            start = offset_origin(point, error, normal, back.direction);
+        }
+        None
+    }
+
     /// The glass around a point.
     fn medium_at(&self, point: Vec3) -> Medium {
         let world = self.shot.world;
@@ -129,25 +149,23 @@ impl Flight<'_> {
             let numbers = shot.world.geometry.instructions().run(Drawing { shot, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 let Some(emitted) = shooting.emission.emit(numbers) else { continue };
+                let from_beyond = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
-                if is_beyond(&emitted) && has_planes {
-                    let back = Ray::new(ray.origin, -ray.direction);
-                    if shot.world.geometry.closest(&back).is_some() {
-                        continue;
-                    }
-                }
-                let flux = emitted.flux * shooting.share;
+                let Some(ray) = (if from_beyond { shooting.from_beyond(ray) } else { Some(ray) }) else {
+                    continue;
+                };
                 let offset = begin as usize + i;
-                self.references[offset] = flux.max_element();
-                rays.push(PathRay {
+                let path = PathRay {
                     ray,
-                    throughput: flux,
+                    throughput: emitted.flux * shooting.share,
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
                     medium: shooting.medium_at(ray.origin),
                     history: History::CAMERA,
                     cone: Cone::default(),
-                });
+                };
+                self.references[offset] = flux(shot.world, &path);
+                rays.push(path);
             }
         }
     }
@@ -161,18 +179,19 @@ impl Flight<'_> {
     fn meet(&mut self, rays: &[PathRay], row: &mut LitRow) {
         let shot = self.shooting.shot;
         let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, true, row);
-        if self.depth == 0 {
-            // What comes straight throws no caustic.
-            row.seen = 0;
-        } else {
+        self.counters.texture_lookups += met.lookups;
+        // What comes straight is found by light samples.
+        if self.depth > 0 {
             for i in lanes(row.used) {
                 let (point, normal) = row.place_of(i);
                 self.store(&rays[i], point, normal);
             }
-        }
-        if self.goes_on() && row.used != 0 {
-            let onward = Onward { leads_on: true, is_risked: false };
-            Scattering { shot, row, used: row.used, onward }.scatter(&self.media, &[], &mut self.next);
+            row.keep(row.seen);
+            for i in lanes(row.used & row.apart) {
+                let counts = row.landed(i, -rays[i].ray.direction);
+                set_lane(&mut row.throughput, i, rays[i].throughput * counts);
+            }
+            self.scatter(row);
         }
         for i in lanes(met.any & !met.plain) {
             if let Some(hit) = met.hit(i) {
@@ -183,18 +202,10 @@ impl Flight<'_> {
 
     /// Keep a photon where it arrives.
     fn store(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
-        self.shots.photons.push(Photon {
-            point,
-            direction: -path.ray.direction,
-            flux: path.throughput,
-            normal,
-            depth: self.depth,
-            way: match path.history {
-                History { is_seen: true, .. } => Way::Caustic,
-                History { is_step: true, .. } => Way::Bounced,
-                History { .. } => Way::Other,
-            },
-        });
+        let (direction, flux) = (-path.ray.direction, path.throughput);
+        let photon = Photon { point, direction, flux, normal, depth: self.depth };
+        let kept = if path.history.is_seen { &mut self.shots.caustic } else { &mut self.shots.bounced };
+        kept.push(photon);
     }
 
     /// What a photon does at the first thing that is no mere change between parts of one glass.
@@ -230,9 +241,15 @@ impl Flight<'_> {
         let shot = self.shooting.shot;
         path.throughput *= absorption(shot.world, path.medium, distance);
         match &vertex.material.bsdf {
+            // What comes straight is found by light samples.
+            Bsdf::Phong(_) if is_direct => {}
             Bsdf::Phong(phong) => {
                 let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
                 if bsdf.is_black() {
+                    return;
+                }
+                self.store(&path, vertex.surface.point, vertex.normal);
+                if !(path.history.is_seen && self.goes_on()) {
                     return;
                 }
                 let shading = vertex.shading(&mut self.counters);
@@ -243,12 +260,6 @@ impl Flight<'_> {
                 }
                 if self.open.used == ALL {
                     self.scatter_open();
-                }
-                // Light samples find what comes straight, and it throws no caustic.
-                if is_direct {
-                    path.history.is_seen = false;
-                } else {
-                    self.store(&path, vertex.surface.point, vertex.normal);
                 }
                 let i = self.open.used.trailing_ones() as usize;
                 let lit = LitVertex { path: &path, place: 0, vertex, shading, bsdf };
@@ -306,24 +317,34 @@ impl Flight<'_> {
 
     /// Send photons on from the single vertices.
     fn scatter_open(&mut self) {
-        let shot = self.shooting.shot;
-        if self.goes_on() && self.open.used != 0 {
-            let onward = Onward { leads_on: true, is_risked: false };
-            let before = self.next.len();
-            Scattering { shot, row: &self.open, used: self.open.used, onward }.scatter(
-                &self.media,
-                &[],
-                &mut self.next,
-            );
-            for ray in &mut self.next[before..] {
-                let own = |i: &usize| self.open.slot[*i] == ray.slot;
-                if let Some(i) = lanes(self.open.used).find(own) {
-                    let counts = self.open.landed(i, ray.ray.direction);
-                    ray.throughput = if counts > 0.0 { ray.throughput / counts } else { Vec3::ZERO };
-                }
+        let mut open = std::mem::replace(&mut self.open, LitRow::EMPTY);
+        self.scatter(&open);
+        open.reset();
+        self.open = open;
+    }
+
+    /// Send photons on from the vertices of a row, which count by how they landed there.
+    fn scatter(&mut self, row: &LitRow) {
+        if !self.goes_on() || row.used == 0 {
+            return;
+        }
+        let onward = Onward { leads_on: true, is_risked: false };
+        let before = self.next.len();
+        Scattering { shot: self.shooting.shot, row, used: row.used, onward }.scatter(
+            &self.media,
+            &[],
+            &mut self.next,
+        );
+        if row.used & row.apart == 0 {
+            return;
+        }
+        for ray in &mut self.next[before..] {
+            let own = |i: &usize| row.slot[*i] == ray.slot;
+            if let Some(i) = lanes(row.used).find(own) {
+                let counts = row.landed(i, ray.ray.direction);
+                ray.throughput = if counts > 0.0 { ray.throughput / counts } else { Vec3::ZERO };
             }
         }
-        self.open.reset();
     }
 
     /// Roulette by flux: what is left has about the flux that it started with.
@@ -336,7 +357,7 @@ impl Flight<'_> {
                 shot.world.geometry.instructions().run(Risking { shot, rays: &self.next[begin..end] });
             for (place, risk) in (begin..end).zip(risks) {
                 let mut ray = self.next[place];
-                let flux = ray.throughput.max_element();
+                let flux = flux(shot.world, &ray);
                 let chance = flux / self.references[ray.slot as usize];
                 if !(flux > 0.0 && risk < chance) {
                     continue;
@@ -350,6 +371,12 @@ impl Flight<'_> {
         }
         self.next.truncate(kept);
     }
+}
+
+/// The largest part of the flux of a photon, in W: glass with a higher index of refraction changes what is carried, not that.
+fn flux(world: &World, path: &PathRay) -> f32 {
+    let index = ior(world, path.medium);
+    path.throughput.max_element() * index * index
 }
 
 fn is_beyond(emitted: &Emitted) -> bool {

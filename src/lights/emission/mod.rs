@@ -184,6 +184,11 @@ impl PhotonSource {
         Self { aim, ..self }
     }
 
+    /// A ball around all that has an end.
+    pub fn around(&self) -> Ball {
+        self.around
+    }
+
     /// What a light sends, in W.
     pub fn power_of(&self, light: u32) -> Vec3 {
         self.sources[light as usize].power
@@ -211,7 +216,9 @@ impl PhotonSource {
         let density = (1.0 - all) * of_light(&self.by_power) + aimed;
         let flux = (made.flux.as_dvec3() / density).as_vec3();
         let Made { start, direction, .. } = made;
-        Some(Emitted { light: number as u32, start, direction, flux, is_aimed: aim.is_some() })
+        let emitted = Emitted { light: number as u32, start, direction, flux, is_aimed: aim.is_some() };
+        // Nothing is sent into a direction of infinite density.
+        (flux != Vec3::ZERO).then_some(emitted)
     }
 
     /// A photon of one light, aimed at a target or not.

@@ -23,8 +23,13 @@ use crate::world::World;
 const MOST_KEPT_BYTES: usize = 128 << 20;
 /// Memory for maps that are in use at once beside those, unless one alone takes more.
 const MOST_ALIVE_BYTES: usize = 256 << 20;
-/// Passes in use at once.
-const MOST_ALIVE: u32 = 8;
+/// Passes in use at once: looks into one at a time find more of it in the processor's caches.
+const MOST_ALIVE: u32 = 1;
+/// Samples at once where no photons are sent.
+const MOST_WITHOUT: u32 = 4096;
+
+/// Why no photons are sent.
+const NOTHING_THROWS_LIGHT: &str = "no mirror or glass throws light";
 
 /// What the stage keeps: the photons of the last scene.
 pub(in crate::pipeline) type PhotonCache = Memo<PhotonStore>;
@@ -55,6 +60,7 @@ struct Sent {
     passes: u64,
     emitted: u64,
     stored: u64,
+    lookups: u64,
     seconds: f64,
     most_alive_bytes: usize,
 }
@@ -62,6 +68,9 @@ struct Sent {
 impl PhotonStore {
     /// Passes that may be in use at once, of the size of the first.
     pub(super) fn at_once(&self) -> u32 {
+        if !self.photons.are_sent() {
+            return MOST_WITHOUT;
+        }
         let size = self.kept.borrow().first().map_or(1, |pass| pass.memory_bytes().max(1));
         ((MOST_ALIVE_BYTES / size) as u32).clamp(1, MOST_ALIVE)
     }
@@ -80,19 +89,22 @@ impl PhotonStore {
     }
 
     fn pass(&self, number: u32, sending: Sending<'_>) -> Result<Arc<PhotonPass>, Cancelled> {
-        if let Some(pass) = self.kept.borrow().get(number as usize) {
+        let number_kept = if self.photons.are_sent() { number } else { 0 };
+        if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
         }
         let Sending { world, plan, pool, token, .. } = sending;
         let begin = Instant::now();
         let photons = &self.photons;
-        let pass = pool.install(|| photons.pass(world, &plan.settings, number, token))?;
+        let settings = plan.settings.heeded();
+        let pass = pool.install(|| photons.pass(world, &settings, number, token))?;
         let pass = Arc::new(pass);
         let sent = self.sent.get();
         self.sent.set(Sent {
             passes: sent.passes + 1,
             emitted: sent.emitted + pass.emitted,
             stored: sent.stored + pass.stored(),
+            lookups: sent.lookups + pass.lookups,
             seconds: sent.seconds + begin.elapsed().as_secs_f64(),
             ..sent
         });
@@ -110,16 +122,17 @@ impl PhotonStore {
 
     /// What was sent since the stage began, and what is kept.
     pub(in crate::pipeline) fn report(&self) -> PhotonsReport {
-        let Sent { passes, emitted, stored, seconds, most_alive_bytes } = self.sent.get();
-        let [caustic, _, all] = self.photons.radii();
+        let Sent { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
+        let [caustic, bounced] = self.photons.radii();
         PhotonsReport {
             passes,
             emitted,
             stored,
+            lookups,
             seconds,
             per_second: if seconds > 0.0 { emitted as f64 / seconds } else { 0.0 },
             caustic_radius: caustic,
-            radius: all,
+            bounced_radius: bounced,
             kept_memory_bytes: self.kept_bytes() as u64,
             used_memory_bytes: most_alive_bytes as u64,
         }
@@ -151,7 +164,10 @@ pub(in crate::pipeline) fn photons(
     let key = key(of_photons);
     if let Some(store) = cache.get(key) {
         store.sent.set(Sent::default());
-        return Ok(Staged::reused((), "nothing that they meet changed"));
+        return Ok(match store.photons.are_sent() {
+            true => Staged::reused((), "nothing that they meet changed"),
+            false => Staged::skipped((), NOTHING_THROWS_LIGHT),
+        });
     }
     let Sending { world, pool, token, .. } = sending;
     let begin = Instant::now();
@@ -159,10 +175,15 @@ pub(in crate::pipeline) fn photons(
         |progress: Progress<'_>| pool.install(|| Photons::new(world, &settings, of_photons, progress, token));
     let (photons, first) = sending.sink.asset("photons", send)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let sent =
-        Sent { passes: 1, emitted: first.emitted, stored: first.stored(), seconds, most_alive_bytes: 0 };
+    let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);
+    let sent = Sent { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
+    let are_sent = photons.are_sent();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
-    Ok(Staged::done((), ""))
+    Ok(if are_sent {
+        Staged::done((), "")
+    } else {
+        Staged::skipped((), "no light meets mirrors or glass first")
+    })
 }

@@ -148,16 +148,20 @@ impl<'a> Painter<'a> {
     /// All tiles that have fewer samples than `target`.
     fn pass(&mut self, target: u32) -> Result<(), Stop> {
         let Some(photons) = self.rendering.photons else { return self.pass_by(target, None) };
-        let Tracer { pool, world, token, .. } = self.rendering.tracer;
         while !self.canvas.is_complete(target) && !self.is_over_time {
             let samples = self.canvas.samples();
             let part = target.min(samples.saturating_add(photons.at_once()));
-            let Rendering { plan, sink, .. } = *self.rendering;
-            let sending = Sending { world, plan, pool, token, sink };
-            let maps = photons.maps(samples..part, sending)?;
+            let maps = photons.maps(samples..part, self.sending())?;
             self.pass_by(part, Some(&maps))?;
         }
         Ok(())
+    }
+
+    /// What passes of photons are sent by.
+    fn sending(&self) -> Sending<'_> {
+        let Rendering { plan, sink, tracer, .. } = *self.rendering;
+        let Tracer { pool, world, token, .. } = tracer;
+        Sending { world, plan, pool, token, sink }
     }
 
     fn pass_by(&mut self, target: u32, photons: Option<&PhotonMaps>) -> Result<(), Stop> {
@@ -261,6 +265,11 @@ impl<'a> Painter<'a> {
         let whole = Rect { x: 0, y: 0, width, height };
         let rect = plan.crop.map_or(whole, |rect| scale(rect, (full_width, full_height), (width, height)));
         let tracer = Tracer { settings: &settings, ..self.rendering.tracer };
+        let maps = match self.rendering.photons {
+            Some(photons) => Some(photons.maps(0..1, self.sending())?),
+            None => None,
+        };
+        let tracer = Tracer { photons: maps.as_ref(), ..tracer };
         let mut base = RadianceImage::black(width, height);
         tracer.run(
             &coarse_jobs(rect),
