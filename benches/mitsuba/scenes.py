@@ -17,7 +17,7 @@ class Scene:
     position: tuple
     look_at: tuple
     fov: float  # vertical
-    # name -> diffuse reflectance or the name of a picture, or (that, emitted radiance)
+    # name -> diffuse reflectance or the name of a picture, or (that, emitted radiance), or {"mirror": reflectance}, {"glass": ior}
     materials: dict
     max_depth: int = 1  # scatterings; 1: direct light, by the integrators that find no other
     aperture: float = 0.0  # radius of the lens
@@ -40,6 +40,11 @@ class Scene:
         if self.aperture > 0:
             lines.append(f"aperture = {self.aperture}\nfocus = {self.focus}")
         for name, material in self.materials.items():
+            if isinstance(material, dict):
+                [(kind, value)] = material.items()
+                value = f"reflectance = {[value] * 3}" if kind == "mirror" else f"ior = {value}"
+                lines.append(f'[materials.{name}]\ntype = "{kind}"\n{value}')
+                continue
             diffuse, emission = lobes(material)
             if isinstance(diffuse, str):
                 lines.append(f'[textures.{name}]\nfile = "{assets}/{diffuse}"')
@@ -98,6 +103,14 @@ class Scene:
         }
 
         def add(kind, number, shape, material):
+            scene[f"{kind}{number}"] = shape
+            match self.materials[material]:
+                case {"mirror": value}:
+                    shape["bsdf"] = {"type": "conductor", "material": "none", "specular_reflectance": rgb([value] * 3)}
+                    return
+                case {"glass": ior}:
+                    shape["bsdf"] = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0}
+                    return
             diffuse, emission = lobes(self.materials[material])
             if isinstance(diffuse, str):
                 # Its v = 0 is at the top row.
@@ -108,7 +121,6 @@ class Scene:
             shape["bsdf"] = {"type": "twosided", "b": {"type": "diffuse", "reflectance": reflectance}}
             if any(emission):
                 shape["emitter"] = {"type": "area", "radiance": rgb(emission)}
-            scene[f"{kind}{number}"] = shape
 
         for i, (corner, u, v, material) in enumerate(self.quads):
             corner, u, v = (np.array(x, dtype=float) for x in (corner, u, v))
@@ -166,6 +178,24 @@ BALLS = [
 PAINTS = {"floor": (0.6, 0.6, 0.6), "red": (0.7, 0.2, 0.15), "blue": (0.2, 0.3, 0.7), "gold": (0.7, 0.55, 0.2)}
 FLOOR = ([-10, 0, 10], [20, 0, 0], [0, 0, -20], "floor")
 DEPTH = 8
+
+# A mirror ball and a glass ball under a small lamp: for photons.
+CAUSTIC = Scene(
+    name="B caustic",
+    anchor=None,
+    max_depth=DEPTH,
+    spheres=[([-0.42, 0.42, -0.38], 0.42, "steel"), ([0.44, 0.36, 0.32], 0.36, "crystal")],
+    **{
+        **BOX,
+        "materials": {
+            **COLORS,
+            "lamp": ((0.8, 0.8, 0.8), (150.0, 137.0, 110.0)),
+            "steel": {"mirror": 0.92},
+            "crystal": {"glass": 1.5},
+        },
+        "quads": WALLS + [([-0.1, 1.98, -0.1], [0.2, 0, 0], [0, 0, 0.2], "lamp")],
+    },
+)
 
 SCENES = [
     Scene(name="A1 quad lamp", anchor=1.2e-5, boxes=BLOCKS, **BOX),

@@ -140,7 +140,7 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
         warning("--dof on has no effect: the scene's camera is a pinhole", help)
     });
     let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
-        let help = "`--integrator whitted` gathers photons; path finds the same light without";
+        let help = "`--integrator whitted` gathers photons";
         warning("--photons on has no effect: path gathers none", help)
     });
     dof.into_iter().chain(photons).collect()

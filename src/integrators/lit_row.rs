@@ -364,3 +364,29 @@ fn terminator(cosine: f32, smooth: f32, bend: f32) -> f32 {
     let soft = if bend > 0.0 { -g * g * g + g * g + g } else { 1.0 };
     if (smooth > 0.0) | (bend == UNBENT) { soft } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vertex_in_the_place_of_another_keeps_nothing_of_it() {
+        // All that is told by bits, of all vertices, also of those that are not used.
+        let noisy = LitRow {
+            used: ALL,
+            is_bounded: ALL,
+            may_lift: ALL,
+            apart: ALL,
+            seen: ALL,
+            from_gloss: ALL,
+            ..LitRow::EMPTY
+        };
+        let plain = LitRow { used: ALL, ..LitRow::EMPTY };
+        let mut row = noisy;
+        row.keep(0b11);
+        row.copy(2, &plain, 7);
+        row.copy(3, &LitRow { seen: 1 << 9, ..plain }, 9);
+        let bits = [row.used, row.is_bounded, row.may_lift, row.apart, row.seen, row.from_gloss];
+        assert_eq!(bits, [0b1111, 0b11, 0b11, 0b11, 0b1011, 0b11]);
+    }
+}

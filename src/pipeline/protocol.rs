@@ -358,7 +358,7 @@ pub struct LightsReport {
     pub count: u64,
     /// How many of them a surface samples where light falls on it.
     pub sampled: LightsSampled,
-    /// Lights that a vertex picks: 32 × `shadow_samples`; 0 without a tree.
+    /// Lights that a vertex picks: 32 × `shadow_samples` in whitted, 4 × in path; 0 without a tree.
     pub picks: u64,
     /// Nodes of the tree that it picks from.
     pub tree_nodes: u64,

@@ -83,12 +83,12 @@ impl Geometry {
         &self.tree
     }
 
-    /// The objects that have none.
     /// Whether any object has no end.
     pub fn has_unbounded(&self) -> bool {
         !self.unbounded.is_empty()
     }
 
+    /// The objects that have none.
     pub(super) fn unbounded(&self) -> &[u32] {
         &self.unbounded
     }

@@ -216,16 +216,25 @@ mod tests {
         let mut next = random(5);
         for count in [0, 1, 2, 3, 17, 3000] {
             for radius in [1e-3_f32, 0.05, 0.4, 30.0] {
-                let mut place = || {
+                let place = |next: &mut dyn FnMut() -> f32| {
                     let point = Vec3::new(next(), next(), 0.1 * next()) * 3.0;
                     let normal = if next() > 0.0 { Vec3::Z } else { Vec3::new(0.6, 0.0, 0.8) };
                     (point, normal)
                 };
-                let photons: Vec<Photon> = (0..count).map(|_| place()).map(|(p, n)| photon(p, n)).collect();
+                let photons: Vec<Photon> =
+                    (0..count).map(|_| place(&mut next)).map(|(p, n)| photon(p, n)).collect();
                 let map = PhotonMap::new(&photons, radius, &CancelToken::new()).expect("nobody cancels");
                 assert_eq!(map.len(), count);
-                for _ in 0..60 {
-                    let (point, normal) = place();
+                let mut seen = 0;
+                for look in 0..60 {
+                    let (point, normal) = match photons.get(7 * look) {
+                        // Near one of them.
+                        Some(photon) => (
+                            photon.point + 0.1 * radius * Vec3::new(next(), next(), 0.1 * next()),
+                            photon.normal,
+                        ),
+                        None => place(&mut next),
+                    };
                     let mut found = Vec::new();
                     map.visit((point, normal), 1, |photon, density| {
                         found.push((photon.point.to_array(), density));
@@ -243,12 +252,14 @@ mod tests {
                     points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
                     expected.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
                     assert!(points.len().abs_diff(expected.len()) <= 1, "but for rounding at the edge");
+                    seen += expected.len();
                     let peak = 2.0 / (std::f32::consts::PI * radius * radius);
                     assert!(found.iter().all(|(_, density)| *density >= 0.0 && *density <= peak));
                     points.dedup();
                     assert_eq!(points.len(), found.len(), "each once");
                     assert!(points.iter().filter(|point| !expected.contains(point)).count() <= 1);
                 }
+                assert!(seen >= count.min(60) / 8, "{seen} of {count} are found within {radius}");
             }
         }
     }

@@ -7,7 +7,7 @@
 
 use super::super::cone::Cone;
 use super::super::crossing::{Crossing, CrossingMemory};
-use super::super::lit_row::{ALL, LitRow};
+use super::super::lit_row::{ALL, LitRow, UNBENT};
 use super::super::medium::{Inside, Medium, absorption, ior};
 use super::super::onward::{Onward, Scattering};
 use super::super::packet::Rays;
@@ -25,7 +25,7 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::Bsdf;
 use crate::math::Vec3;
-use crate::math::lanes::set_lane;
+use crate::math::lanes::{lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
 use crate::world::{Hit, Loops, World};
 
@@ -318,33 +318,24 @@ impl Flight<'_> {
     /// Send photons on from the single vertices.
     fn scatter_open(&mut self) {
         let mut open = std::mem::replace(&mut self.open, LitRow::EMPTY);
-        self.scatter(&open);
+        self.scatter(&mut open);
         open.reset();
         self.open = open;
     }
 
-    /// Send photons on from the vertices of a row, which count by how they landed there.
-    fn scatter(&mut self, row: &LitRow) {
+    /// Send photons on from the vertices of a row: directions are drawn by the cosine with the facet, which is that of the adjoint.
+    fn scatter(&mut self, row: &mut LitRow) {
         if !self.goes_on() || row.used == 0 {
             return;
         }
+        for i in lanes(row.used & row.apart) {
+            let facet = lane(&row.facet, i);
+            set_lane(&mut row.normal, i, facet);
+            row.bend[i] = UNBENT;
+        }
         let onward = Onward { leads_on: true, is_risked: false };
-        let before = self.next.len();
-        Scattering { shot: self.shooting.shot, row, used: row.used, onward }.scatter(
-            &self.media,
-            &[],
-            &mut self.next,
-        );
-        if row.used & row.apart == 0 {
-            return;
-        }
-        for ray in &mut self.next[before..] {
-            let own = |i: &usize| row.slot[*i] == ray.slot;
-            if let Some(i) = lanes(row.used).find(own) {
-                let counts = row.landed(i, ray.ray.direction);
-                ray.throughput = if counts > 0.0 { ray.throughput / counts } else { Vec3::ZERO };
-            }
-        }
+        let used = row.used;
+        Scattering { shot: self.shooting.shot, row, used, onward }.scatter(&self.media, &[], &mut self.next);
     }
 
     /// Roulette by flux: what is left has about the flux that it started with.

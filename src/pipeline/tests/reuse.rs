@@ -139,7 +139,10 @@ fn a_scene_without_files_says_why_stages_are_skipped() {
 fn photons_are_sent_again_only_where_what_they_meet_changed() {
     // What stands in for them where they are off shows that they are.
     let text = SCENE.replace("exposure = 0.0", "exposure = 0.0\nambient = 0.3");
-    let mut bench = Bench::new(&format!("{text}[photons]\nenabled = true\ncount = 500\n"));
+    let mirror = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n";
+    let steel = "[materials.steel]\ntype = \"mirror\"\n";
+    let on = "[photons]\nenabled = true\ncount = 500\n";
+    let mut bench = Bench::new(&format!("{text}{mirror}{steel}{on}"));
     let of = |report: &Report| report.photons.expect("they are on");
     let report = bench.done().0;
     assert_statuses(&report, "dddddddd");
@@ -170,6 +173,36 @@ fn photons_are_sent_again_only_where_what_they_meet_changed() {
     bench.overrides.photons = None;
     assert_statuses(&bench.done().0, "rrrrrrrd");
     assert_eq!(bench.picture(), on, "its film was kept");
+}
+
+#[test]
+fn photons_are_skipped_where_nothing_throws_them() {
+    let mut bench = Bench::new(&format!("{SCENE}[photons]\nenabled = true\n"));
+    for (expected, next) in [("dddddsdd", "[0, 1.5, 4]"), ("drrrrsdd", "[0, 1, 4]")] {
+        let report = bench.done().0;
+        assert_statuses(&report, expected);
+        assert!(report.settings.photons);
+        assert_eq!(report.counters.photons_emitted, 0);
+        bench.edit("position = [0, 1", &format!("position = {next} # [0, 1"));
+    }
+}
+
+#[test]
+fn photons_that_are_sent_later_are_those_of_a_fresh_render() {
+    // `ambient` is ignored with photons: neither what is stored nor the film may depend on it.
+    let ambient =
+        |value: &str| SCENE.replace("exposure = 0.0", &format!("exposure = 0.0\nambient = {value}"));
+    let glass = "[[sphere]]\ncenter = [0.7, 1, 1]\nradius = 0.4\nmaterial = \"clear\"\n[materials.clear]\ntype = \"glass\"\n";
+    let on = "[photons]\nenabled = true\ncount = 2000\nradius = 0.2\n";
+    let text = |value: &str| format!("{}{glass}{on}", ambient(value));
+    let mut bench = Bench::new(&text("0.0"));
+    bench.done();
+    bench.edit("ambient = 0.0", "ambient = 0.3");
+    bench.edit("position = [0, 1, 4]", "position = [0, 1.5, 4]");
+    bench.done();
+    let mut fresh = Bench::new(&text("0.3").replace("position = [0, 1, 4]", "position = [0, 1.5, 4]"));
+    fresh.done();
+    assert_eq!(bench.picture(), fresh.picture());
 }
 
 #[test]

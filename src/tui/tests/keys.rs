@@ -48,7 +48,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             }
             desk.press('i');
             assert!(desk.key(key).is_empty(), "path has none");
-            assert!(desk.text().contains("path finds all light without photons"), "{}", desk.text());
+            assert!(desk.text().contains("path gathers no photons; press i for whitted"), "{}", desk.text());
         }
         Action::CycleIntegrator => {
             for wanted in [Integrator::Path, Integrator::Whitted] {

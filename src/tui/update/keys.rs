@@ -96,7 +96,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
     match state.integrator() {
         Integrator::Path => {
-            return told(state, "path finds all light without photons; i is whitted");
+            return told(state, "path gathers no photons; press i for whitted");
         }
         Integrator::Whitted => {}
     }
