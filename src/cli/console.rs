@@ -1,7 +1,9 @@
-//! What is said on stderr and stdout outside of the terminal UI. Nothing said here can fail: who closed the pipe does
-//! not read. Every text is made harmless before it is shown.
+//! What is said on stderr and stdout outside of the terminal UI. Nothing said on stderr can fail: who closed the pipe does
+//! not read. Answers on stdout can, where the disk is full. Every text is made harmless before it is shown.
 
-use std::io::{IsTerminal, Write};
+use std::cell::RefCell;
+use std::io::{self, IsTerminal, Write};
+use std::rc::Rc;
 
 use super::exit::Exit;
 use crate::scene::diagnostic::Diagnostic;
@@ -10,10 +12,12 @@ use crate::scene::sanitize::visible;
 use crate::tui::ColorChoice;
 
 /// The two streams.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Console {
     style: Style,
     pub(super) is_terminal: bool,
+    /// Why an answer did not get through.
+    lost: Rc<RefCell<Option<io::Error>>>,
 }
 
 /// Columns where stderr is no terminal.
@@ -29,7 +33,8 @@ impl Console {
             ColorChoice::Auto => is_terminal && !is_set("NO_COLOR") && !is_dumb,
             ColorChoice::TrueColor | ColorChoice::Indexed256 | ColorChoice::Ansi16 => true,
         };
-        Self { style: if colored { Style::Ansi } else { Style::Plain }, is_terminal: is_terminal && !is_dumb }
+        let style = if colored { Style::Ansi } else { Style::Plain };
+        Self { style, is_terminal: is_terminal && !is_dumb, lost: Rc::default() }
     }
 
     /// A line on stderr; a line end within the text becomes visible.
@@ -40,12 +45,32 @@ impl Console {
 
     /// A line on stdout.
     pub(super) fn answer(&self, text: &str) {
-        let _ = writeln!(std::io::stdout().lock(), "{}", visible(text));
+        self.text(&format!("{}\n", visible(text)));
     }
 
     /// A text of our own on stdout, as it is.
     pub(super) fn text(&self, text: &str) {
-        let _ = std::io::stdout().lock().write_all(text.as_bytes());
+        let mut stdout = std::io::stdout().lock();
+        self.note(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()));
+    }
+
+    /// Note whether something went to stdout.
+    pub(super) fn note(&self, written: io::Result<()>) {
+        match written {
+            // Who closed the pipe has read enough.
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => *self.lost.borrow_mut() = Some(error),
+            Ok(()) | Err(_) => {}
+        }
+    }
+
+    /// How the program ends: it failed where an answer did not get through.
+    pub(super) fn end(&self, exit: Exit) -> Exit {
+        match self.lost.take() {
+            Some(error) if exit == Exit::DONE => {
+                self.fail(Exit::FAILED, &format!("the answer cannot be written to stdout: {error}"))
+            }
+            Some(_) | None => exit,
+        }
     }
 
     /// `error: …` on stderr.

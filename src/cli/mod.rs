@@ -15,6 +15,7 @@ mod progress;
 mod signals;
 
 use std::ffi::OsString;
+use std::io::{self, Write};
 
 use clap::Parser;
 
@@ -32,7 +33,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Err(error) => return misunderstood(&error, &arguments),
     };
     let console = Console::new(args.color());
-    match args.command {
+    let exit = match args.command {
         Some(Subcommand::Check { scene, sets, .. }) => check::run(&scene, &sets, &console),
         Some(Subcommand::New { file }) => new::run(&file, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
@@ -41,16 +42,16 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
             Ok(order) => live::run(order, &console),
             Err(message) => console.fail(Exit::WRONG, &message),
         },
-    }
+    };
+    console.end(exit)
 }
 
 /// Help and the version are answers; everything else is a wrong call.
 fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
     let console = Console::new(crate::tui::ColorChoice::Auto);
     if !error.use_stderr() {
-        // A closed pipe: nobody reads the help.
-        let _ = error.print();
-        return Exit::DONE;
+        console.note(error.print().and_then(|()| io::stdout().flush()));
+        return console.end(Exit::DONE);
     }
     if let Some(second) = second_scene(error) {
         let message = format!("{second:?} is one scene too many: glimt renders one at a time");

@@ -32,7 +32,7 @@ pub(super) trait Reporter {
 pub(super) fn reporter(progress: Progress, console: &Console) -> Box<dyn Reporter> {
     match progress {
         Progress::Auto if console.is_terminal => Box::new(bars::Bars::new()),
-        Progress::Auto | Progress::Plain => Box::new(plain::Plain::new(*console)),
+        Progress::Auto | Progress::Plain => Box::new(plain::Plain::new(console.clone())),
         Progress::Json => Box::new(json::Json),
         Progress::None => Box::new(Silent),
     }

@@ -106,6 +106,9 @@ pub(super) fn warnings(scene: &Scene, settings: &RenderSettings) -> Vec<String> 
                 .to_owned(),
         );
     }
+    if photons.is_none() && settings.view == View::Photons {
+        warnings.push("the view `photons` shows nothing: photons are off, or `path` renders".to_owned());
+    }
     if photons.is_some() && scene.photons.count > MOST_PHOTONS {
         warnings.push(format!(
             "a pass sends {MOST_PHOTONS} photons at most, for their memory: `count` is larger"

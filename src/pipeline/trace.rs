@@ -22,7 +22,7 @@ pub(super) type Kernel = fn(
 ) -> Result<(TileSamples, RayCounters), Cancelled>;
 
 /// The longest time without a tick.
-const TICK: Duration = Duration::from_millis(20);
+pub(super) const TICK: Duration = Duration::from_millis(20);
 
 /// Everything that is the same for all tiles.
 #[derive(Clone, Copy)]

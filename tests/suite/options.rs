@@ -358,3 +358,17 @@ fn all_trees_give_the_same_picture_of_every_scene_with_meshes() {
         assert!(boxes == planes && boxes == pieces, "{scene}");
     }
 }
+
+#[test]
+fn an_answer_that_finds_no_room_is_an_error() {
+    let desk = Desk::new();
+    for line in ["--help", "--version", "new -", "check ball.toml"] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("the device");
+        let mut process = std::process::Command::new(assert_cmd::cargo::cargo_bin("glimt"));
+        process.current_dir(desk.0.path()).args(line.split_whitespace()).stdout(full);
+        let output = process.output().expect("it runs");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
+        assert!(stderr.contains("cannot be written to stdout: No space left"), "{line}: {stderr}");
+    }
+}

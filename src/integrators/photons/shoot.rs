@@ -99,7 +99,7 @@ impl Shooting<'_> {
 
     /// The ray of a photon from beyond all that has bounds, started where it meets the planes of glass that are on the way there; none
     /// where something opaque is.
-    fn from_beyond(&self, ray: Ray) -> Option<Ray> {
+    fn past_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.shot.world;
         let mut start = ray.origin;
         for _ in 0..MOST_HIDDEN {
@@ -149,9 +149,9 @@ impl Flight<'_> {
             let numbers = shot.world.geometry.instructions().run(Drawing { shot, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 let Some(emitted) = shooting.emission.emit(numbers) else { continue };
-                let from_beyond = is_beyond(&emitted) && has_planes;
+                let past_planes = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
-                let Some(ray) = (if from_beyond { shooting.from_beyond(ray) } else { Some(ray) }) else {
+                let Some(ray) = (if past_planes { shooting.past_planes(ray) } else { Some(ray) }) else {
                     continue;
                 };
                 let offset = begin as usize + i;

@@ -5,6 +5,7 @@
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Instant;
 
 use rayon::ThreadPool;
@@ -13,6 +14,7 @@ use super::super::cache::Memo;
 use super::super::plan::Plan;
 use super::super::protocol::PhotonsReport;
 use super::super::sink::Sink;
+use super::super::trace::TICK;
 use super::Staged;
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons};
@@ -75,20 +77,31 @@ impl PhotonStore {
         ((MOST_ALIVE_BYTES / size) as u32).clamp(1, MOST_ALIVE)
     }
 
-    /// The maps of some samples.
+    /// The maps of some samples; `tick` is called every now and then.
     ///
     /// # Errors
     /// Cancelled.
-    pub(super) fn maps(&self, samples: Range<u32>, sending: Sending<'_>) -> Result<PhotonMaps, Cancelled> {
+    pub(super) fn maps(
+        &self,
+        samples: Range<u32>,
+        sending: Sending<'_>,
+        mut tick: impl FnMut(),
+    ) -> Result<PhotonMaps, Cancelled> {
         let first = samples.start;
-        let passes = samples.map(|number| self.pass(number, sending)).collect::<Result<Vec<_>, _>>()?;
+        let pass = |number| self.pass(number, sending, &mut tick);
+        let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
         let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
         let sent = self.sent.get();
         self.sent.set(Sent { most_alive_bytes: sent.most_alive_bytes.max(bytes), ..sent });
         Ok(PhotonMaps { first, passes })
     }
 
-    fn pass(&self, number: u32, sending: Sending<'_>) -> Result<Arc<PhotonPass>, Cancelled> {
+    fn pass(
+        &self,
+        number: u32,
+        sending: Sending<'_>,
+        tick: &mut impl FnMut(),
+    ) -> Result<Arc<PhotonPass>, Cancelled> {
         let number_kept = if self.photons.are_sent() { number } else { 0 };
         if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
@@ -97,7 +110,7 @@ impl PhotonStore {
         let begin = Instant::now();
         let photons = &self.photons;
         let settings = plan.settings.heeded();
-        let pass = pool.install(|| photons.pass(world, &settings, number, token))?;
+        let pass = ticking(pool, tick, || photons.pass(world, &settings, number, token))?;
         let pass = Arc::new(pass);
         let sent = self.sent.get();
         self.sent.set(Sent {
@@ -137,6 +150,26 @@ impl PhotonStore {
             used_memory_bytes: most_alive_bytes as u64,
         }
     }
+}
+
+/// Do work in a pool, and `tick` on this thread.
+fn ticking<T: Send>(
+    pool: &ThreadPool,
+    tick: &mut impl FnMut(),
+    work: impl FnOnce() -> Result<T, Cancelled> + Send,
+) -> Result<T, Cancelled> {
+    let (sender, result) = mpsc::sync_channel(1);
+    pool.in_place_scope(|scope| {
+        // Its receiver is there until the result is.
+        scope.spawn(move |_| drop(sender.send(work())));
+        loop {
+            match result.recv_timeout(TICK) {
+                Ok(result) => return result,
+                Err(RecvTimeoutError::Timeout) => tick(),
+                Err(RecvTimeoutError::Disconnected) => return Err(Cancelled),
+            }
+        }
+    })
 }
 
 /// Make the first maps for a picture that gathers photons. `wanted` is what the command line says, `enabled` what the scene says.

@@ -4,6 +4,7 @@
 //! and both give the bits of an uninterrupted one, because every sample is a function of its pixel and number and
 //! every pixel's sum has the order of its samples.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -151,17 +152,25 @@ impl<'a> Painter<'a> {
         while !self.canvas.is_complete(target) && !self.is_over_time {
             let samples = self.canvas.samples();
             let part = target.min(samples.saturating_add(photons.at_once()));
-            let maps = photons.maps(samples..part, self.sending())?;
+            // Photons that no time is left for are not sent, nor gathered.
+            self.tick();
+            if self.is_over_time {
+                break;
+            }
+            let maps = self.maps(photons, samples..part)?;
+            if self.is_over_time {
+                break;
+            }
             self.pass_by(part, Some(&maps))?;
         }
         Ok(())
     }
 
-    /// What passes of photons are sent by.
-    fn sending(&self) -> Sending<'_> {
+    /// The photons of some samples; orders are heard while they are sent.
+    fn maps(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
         let Rendering { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
-        Sending { world, plan, pool, token, sink }
+        Ok(photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?)
     }
 
     fn pass_by(&mut self, target: u32, photons: Option<&PhotonMaps>) -> Result<(), Stop> {
@@ -266,7 +275,7 @@ impl<'a> Painter<'a> {
         let rect = plan.crop.map_or(whole, |rect| scale(rect, (full_width, full_height), (width, height)));
         let tracer = Tracer { settings: &settings, ..self.rendering.tracer };
         let maps = match self.rendering.photons {
-            Some(photons) => Some(photons.maps(0..1, self.sending())?),
+            Some(photons) => Some(self.maps(photons, 0..1)?),
             None => None,
         };
         let tracer = Tracer { photons: maps.as_ref(), ..tracer };

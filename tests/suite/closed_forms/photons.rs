@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use glimt::control::{CancelToken, unwatched};
 use glimt::film::Rect;
-use glimt::integrators::{PhotonMap, PhotonMaps, PhotonSettings, Photons, View, render_tile_by};
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::math::{DVec3, vec3};
+use glimt::integrators::{PhotonMap, PhotonMaps, PhotonSettings, Photons, View, render_tile_by};
+use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Falloff, Shape};
 
 use super::distant::sun;
@@ -177,8 +177,13 @@ fn photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass() {
 fn smooth_meshes_throw_back_what_photons_bring_as_paths_see_it() {
     // A wall whose normals are bent to the floor, where about half of the light arrives that the facets would throw there.
     let wall = TriangleMesh {
-        positions: vec![vec3(-1.0, 0.0, -0.5), vec3(1.0, 0.0, -0.5), vec3(1.0, 2.0, -0.5), vec3(-1.0, 2.0, -0.5)],
-        normals: vec![vec3(0.0, -0.6, 0.8); 4],
+        positions: vec![
+            Vec3::new(-1.0, 0.0, -0.5),
+            Vec3::new(1.0, 0.0, -0.5),
+            Vec3::new(1.0, 2.0, -0.5),
+            Vec3::new(-1.0, 2.0, -0.5),
+        ],
+        normals: vec![Vec3::new(0.0, -0.6, 0.8); 4],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         ..TriangleMesh::default()
     };
@@ -188,11 +193,11 @@ fn smooth_meshes_throw_back_what_photons_bring_as_paths_see_it() {
         .quad(v(-1.0, 0.0, 1.5), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.8))
         .sphere(v(0.0, 1.6, 0.9), 0.4, emitter(3.0))
         .sphere(v(0.0, 1.6, 0.9), 0.5, glass(1.5))
-        .pictured(v(0.0, 1.0, 3.0), v(0.0, 0.0, 0.4), 20.0, 16, 16)
+        .pictured(v(0.0, 1.0, 3.0), v(0.0, 0.0, 0.6), 8.0, 16, 16)
         .viewed(View::Indirect);
-    let [(a, da), (b, db)] = both(&build.depth(3), 3, [256, 16], (5000, 0.03));
+    let [(a, da), (b, db)] = both(&build.depth(3), 3, [512, 16], (10_000, 0.2));
     let error = da.hypot(db);
-    assert!(error < 1.5e-2 * a, "{error} of {a}");
+    assert!(error < 2.5e-2 * a, "{error} of {a}");
     assert!((a - b).abs() < 4.0 * error, "{b} ± {db}, by paths {a} ± {da}");
 }
 
