@@ -91,6 +91,11 @@ impl Met {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
     }
 
+    /// The object that a ray hits; none has this number where it hits nothing.
+    pub fn object(&self, lane: usize) -> u32 {
+        self.object[lane]
+    }
+
     /// One of the rays.
     pub fn path(&self, shot: &Shot<'_>, rays: &Rays<'_>, lane: usize) -> PathRay {
         match rays {

@@ -10,7 +10,7 @@ use super::crossing::{Crossing, CrossingMemory};
 use super::lit_queue::LitQueue;
 use super::medium::{Medium, absorption};
 use super::onward::Onward;
-use super::packet::Rays;
+use super::packet::{Met, Rays};
 use super::queues::{PathRay, Queues};
 use super::shot::Shot;
 use super::sink::{Part, Sink};
@@ -18,10 +18,11 @@ use super::specular::{Interface, interface, reflected};
 use super::vertices::{LitVertex, Vertex};
 use super::view::Measure;
 use crate::control::Cancelled;
-use crate::geometry::rows::lanes;
+use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::{Ray, ShapeHit};
 use crate::materials::{Bsdf, Mirror, Phong};
 use crate::math::Vec3;
+use crate::math::lanes::lane as lane_of;
 use crate::sampling::Decision;
 use crate::scene::description::{Integrator, Shadows};
 use crate::world::{Hit, PACKET};
@@ -167,10 +168,14 @@ impl Wave<'_, '_> {
         }
         let render = &shot.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
-        let mut wanted = (met.any & !met.plain) | met.shining;
-        wanted |= if render.ambient == Vec3::ZERO { 0 } else { met.plain };
+        let plain = if render.ambient == Vec3::ZERO { met.shining } else { met.plain };
         let is_dark_beyond = render.background == Vec3::ZERO && !shot.world.lights.are_beyond();
-        wanted |= if is_dark_beyond { 0 } else { all & !met.any };
+        let beyond = if is_dark_beyond { 0 } else { all & !met.any };
+        let mut wanted = met.any & !met.plain;
+        match rays {
+            Rays::Camera(row, first, ..) => self.add_seen(&row.rays, first, &met, (plain, beyond)),
+            Rays::Paths(..) | Rays::Traced(..) => wanted |= plain | beyond,
+        }
         // In the order of the paths: what a sample gets by several is added in that.
         for lane in lanes(wanted) {
             let (of_camera, bit) = (rays.camera_path(shot, lane), 1 << lane);
@@ -197,6 +202,35 @@ impl Wave<'_, '_> {
     fn add_work(&mut self, path: &PathRay, hit: Option<Hit>) {
         let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
         self.sink.add_work(path.slot, self.shot.world.geometry.work(&Ray { t_max, ..path.ray }));
+    }
+
+    /// What the rays of the camera see by themselves: plain surfaces, and what is beyond everything. Each is all that its sample gets
+    /// before lamps.
+    fn add_seen(&mut self, rays: &RayRows, first: u32, met: &Met, (plain, beyond): (u32, u32)) {
+        let shot = self.shot;
+        let render = &shot.settings.render;
+        let mut known = None;
+        for lane in lanes(plain) {
+            let object = met.object(lane);
+            if known.is_none_or(|(own, _)| own != object) {
+                known = shot.plain_phong(object).map(|plain| (object, plain));
+            }
+            let Some((_, (material, phong))) = known else { continue };
+            let slot = first + lane as u32;
+            if met.shining & 1 << lane != 0 {
+                self.sink.add(slot, Part::Emitted, material.emission.scale);
+            }
+            if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
+                let Some(bsdf) = phong.constant() else { continue };
+                self.sink.add(slot, Part::Ambient, render.ambient * bsdf.ambient);
+            }
+        }
+        let lights = &shot.world.lights;
+        for lane in lanes(beyond) {
+            let sky = lights.environment().map(|_| met.sky(lane));
+            let beyond = lights.beyond_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
+            self.sink.add(first + lane as u32, Part::Emitted, render.background + beyond);
+        }
     }
 
     /// What a plain surface sends to the eye by itself.
