@@ -79,6 +79,17 @@ struct Taking<'a> {
 impl PickRow {
     const NOTHING: Self = Self { lights: [0; LANES], shares: [0.0; LANES], weighed: [0.0; LANES] };
 
+    /// Make shares of probabilities, 0 where there are none.
+    #[inline(always)]
+    fn invert(&mut self, count: f32, is_weighed: bool) {
+        for i in 0..LANES {
+            let is_picked = self.shares[i] > 0.0;
+            let [share, weighed] = [self.shares[i], self.weighed[i]].map(|share| 1.0 / (share * count));
+            self.shares[i] = if is_picked { share } else { 0.0 };
+            self.weighed[i] = if is_picked & is_weighed { weighed } else { 0.0 };
+        }
+    }
+
     /// The lights, and a bit for each vertex that picked one. The others look at a light as well, which counts nothing.
     #[inline(always)]
     fn lights(&self) -> ([u32; LANES], u32) {
@@ -109,11 +120,16 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         for k in first..end {
             let u = sampler.pairs(&row.path, Decision::Pick, k, count);
             let place = (k - first) as usize / group * group;
+            // One of each group is in each part of [0, 1): so they are sorted. Both numbers of a pair are the digits of one:
+            // a light among many has a small share.
+            let (mut parts, mut digits) = ([0; LANES], [0.0; LANES]);
             for i in 0..LANES {
-                // One of each group is in each part of [0, 1): so they are sorted. Both numbers of a pair are the digits of one:
-                // a light among many has a small share.
-                let part = (u[0][i] * group as f32) as usize % group;
-                numbers[place + part][i] = f64::from(u[0][i]) + f64::from(u[1][i]) * DIGITS;
+                let part = (u[0][i] * way.count as f32) as i32 as u32;
+                parts[i] = if part < way.count { part } else { way.count - 1 };
+                digits[i] = f64::from(u[0][i]) + f64::from(u[1][i]) * DIGITS;
+            }
+            for i in 0..LANES {
+                numbers[place + parts[i] as usize][i] = digits[i];
             }
         }
         let mut picks = vec![PickRow::NOTHING; numbers.len()];
@@ -127,16 +143,18 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 &*without
             });
             for (numbers, picks) in numbers.chunks(group).zip(picks.chunks_mut(group)) {
-                cut.pick(numbers.iter().map(|row| row[i]), |place, pick| {
+                cut.pick(numbers.iter().map(|row| row[i]), |place, light, probability| {
                     let row = &mut picks[place];
-                    row.lights[i] = pick.light;
-                    row.shares[i] = 1.0 / (pick.probability * count as f32);
-                    row.weighed[i] = match without {
-                        Some(without) => 1.0 / (without.probability(pick.light) * count as f32),
-                        None => row.shares[i],
-                    };
+                    row.lights[i] = light;
+                    row.shares[i] = probability;
+                    if WEIGHED {
+                        row.weighed[i] = without.map_or(probability, |without| without.probability(light));
+                    }
                 });
             }
+        }
+        for row in &mut picks {
+            row.invert(count as f32, WEIGHED);
         }
         picks
     }

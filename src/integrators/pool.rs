@@ -25,7 +25,13 @@ pub struct Pool {
     rows: Vec<Pooled>,
     /// The light's place in the tree of each ray, and its own row and lane.
     order: Vec<(u32, u32)>,
+    /// Rows and lanes of the rays, put together by places.
+    sorted: Vec<u32>,
 }
+
+/// Runs of places that rays are put together by, at most.
+const RUNS: usize = 1 << RUN_BITS;
+const RUN_BITS: u32 = 11;
 
 impl Pool {
     /// Rows of rays from which on they are traced before more come, while they are in the cache.
@@ -53,14 +59,36 @@ impl Pool {
 
     /// Trace all rays and forget them; what arrives is added to the sums of the rows, in the order in which rays came.
     pub(super) fn trace(&mut self, geometry: &Geometry, sums: &mut [Sums]) {
-        // Rays are not equal: the order is one.
-        self.order.sort_unstable();
-        let Self { rows, order } = self;
-        geometry.instructions().run(Tracing { geometry, rows, order });
+        if self.rows.is_empty() {
+            return;
+        }
+        self.sort();
+        let Self { rows, sorted, .. } = self;
+        geometry.instructions().run(Tracing { geometry, rows, rays: sorted });
         for Pooled { row, traced, values, .. } in &*rows {
             add_where(*traced, values, &mut sums[*row as usize].light);
         }
         self.clear();
+    }
+
+    /// Put together rays to runs of places that follow one another, by counting them; those of a run stay in their order.
+    fn sort(&mut self) {
+        let Self { order, sorted, .. } = self;
+        let greatest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
+        let shift = (u32::BITS - greatest.leading_zeros()).saturating_sub(RUN_BITS);
+        let mut starts = [0; RUNS + 1];
+        for (place, _) in &*order {
+            starts[(place >> shift) as usize + 1] += 1;
+        }
+        for run in 1..RUNS {
+            starts[run] += starts[run - 1];
+        }
+        sorted.resize(order.len(), 0);
+        for &(place, ray) in &*order {
+            let start = &mut starts[(place >> shift) as usize];
+            sorted[*start] = ray;
+            *start += 1;
+        }
     }
 
     /// Forget all rays.
@@ -74,7 +102,8 @@ impl Pool {
 struct Tracing<'a> {
     geometry: &'a Geometry,
     rows: &'a mut [Pooled],
-    order: &'a [(u32, u32)],
+    /// Their rows and lanes.
+    rays: &'a [u32],
 }
 
 impl Loops for Tracing<'_> {
@@ -82,12 +111,12 @@ impl Loops for Tracing<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { geometry, rows, order } = self;
-        for rays in order.chunks(LANES) {
+        let Self { geometry, rows, rays } = self;
+        for rays in rays.chunks(LANES) {
             let mut packet = RayRows::of([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
             let mut ends = [-1.0; LANES];
             let mut sources = SourceRow::of(Source::Nothing);
-            for (to, &(_, ray)) in rays.iter().enumerate() {
+            for (to, &ray) in rays.iter().enumerate() {
                 let (row, from) = (&rows[ray as usize / LANES], ray as usize % LANES);
                 for axis in 0..3 {
                     packet.origin[axis][to] = row.rays.origin[axis][from];
@@ -99,7 +128,7 @@ impl Loops for Tracing<'_> {
             let traced = ((1_u64 << rays.len()) - 1) as u32;
             let occluded = geometry.occluded_rows(&packet, &ends, traced, &sources);
             for to in lanes(occluded) {
-                let ray = rays[to].1 as usize;
+                let ray = rays[to] as usize;
                 rows[ray / LANES].traced &= !(1 << (ray % LANES));
             }
         }

@@ -5,9 +5,9 @@
 use arrayvec::ArrayVec;
 
 use super::node::{Child, Expected, Receiver};
-use super::{LightTree, NOWHERE, Pick, ROOT, Shares, Way, rest, target};
+use super::{LightTree, NOWHERE, Pick, ROOT, Shares, Way, below, target};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes};
+use crate::math::lanes::Lanes;
 
 /// What points pick from, one after the other.
 pub struct Cut<'a> {
@@ -53,20 +53,16 @@ impl<'a> Cut<'a> {
         self.nodes.clear();
         self.importance.clear();
         self.sums.clear();
-        let mut sum = 0.0;
         if tree.over_lights.len() <= self.room {
             for &node in &tree.over_lights {
-                let importance = tree.nodes[node as usize].expected(receiver).importance;
-                sum += total(&importance);
                 self.nodes.push(node);
-                self.importance.push(importance);
-                self.sums.push(sum);
+                self.importance.push(tree.nodes[node as usize].expected(receiver).importance);
             }
-            return;
+        } else {
+            self.nodes.push(ROOT);
         }
-        self.nodes.push(ROOT);
-        while self.sums.len() < self.nodes.len() {
-            let node = &tree.nodes[self.nodes[self.sums.len()] as usize];
+        while self.importance.len() < self.nodes.len() {
+            let node = &tree.nodes[self.nodes[self.importance.len()] as usize];
             let Expected { mut importance, nearness } = node.expected(receiver);
             for i in 0..node.count as usize {
                 if let Child::Node(below) = node.children[i]
@@ -78,8 +74,11 @@ impl<'a> Cut<'a> {
                     importance[i] = 0.0;
                 }
             }
-            sum += total(&importance);
             self.importance.push(importance);
+        }
+        let mut sum = 0.0;
+        for importance in &self.importance {
+            sum += total(importance);
             self.sums.push(sum);
         }
     }
@@ -90,15 +89,19 @@ impl<'a> Cut<'a> {
         self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// [`LightTree::pick`] by the cut, for numbers that increase: each pick is told with the place of its number.
+    /// [`LightTree::pick`] by the cut, for numbers that increase: each pick is told with the place of its number, but not where in
+    /// its share that was.
     #[inline(always)]
-    pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, Pick)) {
+    pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
         let all = self.total();
         if !(all > 0.0) {
             return;
         }
+        let inverse = 1.0 / all;
         let (mut index, mut way) = (0, Way::NEW);
         let (mut of, mut shares) = (usize::MAX, Shares::NONE);
+        // The sum before the node, and what its own is by the sum over its children, which is not rounded.
+        let (mut before, mut scale) = (0.0, 0.0);
         for (place, u) in u.enumerate() {
             let target = target(u, all);
             while self.sums[index] <= target {
@@ -106,28 +109,29 @@ impl<'a> Cut<'a> {
             }
             if of != index {
                 (of, shares) = (index, Shares::new(&self.importance[index]));
+                before = if index == 0 { 0.0 } else { self.sums[index - 1] };
+                scale = shares.total() / (self.sums[index] - before);
             }
-            let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
-            let mut rest = rest(target - before, self.sums[index] - before);
-            let Some((child, _)) = shares.find(&mut rest) else { continue };
-            let probability = self.share(index, child);
-            let pick = match self.tree.nodes[self.nodes[index] as usize].children[child] {
-                Child::Light(light) => Some(Pick { light, probability, rest }),
+            // Below the sum over the children, which is above 0 as that of the node is.
+            let part = below((target - before) * scale, shares.total());
+            let child = shares.find(part);
+            let probability = self.share(index, child, inverse);
+            match self.tree.nodes[self.nodes[index] as usize].children[child] {
+                Child::Light(light) => picked(place, light, probability),
                 Child::Node(node) => {
-                    let so_far = Pick { light: 0, probability, rest };
-                    self.tree.pick_under(node, &self.receiver, so_far, &mut way)
+                    let so_far = Pick { light: 0, probability, rest: shares.rest(part, child) };
+                    if let Some(pick) = self.tree.pick_under(node, &self.receiver, so_far, &mut way) {
+                        picked(place, pick.light, pick.probability);
+                    }
                 }
-            };
-            if let Some(pick) = pick {
-                picked(place, pick);
             }
         }
     }
 
-    /// The probability of a child of a node.
+    /// The probability of a child of a node, by one over the importance of all.
     #[inline(always)]
-    fn share(&self, index: usize, child: usize) -> f32 {
-        (f64::from(self.importance[index][child]) / self.total()) as f32
+    fn share(&self, index: usize, child: usize, inverse: f64) -> f32 {
+        (f64::from(self.importance[index][child]) * inverse) as f32
     }
 
     /// The probability with which [`Cut::pick`] picks a light.
@@ -150,7 +154,7 @@ impl<'a> Cut<'a> {
             }
         }
         let Some((index, child)) = last else { return 0.0 };
-        let share = self.share(index, child);
+        let share = self.share(index, child, 1.0 / self.total());
         match self.tree.nodes[self.nodes[index] as usize].children[child] {
             Child::Node(below) if share > 0.0 => {
                 self.tree.probability_under(below, &self.receiver, place, share)
@@ -163,15 +167,15 @@ impl<'a> Cut<'a> {
 /// The sum of a row, in one order on all machines.
 #[inline(always)]
 fn total(importance: &Lanes) -> f64 {
-    let mut row = [0.0; LANES];
-    for i in 0..LANES {
-        row[i] = f64::from(importance[i]);
-    }
+    let mut row = *importance;
     for i in 0..8 {
         row[i] += row[i + 8];
     }
     for i in 0..4 {
         row[i] += row[i + 4];
     }
-    (row[0] + row[2]) + (row[1] + row[3])
+    for i in 0..2 {
+        row[i] += row[i + 2];
+    }
+    f64::from(row[0] + row[1])
 }

@@ -70,8 +70,15 @@ impl LightTree {
                 way.nodes[level] = node;
                 way.shares[level] = Shares::new(&one.expected(receiver).importance);
             }
-            let (child, share) = way.shares[level].find(&mut pick.rest)?;
-            pick.probability *= share;
+            let shares = &way.shares[level];
+            let total = shares.total();
+            if !(total > 0.0) {
+                return None;
+            }
+            let target = target(pick.rest, total);
+            let child = shares.find(target);
+            pick.probability *= shares.share(child);
+            pick.rest = shares.rest(target, child);
             match one.children[child] {
                 Child::Light(light) => return Some(Pick { light, ..pick }),
                 Child::Node(below) => node = below,
@@ -130,26 +137,17 @@ struct Shares([f64; LANES]);
 impl Shares {
     const NONE: Self = Self([0.0; LANES]);
 
-    /// Four runs of four side by side, and then one after the other.
+    /// By steps of 1, 2, 4 and 8 places, each for all children side by side.
     #[inline(always)]
     fn new(importance: &Lanes) -> Self {
-        const RUN: usize = 4;
         let mut sums = [0.0; LANES];
         for i in 0..LANES {
             sums[i] = f64::from(importance[i]);
         }
-        for i in 1..RUN {
-            for run in (0..LANES).step_by(RUN) {
-                sums[run + i] += sums[run + i - 1];
-            }
-        }
-        for run in (RUN..LANES).step_by(RUN) {
-            let before = sums[run - 1];
-            for i in 0..RUN {
-                sums[run + i] += before;
-            }
-        }
-        Self(sums)
+        sums = with_those_before::<1>(&sums);
+        sums = with_those_before::<2>(&sums);
+        sums = with_those_before::<4>(&sums);
+        Self(with_those_before::<8>(&sums))
     }
 
     /// The probability of a child.
@@ -159,29 +157,54 @@ impl Shares {
         if total > 0.0 { ((self.0[child] - before) / total) as f32 } else { 0.0 }
     }
 
-    /// The child that a number in [0, 1) falls on, with its probability; the number becomes that in its share.
+    /// Of all children.
     #[inline(always)]
-    fn find(&self, u: &mut f64) -> Option<(usize, f32)> {
-        let total = self.0[LANES - 1];
-        if !(total > 0.0) {
-            return None;
-        }
-        let target = target(*u, total);
+    fn total(&self) -> f64 {
+        self.0[LANES - 1]
+    }
+
+    /// The child that a part of the sum falls on, which is below it.
+    #[inline(always)]
+    fn find(&self, target: f64) -> usize {
         let mut child = 0;
         for i in 0..LANES {
             child += usize::from(self.0[i] <= target);
         }
-        let before = if child == 0 { 0.0 } else { self.0[child - 1] };
-        *u = rest(target - before, self.0[child] - before);
-        Some((child, self.share(child)))
+        child
     }
+
+    /// Where in the share of a child a part of the sum is that falls on it, in [0, 1).
+    #[inline(always)]
+    fn rest(&self, target: f64, child: usize) -> f64 {
+        let before = if child == 0 { 0.0 } else { self.0[child - 1] };
+        rest(target - before, self.0[child] - before)
+    }
+}
+
+/// The sum of each number and that so many places before it.
+#[inline(always)]
+fn with_those_before<const STEP: usize>(sums: &[f64; LANES]) -> [f64; LANES] {
+    let mut before = [0.0; LANES];
+    for i in STEP..LANES {
+        before[i] = sums[i - STEP];
+    }
+    for i in 0..LANES {
+        before[i] += sums[i];
+    }
+    before
 }
 
 /// A number in [0, 1) as a part of a sum, below it: rounding may not lead beyond the last share.
 #[inline(always)]
 fn target(u: f64, total: f64) -> f64 {
-    let (target, last) = (u * total, total.next_down());
-    if target < last { target } else { last }
+    below(u * total, total)
+}
+
+/// A part of a sum, below it.
+#[inline(always)]
+fn below(part: f64, total: f64) -> f64 {
+    let last = total.next_down();
+    if part < last { part } else { last }
 }
 
 /// What is left of a part of a share, in [0, 1).

@@ -17,6 +17,11 @@ pub struct Node {
     weakens: Lanes,
     /// Shares of the tree's power; 0 where there is no child.
     power: Lanes,
+    /// One over four times the radii.
+    spread: Lanes,
+    /// Whether all children are in the scene, weaken with distance and send light everywhere, as points and balls do: of others all
+    /// that follows is looked at.
+    is_plain: bool,
     /// Of the cones of emission.
     axis: Lanes3,
     /// Of their half angles.
@@ -47,6 +52,9 @@ const LEAST_COSINE: f32 = 1e-3;
 /// Least and greatest importance of a child that may contribute.
 const LEAST: f32 = 1e-36;
 const MOST: f32 = 1e30;
+
+/// Squares of distances count as no more.
+const GREATEST: f32 = 1e37;
 
 /// A point of a surface that lights are expected to bring light to.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +89,9 @@ impl Receiver {
 }
 
 impl Lobe {
+    /// Of no surface.
+    const NONE: Self = Self { axis: Vec3::ZERO, shininess: 0.0, peak: 0.0, diffuse: 1.0 };
+
     /// What a surface makes of light from within an angle of a direction, at most and about: cosⁿ δ lies below
     /// (1 + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and has no end.
     #[inline(always)]
@@ -111,6 +122,8 @@ impl Node {
             is_place: [0.0; LANES],
             weakens: [0.0; LANES],
             power: [0.0; LANES],
+            spread: [1.0; LANES],
+            is_plain: true,
             axis: [[0.0; LANES]; 3],
             cos: [-1.0; LANES],
             sin: [0.0; LANES],
@@ -133,6 +146,8 @@ impl Node {
             Space::Beyond => (0.0, 0.0),
         };
         self.power[i] = ((own / power) as f32).max(LEAST);
+        self.spread[i] = 0.25 / self.radius[i].max(LEAST);
+        self.is_plain &= *space == Space::Weakening && cone.cos <= -1.0;
         set_lane(&mut self.axis, i, cone.axis.as_vec3());
         self.cos[i] = cone.cos as f32;
         self.sin[i] = ((1.0 - cone.cos) * (1.0 + cone.cos)).max(0.0).sqrt() as f32;
@@ -148,39 +163,87 @@ impl Node {
     #[inline(always)]
     pub fn expected(&self, receiver: &Receiver) -> Expected {
         let Receiver { point, normal, lobe } = *receiver;
-        let (mut importance, mut nearness, mut reflected) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
-        if let Some(lobe) = lobe {
+        match (self.is_plain, lobe) {
+            (true, None) => self.expected_as::<true, false>(point, normal, Lobe::NONE),
+            (false, None) => self.expected_as::<false, false>(point, normal, Lobe::NONE),
+            (true, Some(lobe)) => self.expected_as::<true, true>(point, normal, lobe),
+            (false, Some(lobe)) => self.expected_as::<false, true>(point, normal, lobe),
+        }
+    }
+
+    #[inline(always)]
+    fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        lobe: Lobe,
+    ) -> Expected {
+        let mut offset = self.center;
+        for axis in 0..3 {
             for i in 0..LANES {
-                let offset = lane(&self.center, i) - point * self.is_place[i];
-                let inverse = 1.0 / at_least(offset.length_squared(), LEAST).sqrt();
-                reflected[i] = lobe.value(lobe.axis.dot(offset) * inverse, self.radius[i] * inverse);
+                let start = if IS_PLAIN { point[axis] } else { point[axis] * self.is_place[i] };
+                offset[axis][i] = self.center[axis][i] - start;
             }
         }
+        // Squares of the distance, not below that of the radius; and the part along the normal.
+        let [mut square, mut least, mut along] = [[0.0; LANES]; 3];
         for i in 0..LANES {
-            let offset = lane(&self.center, i) - point * self.is_place[i];
-            let radius = self.radius[i];
-            let (d2, r2) = (offset.length_squared(), at_least(radius * radius, LEAST));
-            let inverse = 1.0 / at_least(d2, r2).sqrt();
-            // Positive where θ − β < 90°, and above 1 where θ < β, with β half of the angle that the sphere fills. From inside there is
-            // light in every direction.
-            let sin = radius * inverse;
-            let is_inside = d2 <= r2;
-            let straight = normal.dot(offset) * inverse;
-            let towards = if is_inside { 1.0 } else { straight + sin };
-            let cos = -lane(&self.axis, i).dot(offset) * inverse;
-            let beyond = cos * self.cos[i] + one_without(cos) * self.sin[i];
-            let away = (if (cos >= self.cos[i]) | is_inside { 1.0 } else { beyond }) + sin;
-            let arrives =
-                (towards > -LEAST_COSINE) & (away > self.end[i] - LEAST_COSINE) & (self.power[i] > 0.0);
-            let weakened = if self.weakens[i] > 0.0 { inverse * inverse } else { 1.0 };
+            square[i] = lane(&offset, i).length_squared();
+            least[i] = at_least(self.radius[i] * self.radius[i], LEAST);
+            along[i] = normal.dot(lane(&offset, i));
+        }
+        let mut inverse = square;
+        for i in 0..LANES {
+            inverse[i] = at_least(square[i], least[i]);
+        }
+        inverse_roots(&mut inverse);
+        // Positive where θ − β < 90°, and above 1 where θ < β, with β half of the angle that the sphere fills. From inside there is
+        // light in every direction.
+        let [mut sin, mut towards, mut mean] = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            sin[i] = self.radius[i] * inverse[i];
+            let straight = along[i] * inverse[i];
+            let sum = straight + sin[i];
+            towards[i] = if square[i] <= least[i] { 1.0 } else { sum };
             // Cosines at the points of a sphere are uniform between the least and the greatest; those below 0 bring nothing.
-            let cut = towards * towards / (4.0 * at_least(sin, LEAST));
-            let mean = if straight > sin { straight } else { cut };
-            let value = self.power[i] * weakened * cosine(mean) * cosine(away) * reflected[i];
-            let value = at_least(value, LEAST);
-            let value = if value < MOST { value } else { MOST };
+            let above = at_least(towards[i], 0.0);
+            let cut = above * above * self.spread[i] * at_least(square[i], least[i]) * inverse[i];
+            mean[i] = if straight > sin[i] { straight } else { cut };
+        }
+        let (mut value, mut away) = ([0.0; LANES], [1.0; LANES]);
+        if IS_PLAIN {
+            for i in 0..LANES {
+                value[i] = self.power[i] * cosine(mean[i]) * (inverse[i] * inverse[i]);
+            }
+        } else {
+            let [mut cos, mut without] = [[0.0; LANES]; 2];
+            for i in 0..LANES {
+                cos[i] = -lane(&self.axis, i).dot(lane(&offset, i)) * inverse[i];
+                without[i] = at_least(1.0 - cos[i] * cos[i], LEAST);
+            }
+            let rest = without;
+            inverse_roots(&mut without);
+            for i in 0..LANES {
+                let beyond = cos[i] * self.cos[i] + rest[i] * without[i] * self.sin[i];
+                let is_within = (cos[i] >= self.cos[i]) | (square[i] <= least[i]);
+                away[i] = (if is_within { 1.0 } else { beyond }) + sin[i];
+                let weakened = if self.weakens[i] > 0.0 { inverse[i] * inverse[i] } else { 1.0 };
+                value[i] = self.power[i] * cosine(mean[i]) * weakened * cosine(away[i]);
+            }
+        }
+        if HAS_LOBE {
+            for i in 0..LANES {
+                value[i] *= lobe.value(lobe.axis.dot(lane(&offset, i)) * inverse[i], sin[i]);
+            }
+        }
+        let (mut importance, mut nearness) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let value = at_most(at_least(value[i], LEAST), MOST);
+            let arrives = (towards[i] > -LEAST_COSINE)
+                & (IS_PLAIN | (away[i] > self.end[i] - LEAST_COSINE))
+                & (self.power[i] > 0.0);
             importance[i] = if arrives { value } else { 0.0 };
-            nearness[i] = sin * sin;
+            nearness[i] = sin[i] * sin[i];
         }
         Expected { importance, nearness }
     }
@@ -192,21 +255,50 @@ impl Node {
     }
 }
 
-/// √(1 − x²).
+/// 1/√x of numbers from [`LEAST`] on, within a few units of the last place, by Newton's method: a root and a division of sixteen
+/// numbers would take longer than all else that is asked of children.
 #[inline(always)]
-fn one_without(x: f32) -> f32 {
-    let rest = 1.0 - x * x;
-    (if rest > 0.0 { rest } else { 0.0 }).sqrt()
+fn inverse_roots(x: &mut Lanes) {
+    for i in 0..LANES {
+        let x = &mut x[i];
+        let square = at_most(*x, GREATEST);
+        let half = 0.5 * square;
+        let root = f32::from_bits(0x5f37_5a86_u32.wrapping_sub(square.to_bits() >> 1));
+        let root = root * (1.5 - half * root * root);
+        let root = root * (1.5 - half * root * root);
+        *x = root * (1.5 - half * root * root);
+    }
 }
 
 /// A bound of a cosine as it counts.
 #[inline(always)]
 fn cosine(bound: f32) -> f32 {
-    let bound = at_least(bound, LEAST_COSINE);
-    if bound < 1.0 { bound } else { 1.0 }
+    at_most(at_least(bound, LEAST_COSINE), 1.0)
 }
 
 #[inline(always)]
 fn at_least(x: f32, least: f32) -> f32 {
     if x > least { x } else { least }
+}
+
+#[inline(always)]
+fn at_most(x: f32, most: f32) -> f32 {
+    if x < most { x } else { most }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverse_roots_are_those_of_a_division() {
+        for exponent in -35..37 {
+            let mut x: Lanes = std::array::from_fn(|i| (1.0 + 0.6 * i as f32) * 10_f32.powi(exponent));
+            let expected = x.map(|x| (1.0 / f64::from(at_most(x, GREATEST)).sqrt()) as f32);
+            inverse_roots(&mut x);
+            for (root, expected) in x.iter().zip(expected) {
+                assert!((root / expected - 1.0).abs() < 4.0 * f32::EPSILON, "{root} {expected}");
+            }
+        }
+    }
 }
