@@ -185,9 +185,7 @@ impl Shares {
 #[inline(always)]
 fn with_those_before<const STEP: usize>(sums: &[f64; LANES]) -> [f64; LANES] {
     let mut before = [0.0; LANES];
-    for i in STEP..LANES {
-        before[i] = sums[i - STEP];
-    }
+    before[STEP..].copy_from_slice(&sums[..LANES - STEP]);
     for i in 0..LANES {
         before[i] += sums[i];
     }
