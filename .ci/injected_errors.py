@@ -93,7 +93,7 @@ FAULTS = [
     ("lamps behind glass met by paths too", "integrators/wave.rs", "if ⟦self.is_gathered(path)⟧ {", "false",
      PHOTONS + "a_furnace_with_a_glowing_ball_in_glass_is_even"),
     ("photons go one scattering too far", "integrators/photons/gather.rs", "max_depth.checked_sub(⟦depth + 1⟧)", "depth",
-     PHOTONS + "photons_and_paths_see_the_same_light_to_every_depth"),
+     PHOTONS + "photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass"),
     ("picks in lobes weighed by what others do not know", "integrators/picking.rs",
      "row.weighed[i] = ⟦without.map_or(probability, |without| without.probability(light))⟧;", "probability",
      MANY + "a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before"),
