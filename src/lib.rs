@@ -20,7 +20,7 @@
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |
 //! | [`world`] | everything ready to trace, immutable |
 //! | [`film`] | sums of samples, tone mapping, pictures |
-//! | [`integrators`] | whitted, path, views |
+//! | [`integrators`] | whitted, path, photons, views |
 //! | [`compare`] | the error of a picture against a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
 //! | [`pipeline`] | stages, caches, the worker, watching files |

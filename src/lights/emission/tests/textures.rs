@@ -1,0 +1,128 @@
+//! Lamps with textures, meshes of lamps, maps of the sky.
+
+use super::*;
+
+/// Something irregular with black parts and a bright spot.
+fn patchy(width: u32, height: u32) -> Arc<Texels> {
+    let color = |(x, y): (u32, u32)| {
+        let random = (x.wrapping_mul(7919).wrapping_add(y.wrapping_mul(104_729)) >> 3) % 97;
+        match random {
+            0..40 => Vec3::ZERO,
+            90.. => Vec3::new(10.0, 20.0, 15.0),
+            _ => Vec3::new(random as f32, 60.0, 97.0 - random as f32) / 97.0,
+        }
+    };
+    let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    Arc::new(Texels { width, height, data: TexelData::Float(places.map(color).collect()), unusable: 0 })
+}
+
+fn texture(width: u32, height: u32, filter: TextureFilter) -> Arc<Texture> {
+    let texels = patchy(width, height);
+    Arc::new(Texture { texels, mipmaps: None, filter, wrap: Wrap::Repeat, repeat: Vec2::new(1.0, 2.0) })
+}
+
+/// A light with a texture.
+fn textured(light: AreaLight, texture: &Arc<Texture>, chart: Chart) -> Light {
+    Light::Area(AreaLight { pattern: Some(Box::new(Pattern::new(texture, chart))), ..light })
+}
+
+#[test]
+fn textures_send_what_samples_of_them_say() {
+    for shape in shapes() {
+        let light = area_light(&shape, COLOR, OBJECT).expect("an area");
+        let light = textured(light, &texture(16, 8, TextureFilter::Bilinear), Chart::Shape(shape));
+        let source = source_of(light.clone(), Some(shape));
+        assert_same_irradiance(&format!("{shape:?}"), &light, &source, Some(&shape));
+        let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
+        let told = f64::from(source.power().y);
+        assert!(
+            found.error < 5e-3 * told && (found.mean / told - 1.0).abs() < 0.02,
+            "{found:?}, told {told}"
+        );
+    }
+}
+
+#[test]
+fn a_quad_sends_the_mean_of_its_texture() {
+    let (shape, texels) = (shapes()[1], patchy(32, 16));
+    let light = area_light(&shape, COLOR, OBJECT).expect("an area");
+    let light = textured(light, &texture(32, 16, TextureFilter::Nearest), Chart::Shape(shape));
+    let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.areas()[0];
+    let source = source_of(light, Some(shape));
+    assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-4, "{}", source.power());
+    let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.x));
+    assert!(found.error < 1e-3 * exact.x && (found.mean - exact.x).abs() < 5.0 * found.error, "{found:?}");
+}
+
+/// Triangles of a bent sheet with scale, turn and move, and their texture coordinates.
+fn sheet(side: u32) -> Vec<Patch> {
+    let transform = Transform::scale_rotate_translate(
+        DVec3::new(0.5, -1.5, 0.8),
+        DVec3::new(30.0, -50.0, 80.0),
+        DVec3::new(-0.1, 0.2, 0.3),
+    );
+    let at = |i: u32, j: u32| {
+        let (x, y) = (f64::from(i) / f64::from(side), f64::from(j) / f64::from(side));
+        (transform.point(DVec3::new(x, y * y, 0.3 * x * x - 0.2 * y)), Vec2::new(x as f32, y as f32))
+    };
+    let cells = (0..side).flat_map(|j| (0..side).map(move |i| (i, j)));
+    let corners = cells.flat_map(|(i, j)| {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    // Every second number is of another light.
+    let patch = |(number, corners): (u32, [(DVec3, Vec2); 3])| Patch {
+        primitive: number * 2 + 1,
+        corners: corners.map(|(point, _)| point),
+        uvs: corners.map(|(_, uv)| uv),
+    };
+    (0..).zip(corners).map(patch).collect()
+}
+
+#[test]
+fn meshes_send_what_samples_of_them_say() {
+    for (side, is_textured) in [(2, false), (12, false), (2, true), (12, true)] {
+        let patches = sheet(side);
+        let mesh = MeshEmitter::new(
+            patches.iter().map(|patch| (patch.corners, patch.primitive)).collect(),
+            &CancelToken::new(),
+        )
+        .expect("nobody cancels");
+        let mesh = mesh.expect("an area");
+        let bounds = mesh.bounds();
+        let light = AreaLight {
+            shape: Emitter::Mesh(mesh),
+            radiance: COLOR,
+            pattern: None,
+            object: OBJECT,
+            part: Part::Listed,
+            bounds,
+        };
+        let area_of = |Patch { corners: [a, b, c], .. }: &Patch| 0.5 * (*b - *a).cross(*c - *a).length();
+        let area: f64 = patches.iter().map(area_of).sum();
+        let light = if is_textured {
+            textured(light, &texture(16, 8, TextureFilter::Bilinear), Chart::Triangles(patches))
+        } else {
+            Light::Area(light)
+        };
+        let lights = Arc::new(Lights::new(vec![light.clone()], &CancelToken::new()).expect("nobody cancels"));
+        let source = PhotonSource::new(&lights, |_| Some(Outline::Mesh { rounding: 1e-6 }), SCENE);
+        let source = source.expect("power");
+        assert_same_irradiance(&format!("mesh {side} {is_textured}"), &light, &source, None);
+        if !is_textured {
+            let exact = COLOR.as_dvec3() * area * PI;
+            assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn maps_send_what_samples_of_them_say() {
+    let sky = Arc::new(SkyMap::new(patchy(24, 12)).expect("light"));
+    let light = Light::Environment(Environment::map(sky, COLOR, 77.0));
+    let source = source_of(light.clone(), None);
+    let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
+    let told = f64::from(source.power().y);
+    assert!(found.error < 1e-3 * told && (found.mean - told).abs() < 5.0 * found.error, "{found:?} {told}");
+    assert_same_irradiance("map", &light, &source, None);
+}
