@@ -25,6 +25,7 @@ pub use aabb::Aabb;
 pub use ray::{Ray, RayF64};
 pub use surface::{AreaPoint, Asked, ShapeHit, SurfacePoint};
 
+use crate::math::lanes::Folds;
 use crate::math::{DVec2, DVec3, Vec2};
 use cone::Cone;
 use cuboid::Cuboid;
@@ -86,11 +87,18 @@ impl Shape {
     /// The nearest hits of the rays in `met`, side by side where the shape has a loop for that; the others end below 0. `found`
     /// holds none before.
     #[inline(always)]
-    pub fn intersect_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+    pub fn intersect_rows(
+        &self,
+        rows: &RayRows,
+        met: u32,
+        ends: &Ends,
+        found: &mut HitRows,
+        folds: impl Folds,
+    ) {
         match self {
-            Self::Plane(plane) => plane.intersect_rows(rows, ends, found),
-            Self::Quad(quad) => quad.intersect_rows(rows, ends, found),
-            Self::Sphere(sphere) => sphere.intersect_rows(rows, ends, found),
+            Self::Plane(plane) => plane.intersect_rows(rows, ends, found, folds),
+            Self::Quad(quad) => quad.intersect_rows(rows, ends, found, folds),
+            Self::Sphere(sphere) => sphere.intersect_rows(rows, ends, found, folds),
             Self::Box(cuboid) => cuboid.intersect_rows(rows, ends, found),
             Self::Triangle(triangle) => triangle.intersect_rows(rows, ends, found),
             Self::Disk(disk) => disk.intersect_rows(rows, ends, found),

@@ -3,7 +3,7 @@
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface_rows::{Exact, ExactPoint, Mapped};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::lanes::{TRUE, bits};
+use crate::math::lanes::{Folds, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// Room given to a quad's border in units of its edges, so that two quads which share an edge leave no gap between
@@ -53,7 +53,7 @@ impl Parallelogram {
 
     /// [`Parallelogram::intersect`] side by side.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], [0; PACKET]);
         for lane in 0..PACKET {
             let ray = rays.line(lane);
@@ -61,7 +61,7 @@ impl Parallelogram {
             along[lane] = self.normal.dot(ray.direction);
             may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
         }
-        if bits(may_hit) == 0 {
+        if folds.bits(&may_hit) == 0 {
             return;
         }
         for lane in 0..PACKET {

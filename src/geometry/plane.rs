@@ -4,7 +4,7 @@ use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface::flat_axes;
 use super::surface_rows::{Exact, ExactPoint, Mapped};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::lanes::{TRUE, bits};
+use crate::math::lanes::{Folds, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// All points p with (p − point)·normal = 0.
@@ -34,7 +34,7 @@ impl Plane {
 
     /// [`Plane::intersect`] side by side.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], [0; PACKET]);
         for lane in 0..PACKET {
             let ray = rays.line(lane);
@@ -42,7 +42,7 @@ impl Plane {
             along[lane] = self.normal.dot(ray.direction);
             may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
         }
-        if bits(may_hit) == 0 {
+        if folds.bits(&may_hit) == 0 {
             return;
         }
         for lane in 0..PACKET {

@@ -2,7 +2,7 @@
 //! compilers turn into vector instructions. Every lane gets the bits that its ray gets alone.
 
 use super::{Ray, RayF64, ShapeHit};
-use crate::math::lanes::{LANES, TRUE, bits};
+use crate::math::lanes::{Folds, LANES, TRUE};
 use crate::math::{DVec3, Vec3};
 
 /// Rays that are traced together.
@@ -16,12 +16,12 @@ pub type Ends = Row;
 
 /// A bit for each ray that has an end.
 #[inline(always)]
-pub fn traced(ends: &Ends) -> u32 {
+pub fn traced(ends: &Ends, folds: impl Folds) -> u32 {
     let mut traced = [0; PACKET];
     for lane in 0..PACKET {
         traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };
     }
-    bits(traced)
+    folds.bits(&traced)
 }
 
 /// Lanes whose bits are set.
@@ -116,12 +116,12 @@ impl HitRows {
 
     /// A bit for each ray that hits.
     #[inline(always)]
-    pub fn any(&self) -> u32 {
+    pub fn any(&self, folds: impl Folds) -> u32 {
         let mut any = [0; PACKET];
         for lane in 0..PACKET {
             any[lane] = if self.t[lane].is_nan() { 0 } else { TRUE };
         }
-        bits(any)
+        folds.bits(&any)
     }
 
     /// Write down a hit.

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::lanes::{TRUE, bits};
+use crate::math::lanes::{Folds, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// All points at one distance from a centre; the front is outside.
@@ -40,7 +40,7 @@ impl Sphere {
 
     /// [`Sphere::intersect`] side by side.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
         let (mut discriminants, mut may_hit) = ([0.0; PACKET], [0; PACKET]);
         for lane in 0..PACKET {
             let ray = rays.line(lane);
@@ -51,7 +51,7 @@ impl Sphere {
             discriminants[lane] = self.radius * self.radius - foot.length_squared();
             may_hit[lane] = if (discriminants[lane] >= 0.0) & (ends[lane] >= 0.0) { TRUE } else { 0 };
         }
-        if bits(may_hit) == 0 {
+        if folds.bits(&may_hit) == 0 {
             return;
         }
         for lane in 0..PACKET {

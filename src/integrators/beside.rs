@@ -11,7 +11,7 @@ use crate::lights::LightRow;
 use crate::materials::Lobes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::{Hit, Loops};
 
@@ -131,7 +131,7 @@ impl Loops for LobeRays<'_> {
     type Done = Arrived;
 
     #[inline(always)]
-    fn run(self) -> Arrived {
+    fn run(self, folds: impl Folds) -> Arrived {
         let Self { shot, row, sharp, measure, media, mut arrived } = self;
         let count = shot.settings.render.shadow_samples;
         let sampler = row.sampler(shot);
@@ -145,7 +145,7 @@ impl Loops for LobeRays<'_> {
                 set_lane(&mut directions, i, glossy_lobe(row, i).sample(1.0, [u[0][i], u[1][i]]));
             }
             let Response { cosines, glosses, .. } = row.response(&directions);
-            let mut sent = sharp & !row.hidden(&directions);
+            let mut sent = sharp & !row.hidden(&directions, folds);
             let mut ends = [-1.0; LANES];
             for i in 0..LANES {
                 let bit = 1 << i;
@@ -153,7 +153,7 @@ impl Loops for LobeRays<'_> {
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
             let rays = RayRows::of(row.from, directions);
-            let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends, sent);
+            let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
             arrived.rays.scattered += u64::from(sent.count_ones());
             if measure == Measure::Work {
                 for i in lanes(sent) {

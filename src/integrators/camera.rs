@@ -8,7 +8,7 @@ use super::queues::{History, PathRay};
 use super::shot::Shot;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, Row};
-use crate::math::lanes::set_lane;
+use crate::math::lanes::{Folds, set_lane};
 use crate::math::{DVec2, Vec2, Vec3};
 use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow, warp};
@@ -114,7 +114,7 @@ impl Loops for Camera<'_> {
     type Done = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run(self, _: impl Folds) {
         for number in 0..self.count as u32 {
             self.rows.push(self.shot.camera_row(self.first + number * PACKET as u32));
         }

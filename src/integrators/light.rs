@@ -10,7 +10,7 @@ use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::lights::{LightRow, Middle, Pattern, Source, SourceRow};
 use crate::math::Vec3;
 use crate::math::color::luminance;
-use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
 use crate::sampling::Decision;
 use crate::scene::description::Shadows;
 use crate::world::Loops;
@@ -93,7 +93,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
     type Done = Sums;
 
     #[inline(always)]
-    fn run(self) -> Sums {
+    fn run(self, folds: impl Folds) -> Sums {
         let render = &self.shot.settings.render;
         let mut sampler = None;
         let mut sums = Sums::NOTHING;
@@ -111,8 +111,8 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
-                let (values, active) = self.values(&samples, 1.0);
-                self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting));
+                let (values, active) = self.values(&samples, 1.0, folds);
+                self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting), folds);
             } else {
                 let count = render.shadow_samples;
                 if sampler.is_none() {
@@ -122,7 +122,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
-                    let (mut values, active) = self.values(&samples, 1.0 / count as f32);
+                    let (mut values, active) = self.values(&samples, 1.0 / count as f32, folds);
                     if let Some(pattern) = light.pattern() {
                         values = self.tinted(pattern, &samples, active, values);
                         sums.rays.lookups += u64::from(active.count_ones());
@@ -132,11 +132,11 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                         let others = self.others.to_each(count);
                         values = self.others.left(self.row, &samples, values, (&of_light, others));
                     }
-                    self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting));
+                    self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting), folds);
                 }
             }
             if waiting.active != 0 {
-                self.add_waiting(light.middle(), &waiting, &mut sums);
+                self.add_waiting(light.middle(), &waiting, &mut sums, folds);
             }
         }
         sums
@@ -185,6 +185,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         active: u32,
         sums: &mut Sums,
         waiting: Option<&mut Waiting>,
+        folds: impl Folds,
     ) {
         if active == 0 {
             return;
@@ -197,15 +198,21 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             waiting.active |= active;
             add_where(active, values, &mut waiting.light);
         } else {
-            let traced = active & !self.row.hidden(&samples.directions);
+            let traced = active & !self.row.hidden(&samples.directions, folds);
             let (rays, ends) = self.shadow_rays(samples, traced);
-            self.add_seen(&rays, &ends, traced, &samples.sources, values, sums);
+            self.add_seen((&rays, &ends, traced), &samples.sources, values, sums, folds);
         }
     }
 
     /// What waits for one ray to the middle of its light.
     #[inline(always)]
-    fn add_waiting(&self, middle: Option<(Middle, Source)>, waiting: &Waiting, sums: &mut Sums) {
+    fn add_waiting(
+        &self,
+        middle: Option<(Middle, Source)>,
+        waiting: &Waiting,
+        sums: &mut Sums,
+        folds: impl Folds,
+    ) {
         let is_untraced = self.shot.settings.render.shadows == Shadows::Off;
         if is_untraced && self.measure == Measure::Work {
             return;
@@ -223,36 +230,35 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
-        let traced = waiting.active & !self.row.hidden(&direction);
+        let traced = waiting.active & !self.row.hidden(&direction, folds);
         for i in 0..LANES {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
         let rays = RayRows::of(self.row.from, direction);
-        self.add_seen(&rays, &ends, traced, &SourceRow::of(source), &waiting.light, sums);
+        self.add_seen((&rays, &ends, traced), &SourceRow::of(source), &waiting.light, sums, folds);
     }
 
     /// Add what arrives on the rays of `traced`; the others end below 0.
     #[inline(always)]
     pub(super) fn add_seen(
         &self,
-        rays: &RayRows,
-        ends: &Ends,
-        traced: u32,
+        (rays, ends, traced): (&RayRows, &Ends, u32),
         sources: &SourceRow,
         values: &Lanes3,
         sums: &mut Sums,
+        folds: impl Folds,
     ) {
         sums.rays.shadow += u64::from(traced.count_ones());
         if self.measure == Measure::Work {
             return add_work(self.shot, rays, ends, traced, &mut sums.light);
         }
-        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, traced, sources);
+        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, traced, sources, folds);
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
     /// What each sample brings if nothing is in its way, and a bit for each that brings anything.
     #[inline(always)]
-    pub(super) fn values(&self, samples: &LightRow, share: f32) -> (Lanes3, u32) {
+    pub(super) fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32) {
         let Response { f, cosines, .. } = self.row.response(&samples.directions);
         let mut arriving = samples.weights;
         if self.measure == Measure::ArrivingShare {
@@ -271,7 +277,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         if let Some(media) = self.media.filter(|_| self.measure != Measure::ArrivingShare) {
             values = self.left_by_glass(media, samples, values);
         }
-        (values, bits(active) & self.used)
+        (values, folds.bits(&active) & self.used)
     }
 
     /// The rays on which the light of the samples in `active` arrives; the others have no end.

@@ -20,7 +20,7 @@ use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::lights::{Source, SourceRow};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes3, lane};
+use crate::math::lanes::{Folds, LANES, Lanes3, lane};
 use crate::scene::description::Shadows;
 use crate::world::{Geometry, Loops};
 
@@ -309,7 +309,7 @@ impl Loops for Lifting<'_> {
     type Done = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run(self, folds: impl Folds) {
         let Self { geometry, row } = self;
         let mut direction = row.lifted;
         for axis in 0..3 {
@@ -322,7 +322,10 @@ impl Loops for Lifting<'_> {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
         let rays = RayRows::of(row.from, direction);
-        let blocked = geometry.occluded_rows(&rays, &ends, traced(&ends), &SourceRow::of(Source::Nothing));
+        let blocked = {
+            let (traced, nothing) = (traced(&ends, folds), SourceRow::of(Source::Nothing));
+            geometry.occluded_rows(&rays, &ends, traced, &nothing, folds)
+        };
         let lifted = row.may_lift & !blocked;
         row.is_bounded &= !lifted;
         for axis in 0..3 {

@@ -8,7 +8,7 @@ use crate::materials::Lobes;
 use crate::materials::lobes::gloss;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, bits, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
 use crate::sampling::SamplerRow;
 use crate::scene::description::Shadows;
 
@@ -318,7 +318,7 @@ impl LitRow {
 
     /// A bit for each vertex that certainly sees nothing in a direction.
     #[inline(always)]
-    pub fn hidden(&self, directions: &Lanes3) -> u32 {
+    pub fn hidden(&self, directions: &Lanes3, folds: impl Folds) -> u32 {
         let mut hidden = [0; LANES];
         if self.is_bounded != 0 {
             for i in 0..LANES {
@@ -326,7 +326,7 @@ impl LitRow {
                 hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
             }
         }
-        bits(hidden) & self.is_bounded
+        folds.bits(&hidden) & self.is_bounded
     }
 }
 

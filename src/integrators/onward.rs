@@ -14,7 +14,7 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::lights::{Met, Picks, Source};
 use crate::materials::TexturePoint;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::{Hit, Loops};
 
@@ -120,7 +120,7 @@ impl Loops for Scattering<'_> {
     type Done = Ways;
 
     #[inline(always)]
-    fn run(self) -> Ways {
+    fn run(self, folds: impl Folds) -> Ways {
         let Self { shot, row, used, onward } = self;
         let sampler = row.sampler(shot);
         let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
@@ -151,7 +151,7 @@ impl Loops for Scattering<'_> {
             let bit = 1 << i;
             alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
         }
-        alive &= used & !row.hidden(&directions);
+        alive &= used & !row.hidden(&directions, folds);
         if onward.is_risked {
             let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
             for i in 0..LANES {

@@ -13,7 +13,7 @@ use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::phong::PhongBsdf;
 use crate::materials::{Material, Phong};
 use crate::math::Vec3;
-use crate::math::lanes::{Lanes, Lanes3, TRUE, bits, lane, set_lane, take, truths};
+use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, truths};
 use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Loops, Object, PACKET};
@@ -140,7 +140,7 @@ impl Loops for Meeting<'_> {
     type Done = Met;
 
     #[inline(always)]
-    fn run(self) -> Met {
+    fn run(self, folds: impl Folds) -> Met {
         let Self { shot, rays, measure, are_lit, row } = self;
         let world = shot.world;
         row.reset();
@@ -160,13 +160,13 @@ impl Loops for Meeting<'_> {
                     set_lane(&mut direction, lane, path.ray.direction);
                     ends[lane] = path.ray.t_max;
                 }
-                traced = rows::traced(&ends);
+                traced = rows::traced(&ends, folds);
                 of_paths = RayRows::of(origin, direction);
                 &of_paths
             }
         };
         let (hits, object) = match rays {
-            Rays::Camera(..) | Rays::Paths(..) => world.geometry.closest_rows(rows, &mut ends, traced),
+            Rays::Camera(..) | Rays::Paths(..) => world.geometry.closest_rows(rows, &mut ends, traced, folds),
             Rays::Traced(_, known, places) => {
                 let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
                 for (lane, &place) in places.iter().enumerate().take(PACKET) {
@@ -179,7 +179,7 @@ impl Loops for Meeting<'_> {
             }
         };
         let mut surface = SurfaceRow::EMPTY;
-        let any = hits.any();
+        let any = hits.any(folds);
         let (mut left, mut plain, mut shining) = (any, 0, 0);
         let (mut seen, mut from_gloss, mut lookups) = (!0, 0, 0);
         match rays {
@@ -199,7 +199,7 @@ impl Loops for Meeting<'_> {
             for lane in 0..PACKET {
                 of[lane] = if object[lane] == id { TRUE } else { 0 };
             }
-            let of = bits(of) & left;
+            let of = folds.bits(&of) & left;
             left &= !of;
             let Some((material, phong)) = shot.plain_phong(id) else { continue };
             let Some(specular) = phong.specular.constant() else { continue };
@@ -229,7 +229,7 @@ impl Loops for Meeting<'_> {
                     PhongRow { diffuse, specular, shininess: phong.shininess }
                 }
             };
-            row.used |= of & !bsdf.black();
+            row.used |= of & !bsdf.black(folds);
             let seen = seen & of;
             row.set_bsdf(of, &bsdf, measure);
             if seen != of && measure != Measure::ALL {
@@ -241,7 +241,7 @@ impl Loops for Meeting<'_> {
             Shadows::Off => Lifts::All,
             Shadows::Hard | Shadows::Soft => Lifts::IfFree(seen),
         };
-        let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface, lifts) };
+        let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface, lifts, folds) };
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
@@ -261,7 +261,7 @@ struct PhongRow {
 impl PhongRow {
     /// A bit for each that reflects nothing.
     #[inline(always)]
-    fn black(&self) -> u32 {
+    fn black(&self, folds: impl Folds) -> u32 {
         if self.specular != Vec3::ZERO {
             return 0;
         }
@@ -270,7 +270,7 @@ impl PhongRow {
             let Vec3 { x, y, z } = lane(&self.diffuse, i);
             black[i] = if (x == 0.0) & (y == 0.0) & (z == 0.0) { TRUE } else { 0 };
         }
-        bits(black)
+        folds.bits(&black)
     }
 }
 
@@ -313,7 +313,7 @@ impl LitRow {
 
     /// What normals and points above their facets change for the lanes of smooth surfaces.
     #[inline(always)]
-    fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts) {
+    fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
         let [mut normals, mut mirrored] = [[[0.0; PACKET]; 3]; 2];
         let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
         for i in 0..PACKET {
@@ -334,11 +334,11 @@ impl LitRow {
             ends[i] = end;
         }
         let of = truths(surface.smooth);
-        let above = bits(above) & surface.smooth;
+        let above = folds.bits(&above) & surface.smooth;
         let rises = match lifts {
             Lifts::All => truths(above),
             Lifts::IfFree(seen) => {
-                self.is_bounded |= bits(bent) & surface.smooth;
+                self.is_bounded |= folds.bits(&bent) & surface.smooth;
                 self.may_lift |= above & seen;
                 [0; PACKET]
             }
@@ -362,7 +362,14 @@ impl LitRow {
 
     /// Where paths meet plain surfaces; a bit for each that comes to the front.
     #[inline(always)]
-    fn place(&mut self, paths: &Rays<'_>, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts) -> u32 {
+    fn place(
+        &mut self,
+        paths: &Rays<'_>,
+        rays: &RayRows,
+        surface: &SurfaceRow,
+        lifts: Lifts,
+        folds: impl Folds,
+    ) -> u32 {
         let mut front = [0; PACKET];
         self.medium = [0; PACKET];
         for i in 0..PACKET {
@@ -377,7 +384,7 @@ impl LitRow {
             set_lane(&mut self.mirrored_eye, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
         }
         if surface.smooth != 0 {
-            self.smooth(rays, surface, lifts);
+            self.smooth(rays, surface, lifts, folds);
         }
         match paths {
             Rays::Camera(_, slot, ..) => {
@@ -400,6 +407,6 @@ impl LitRow {
         for i in 0..PACKET {
             self.place[i] = paths.place(i);
         }
-        bits(front)
+        folds.bits(&front)
     }
 }

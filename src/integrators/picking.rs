@@ -8,7 +8,7 @@ use super::view::Measure;
 use crate::geometry::rows::lanes;
 use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::{Integrator, Shadows};
 use crate::world::Loops;
@@ -49,7 +49,7 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
     type Done = Sums;
 
     #[inline(always)]
-    fn run(self) -> Sums {
+    fn run(self, folds: impl Folds) -> Sums {
         let Self { lighting, tree, number, pool } = self;
         let (sampler, mut sums) = (lighting.row.sampler(lighting.shot), Sums::NOTHING);
         let samples = lighting.shot.settings.render.shadow_samples;
@@ -60,7 +60,7 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
             let picks = lighting.picks(tree, &sampler, first..(first + TOGETHER).min(samples));
             for (k, pick) in (first * each..).zip(&picks) {
                 let mut taking = Taking { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
-                lighting.add_pick(pick, &sampler, (k, samples * each), &mut taking);
+                lighting.add_pick(pick, &sampler, (k, samples * each), &mut taking, folds);
             }
         }
         sums
@@ -184,6 +184,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         sampler: &SamplerRow<LANES>,
         (number, count): (u32, u32),
         taking: &mut Taking<'_>,
+        folds: impl Folds,
     ) {
         let Taking { tree, row: row_number, pool, sums } = taking;
         let (row, render) = (self.row, &self.shot.settings.render);
@@ -197,7 +198,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             set_lane(&mut samples.weights, i, weight);
             inverse[i] *= pick.weighed[i];
         }
-        let (mut values, active) = self.values(&samples, 1.0);
+        let (mut values, active) = self.values(&samples, 1.0, folds);
         let active = active & used;
         if WEIGHED {
             // As many rays in lobes as samples are asked for come on all groups of picks, each of which has its own density.
@@ -218,7 +219,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             Shadows::Hard => self.aim_at_middles(&mut samples, &lights, active),
             Shadows::Soft => {}
         }
-        let traced = active & !row.hidden(&samples.directions);
+        let traced = active & !row.hidden(&samples.directions, folds);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
             Some(pool) if self.measure != Measure::Work => {
@@ -229,7 +230,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 }
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
-            Some(_) | None => self.add_seen(&rays, &ends, traced, &samples.sources, &values, sums),
+            Some(_) | None => self.add_seen((&rays, &ends, traced), &samples.sources, &values, sums, folds),
         }
     }
 

@@ -4,7 +4,7 @@
 use super::light::{Sums, add_where};
 use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::lights::{Source, SourceRow};
-use crate::math::lanes::{LANES, Lanes3};
+use crate::math::lanes::{Folds, LANES, Lanes3};
 use crate::world::{Geometry, Loops};
 
 /// Rays of a row of vertices, and what they bring.
@@ -110,7 +110,7 @@ impl Loops for Tracing<'_> {
     type Done = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run(self, folds: impl Folds) {
         let Self { geometry, rows, rays } = self;
         for rays in rays.chunks(LANES) {
             let mut packet = RayRows::of([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
@@ -126,7 +126,7 @@ impl Loops for Tracing<'_> {
                 sources.copy(to, &row.sources, from);
             }
             let traced = ((1_u64 << rays.len()) - 1) as u32;
-            let occluded = geometry.occluded_rows(&packet, &ends, traced, &sources);
+            let occluded = geometry.occluded_rows(&packet, &ends, traced, &sources, folds);
             for to in lanes(occluded) {
                 let ray = rays[to] as usize;
                 rows[ray / LANES].traced &= !(1 << (ray % LANES));

@@ -30,24 +30,37 @@ pub type Truths = [u32; LANES];
 /// What holds, in [`Truths`].
 pub const TRUE: u32 = u32::MAX;
 
-/// A bit for each lane where something holds. Compilers take sums of single bits apart into a test of one lane after the other:
-/// the hint has them finish the vector first, and then it is folded by halves.
-#[inline(always)]
-pub fn bits(holds: Truths) -> u32 {
-    let mut row = std::hint::black_box(holds);
-    for i in 0..LANES {
-        row[i] &= 1 << i;
+/// What instructions fold rows with. A value is the right to use them: of those that a processor may lack, values are made where
+/// it is known to have them.
+pub trait Folds: Copy {
+    /// A bit for each lane where something holds.
+    fn bits(self, holds: &Truths) -> u32;
+}
+
+/// By instructions that every processor has.
+#[derive(Clone, Copy)]
+pub struct PlainFolds;
+
+impl Folds for PlainFolds {
+    /// Compilers take sums of single bits apart into a test of one lane after the other: the hint has them finish the vector first,
+    /// and then it is folded by halves.
+    #[inline(always)]
+    fn bits(self, holds: &Truths) -> u32 {
+        let mut row = std::hint::black_box(*holds);
+        for i in 0..LANES {
+            row[i] &= 1 << i;
+        }
+        for i in 0..8 {
+            row[i] |= row[i + 8];
+        }
+        for i in 0..4 {
+            row[i] |= row[i + 4];
+        }
+        for i in 0..2 {
+            row[i] |= row[i + 2];
+        }
+        row[0] | row[1]
     }
-    for i in 0..8 {
-        row[i] |= row[i + 8];
-    }
-    for i in 0..4 {
-        row[i] |= row[i + 4];
-    }
-    for i in 0..2 {
-        row[i] |= row[i + 2];
-    }
-    row[0] | row[1]
 }
 
 /// The lanes whose bits are set.
@@ -85,7 +98,7 @@ mod tests {
     fn lanes_of_bits_are_taken() {
         for expected in 0..1_u32 << LANES {
             let holds = std::array::from_fn(|i| if expected >> i & 1 == 1 { TRUE } else { 0 });
-            assert_eq!(bits(holds), expected);
+            assert_eq!(PlainFolds.bits(&holds), expected);
             assert_eq!(truths(expected), holds);
             let (mut own, mut whole) = ([1.0; LANES], [1; LANES]);
             take(&holds, &[f32::NAN; LANES], &mut own);

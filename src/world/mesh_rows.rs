@@ -95,6 +95,7 @@ mod tests {
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::{Asked, Ray, ShapeHit};
     use crate::math::DVec3;
+    use crate::math::lanes::Folds;
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
     use crate::scene::description::Accel;
@@ -111,7 +112,7 @@ mod tests {
         type Done = SurfaceRow;
 
         #[inline(always)]
-        fn run(self) -> SurfaceRow {
+        fn run(self, _: impl Folds) -> SurfaceRow {
             let mut surface = SurfaceRow::EMPTY;
             let (rows, _) = RayRows::new(self.rays);
             self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, true);

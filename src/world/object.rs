@@ -6,6 +6,7 @@ use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::sphere::Sphere;
 use crate::geometry::{Aabb, Asked, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::lights::{Ball, Outline};
+use crate::math::lanes::Folds;
 
 /// A thing that rays can hit.
 #[derive(Clone, Debug)]
@@ -35,9 +36,16 @@ impl Object {
 
     /// The nearest hits of the rays of a packet that are in `met`; the others end below 0. `found` holds none before.
     #[inline(always)]
-    pub fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+    pub fn closest_rows(
+        &self,
+        rows: &RayRows,
+        met: u32,
+        ends: &Ends,
+        found: &mut HitRows,
+        folds: impl Folds,
+    ) {
         match self {
-            Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found),
+            Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found, folds),
             Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
         }
     }
@@ -51,14 +59,15 @@ impl Object {
         met: u32,
         ends: &Ends,
         except: Option<(u32, &[u32; PACKET])>,
+        folds: impl Folds,
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
             Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
         let mut found = HitRows::none();
-        shape.intersect_rows(rows, met, ends, &mut found);
-        let mut hit = found.any();
+        shape.intersect_rows(rows, met, ends, &mut found, folds);
+        let mut hit = found.any(folds);
         if let Some((own, parts)) = except {
             for (lane, &part) in parts.iter().enumerate() {
                 let bit = own & 1 << lane;

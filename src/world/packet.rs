@@ -5,7 +5,7 @@ use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows, traced};
 use crate::lights::SourceRow;
-use crate::math::lanes::{TRUE, bits, take, take_u32};
+use crate::math::lanes::{Folds, TRUE, take, take_u32};
 
 impl Geometry {
     /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
@@ -17,18 +17,33 @@ impl Geometry {
     /// [`Geometry::closest_packet`] inside of such loops: hits, and of which objects they are. `traced` are the bits of the rays that
     /// have an end.
     #[inline(always)]
-    pub fn closest_rows(&self, rows: &RayRows, ends: &mut Ends, traced: u32) -> (HitRows, [u32; PACKET]) {
-        let mut nearest = Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET] };
-        self.tree().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest);
+    pub fn closest_rows(
+        &self,
+        rows: &RayRows,
+        ends: &mut Ends,
+        traced: u32,
+        folds: impl Folds,
+    ) -> (HitRows, [u32; PACKET]) {
+        let mut nearest =
+            Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET], folds };
+        self.tree().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, folds);
         (nearest.hits, nearest.object)
     }
 
     /// [`Geometry::occluded`] of the segments of a packet, each with the light that it goes to: a bit for each that is. `traced` are
     /// the bits of those that have an end. To be called inside of loops for each instruction set.
     #[inline(always)]
-    pub fn occluded_rows(&self, rows: &RayRows, ends: &Ends, traced: u32, sources: &SourceRow) -> u32 {
-        let mut blockers = Blockers { geometry: self, rows, sources, in_part: in_part(sources) };
-        self.tree().any_packet(rows, ends, traced, self.unbounded(), &mut blockers)
+    pub fn occluded_rows(
+        &self,
+        rows: &RayRows,
+        ends: &Ends,
+        traced: u32,
+        sources: &SourceRow,
+        folds: impl Folds,
+    ) -> u32 {
+        let mut blockers =
+            Blockers { geometry: self, rows, sources, in_part: in_part(sources, folds), folds };
+        self.tree().any_packet(rows, ends, traced, self.unbounded(), &mut blockers, folds)
     }
 }
 
@@ -43,10 +58,10 @@ impl Loops for Closest<'_> {
     type Done = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run(self, folds: impl Folds) {
         let (rows, mut ends) = RayRows::new(self.rays);
-        let traced = traced(&ends);
-        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced);
+        let traced = traced(&ends, folds);
+        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced, folds);
         for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET) {
             *hit = hits.get(lane).map(|shape| Hit { shape, object: object[lane] });
         }
@@ -57,19 +72,20 @@ impl Loops for Closest<'_> {
 const NONE: u32 = u32::MAX;
 
 /// The nearest hits so far, and of which objects they are.
-struct Nearest<'a> {
+struct Nearest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayRows,
     hits: HitRows,
     object: [u32; PACKET],
+    folds: F,
 }
 
-impl ClosestTest for Nearest<'_> {
+impl<F: Folds> ClosestTest for Nearest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut Ends) {
         let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
-        object.closest_rows(self.rows, met, &of_these(met, ends), &mut found);
+        object.closest_rows(self.rows, met, &of_these(met, ends), &mut found, self.folds);
         let mut nearer = [0; PACKET];
         for lane in 0..PACKET {
             let (t, end) = (found.t[lane], ends[lane]);
@@ -86,18 +102,19 @@ impl ClosestTest for Nearest<'_> {
 }
 
 /// Looks for what is in the way of shadow rays.
-struct Blockers<'a> {
+struct Blockers<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayRows,
     sources: &'a SourceRow,
     /// Rays whose light is a part of an object.
     in_part: u32,
+    folds: F,
 }
 
-impl AnyTest for Blockers<'_> {
+impl<F: Folds> AnyTest for Blockers<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32 {
-        let own = own_bits(self.sources, id);
+        let own = own_bits(self.sources, id, self.folds);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
         let met = met & !whole;
         if met == 0 {
@@ -105,13 +122,13 @@ impl AnyTest for Blockers<'_> {
         }
         let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        object.any_rows(self.rows, met, &of_these(met, ends), except)
+        object.any_rows(self.rows, met, &of_these(met, ends), except, self.folds)
     }
 }
 
 /// A bit for each ray whose light is a part of an object.
 #[inline(always)]
-fn in_part(sources: &SourceRow) -> u32 {
+fn in_part(sources: &SourceRow, folds: impl Folds) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -119,12 +136,12 @@ fn in_part(sources: &SourceRow) -> u32 {
     for lane in 0..PACKET {
         in_part[lane] = if sources.part[lane] == SourceRow::NONE { 0 } else { TRUE };
     }
-    bits(in_part)
+    folds.bits(&in_part)
 }
 
 /// A bit for each ray whose light is an object or a part of it.
 #[inline(always)]
-fn own_bits(sources: &SourceRow, id: u32) -> u32 {
+fn own_bits(sources: &SourceRow, id: u32, folds: impl Folds) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -132,7 +149,7 @@ fn own_bits(sources: &SourceRow, id: u32) -> u32 {
     for lane in 0..PACKET {
         own[lane] = if sources.object[lane] == id { TRUE } else { 0 };
     }
-    bits(own)
+    folds.bits(&own)
 }
 
 /// The ends of the rays of `met`; the others end below 0.
@@ -221,9 +238,9 @@ mod tests {
         type Done = u32;
 
         #[inline(always)]
-        fn run(self) -> u32 {
+        fn run(self, folds: impl Folds) -> u32 {
             let (rows, ends) = RayRows::new(self.rays);
-            self.geometry.occluded_rows(&rows, &ends, traced(&ends), self.sources)
+            self.geometry.occluded_rows(&rows, &ends, traced(&ends, folds), self.sources, folds)
         }
     }
 

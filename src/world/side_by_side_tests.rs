@@ -94,16 +94,16 @@ impl Loops for Both<'_> {
     type Done = (HitRows, u32, u32);
 
     #[inline(always)]
-    fn run(self) -> Self::Done {
+    fn run(self, folds: impl Folds) -> Self::Done {
         let Self { object, rays, met, except } = self;
         let (rows, mut ends) = RayRows::new(rays);
         for (lane, end) in ends.iter_mut().enumerate() {
             *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
         let mut found = HitRows::none();
-        object.closest_rows(&rows, met, &ends, &mut found);
-        let any_part = object.any_rows(&rows, met, &ends, None);
-        (found, any_part, object.any_rows(&rows, met, &ends, Some(except)))
+        object.closest_rows(&rows, met, &ends, &mut found, folds);
+        let any_part = object.any_rows(&rows, met, &ends, None, folds);
+        (found, any_part, object.any_rows(&rows, met, &ends, Some(except), folds))
     }
 }
 

@@ -11,7 +11,7 @@ use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::rows::Row;
 use crate::math::Vec3;
-use crate::math::lanes::{TRUE, bits};
+use crate::math::lanes::{Folds, PlainFolds, TRUE};
 
 /// Up to [`PACKET`] subtrees that hold all primitives, in place of the upper levels; a scene of few objects is all in it.
 #[derive(Clone, Debug)]
@@ -75,12 +75,12 @@ impl Crown {
                 met[i] = if meets { met[i] } else { 0 };
             }
         }
-        bits(met) & self.used
+        PlainFolds.bits(&met) & self.used
     }
 
     /// A bit for each subtree that the rays of a beam may meet, and where they enter it at the earliest.
     #[inline(always)]
-    pub(super) fn met(&self, beam: &Beam) -> (u32, Row) {
+    pub(super) fn met(&self, beam: &Beam, folds: impl Folds) -> (u32, Row) {
         let (mut near, mut far) = ([0.0_f32; PACKET], [beam.end * SLAB_PAD; PACKET]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
@@ -107,7 +107,7 @@ impl Crown {
         for i in 0..PACKET {
             met[i] = if near[i] <= far[i] { TRUE } else { 0 };
         }
-        (bits(met) & self.used, near)
+        (folds.bits(&met) & self.used, near)
     }
 }
 
@@ -250,9 +250,9 @@ mod tests {
                     ends[lane] = -1.0;
                 }
                 let (mut closest, mut any) = (Seen(vec![0; count]), Seen(vec![0; count]));
-                let traced = traced(&ends);
-                tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest);
-                tree.any_packet(&rows, &ends, traced, &[], &mut any);
+                let traced = traced(&ends, PlainFolds);
+                tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest, PlainFolds);
+                tree.any_packet(&rows, &ends, traced, &[], &mut any, PlainFolds);
                 for (id, bounds) in boxes.iter().enumerate() {
                     for lane in lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);

@@ -11,7 +11,7 @@ use crate::accel::{Ends, PACKET};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::rows::{RayRows, Row, lanes};
-use crate::math::lanes::{TRUE, bits};
+use crate::math::lanes::{Folds, TRUE};
 
 /// Looks for the nearest hits of the rays of a packet.
 pub trait ClosestTest {
@@ -88,12 +88,12 @@ impl Stretches {
 
 /// A bit for each ray that meets a box before its end.
 #[inline(always)]
-fn met(stretches: &Stretches) -> u32 {
+fn met(stretches: &Stretches, folds: impl Folds) -> u32 {
     let mut met = [0; PACKET];
     for lane in 0..PACKET {
         met[lane] = if stretches.near[lane] <= stretches.far[lane] { TRUE } else { 0 };
     }
-    bits(met)
+    folds.bits(&met)
 }
 
 /// The end of the ray that goes on longest; below 0 where no ray is traced. Bits are ordered as in [`Stretches::first`].
@@ -143,12 +143,12 @@ impl Near {
 impl Bvh {
     /// The subtrees of the crown that the rays of a packet may meet, and where they are entered at the earliest.
     #[inline(always)]
-    fn crown_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32) -> (u32, Row) {
+    fn crown_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32, folds: impl Folds) -> (u32, Row) {
         if traced == 0 {
             return (0, [0.0; PACKET]);
         }
         let one = traced.trailing_zeros() as usize;
-        self.crown.met(&Beam::around(slabs.origin, &slabs.inverse, ends, one))
+        self.crown.met(&Beam::around(slabs.origin, &slabs.inverse, ends, one), folds)
     }
 
     /// Visit the leaves that any of at most [`PACKET`] rays may meet, near ones first; before them primitives that are not in
@@ -161,10 +161,11 @@ impl Bvh {
         traced: u32,
         outside: &[u32],
         closest: &mut impl ClosestTest,
+        folds: impl Folds,
     ) {
         let slabs = SlabPacket::new(rays);
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let mut near = Near::sorted(self.crown_met(&slabs, ends, traced));
+        let mut near = Near::sorted(self.crown_met(&slabs, ends, traced, folds));
         let mut stack = Waiting::new();
         loop {
             for &id in leaf {
@@ -183,7 +184,7 @@ impl Bvh {
                             return;
                         }
                         let (bounds, child) = self.crown.subtree(i);
-                        (entry, met(&slabs.enter(&bounds, ends)), child)
+                        (entry, met(&slabs.enter(&bounds, ends), folds), child)
                     }
                 };
                 if entry > end || in_it == 0 {
@@ -196,7 +197,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
-                let (left_met, right_met) = (met(&left), met(&right));
+                let (left_met, right_met) = (met(&left, folds), met(&right, folds));
                 if left_met == 0 || right_met == 0 {
                     let side = usize::from(left_met == 0);
                     stack.push((0.0, left_met | right_met, node.child[side]));
@@ -222,11 +223,12 @@ impl Bvh {
         traced: u32,
         outside: &[u32],
         any: &mut impl AnyTest,
+        folds: impl Folds,
     ) -> u32 {
         let slabs = SlabPacket::new(rays);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let (mut subtrees, _) = self.crown_met(&slabs, ends, traced);
+        let (mut subtrees, _) = self.crown_met(&slabs, ends, traced, folds);
         let mut stack = Waiting::new();
         loop {
             for &id in leaf {
@@ -245,7 +247,7 @@ impl Bvh {
                     None => {
                         let (bounds, child) = self.crown.subtree(subtrees.trailing_zeros() as usize % PACKET);
                         subtrees &= subtrees - 1;
-                        (met(&slabs.enter(&bounds, ends)), child)
+                        (met(&slabs.enter(&bounds, ends), folds), child)
                     }
                 };
                 if in_it & free == 0 {
@@ -258,7 +260,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 for (bounds, child) in node.bounds.iter().zip(node.child) {
-                    let met = met(&slabs.enter(bounds, ends));
+                    let met = met(&slabs.enter(bounds, ends), folds);
                     if met & free != 0 {
                         stack.push((0.0, met, child));
                     }

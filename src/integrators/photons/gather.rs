@@ -9,7 +9,7 @@ use super::map::Photon;
 use crate::geometry::rows::lanes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
-use crate::math::lanes::{Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::Loops;
 
@@ -35,7 +35,7 @@ impl Loops for Gathering<'_> {
 
     /// What arrives there and goes on to the eye, before the throughput of the paths.
     #[inline(always)]
-    fn run(self) -> Lanes3 {
+    fn run(self, _: impl Folds) -> Lanes3 {
         let Self { shot, row, maps, depth, measure } = self;
         let mut sums = [[0.0; PACKET]; 3];
         let looks = if row.used & !row.seen == 0 || measure == Measure::Work {

@@ -25,7 +25,7 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::Bsdf;
 use crate::math::Vec3;
-use crate::math::lanes::{lane, set_lane};
+use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
 use crate::world::{Hit, Loops, World};
 
@@ -387,7 +387,7 @@ impl Loops for Drawing<'_> {
     type Done = [Numbers; PACKET];
 
     #[inline(always)]
-    fn run(self) -> Self::Done {
+    fn run(self, _: impl Folds) -> Self::Done {
         let slots = std::array::from_fn(|i| self.first + i as u32);
         let (xs, ys, samples) = self.shot.block.places_of(&slots);
         let sampler = SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples);
@@ -413,7 +413,7 @@ impl Loops for Risking<'_> {
     type Done = [f32; PACKET];
 
     #[inline(always)]
-    fn run(self) -> Self::Done {
+    fn run(self, _: impl Folds) -> Self::Done {
         let (mut slots, mut paths) = ([0; PACKET], [0; PACKET]);
         for (i, ray) in self.rays.iter().enumerate().take(PACKET) {
             (slots[i], paths[i]) = (ray.slot, ray.path);

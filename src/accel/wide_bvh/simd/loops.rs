@@ -2,6 +2,11 @@
 //! are the same.
 
 use super::Instructions;
+use crate::math::lanes::{Folds, PlainFolds};
+#[cfg(target_arch = "x86_64")]
+use crate::math::lanes::{LANES, Truths};
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::*;
 
 /// Work in loops without branches over rows. What it calls in its loops must be inlined, and no closure, or it is compiled
 /// without the instructions.
@@ -9,8 +14,8 @@ pub trait Loops {
     /// What it gives.
     type Done;
 
-    /// Do it.
-    fn run(self) -> Self::Done;
+    /// Do it, folding rows by these.
+    fn run(self, folds: impl Folds) -> Self::Done;
 }
 
 impl Instructions {
@@ -18,7 +23,7 @@ impl Instructions {
     #[inline]
     pub fn run<L: Loops>(self, work: L) -> L::Done {
         match self.available() {
-            Self::Portable => work.run(),
+            Self::Portable => work.run(PlainFolds),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the processor has what is available.
             Self::Avx2 => unsafe { avx2(work) },
@@ -26,7 +31,7 @@ impl Instructions {
             // SAFETY: as above.
             Self::Avx512 => unsafe { avx512(work) },
             #[cfg(not(target_arch = "x86_64"))]
-            _ => work.run(),
+            _ => work.run(PlainFolds),
         }
     }
 }
@@ -34,11 +39,58 @@ impl Instructions {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn avx2<L: Loops>(work: L) -> L::Done {
-    work.run()
+    work.run(Avx2Folds(()))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn avx512<L: Loops>(work: L) -> L::Done {
-    work.run()
+    work.run(Avx512Folds(()))
+}
+
+/// Made where the processor has AVX2.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+struct Avx2Folds(());
+
+#[cfg(target_arch = "x86_64")]
+impl Folds for Avx2Folds {
+    #[inline(always)]
+    fn bits(self, holds: &Truths) -> u32 {
+        // SAFETY: a value is made where the processor has AVX2 alone.
+        unsafe { avx2_bits(holds) }
+    }
+}
+
+/// Made where the processor has AVX-512F, VL, DQ and BW.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+struct Avx512Folds(());
+
+#[cfg(target_arch = "x86_64")]
+impl Folds for Avx512Folds {
+    #[inline(always)]
+    fn bits(self, holds: &Truths) -> u32 {
+        // SAFETY: a value is made where the processor has AVX-512F, VL, DQ and BW alone.
+        unsafe { avx512_bits(holds) }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx2")]
+fn avx2_bits(holds: &Truths) -> u32 {
+    let (low, high) = holds.split_at(LANES / 2);
+    // SAFETY: eight numbers may be read from each half, at any address.
+    let [low, high] = [low, high].map(|half| unsafe { _mm256_loadu_ps(half.as_ptr().cast()) });
+    (_mm256_movemask_ps(low) | _mm256_movemask_ps(high) << (LANES / 2)) as u32
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+fn avx512_bits(holds: &Truths) -> u32 {
+    // SAFETY: sixteen numbers may be read, at any address.
+    let row = unsafe { _mm512_loadu_epi32(holds.as_ptr().cast()) };
+    u32::from(_mm512_movepi32_mask(row))
 }
