@@ -92,11 +92,11 @@ impl Lights {
     /// How often a vertex that picks in this way samples lights, at a point of a surface with this normal, if nothing else is known
     /// of that.
     pub fn samples_at(&self, picks: Picks, point: Vec3, normal: Vec3) -> Samples<'_> {
-        Samples(self.tree().map(|tree| {
-            let mut cut = picks.cut(tree);
-            cut.go_to(&Receiver::plain(point, normal));
-            (picks, cut)
-        }))
+        // What is not picked from is not moved: a cut is large.
+        let Some(tree) = &self.tree else { return Samples(None) };
+        let mut cut = picks.cut(tree);
+        cut.go_to(&Receiver::plain(point, normal));
+        Samples(Some((picks, cut)))
     }
 
     /// Bytes that trees over lights and over the triangles of lights hold.
