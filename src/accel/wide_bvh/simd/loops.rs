@@ -1,12 +1,13 @@
 //! Plain loops, compiled once more for the vector instructions that the processor has. Nothing is fused or reordered: the bits
 //! are the same.
 
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::*;
+
 use super::Instructions;
 use crate::math::lanes::{Folds, PlainFolds};
 #[cfg(target_arch = "x86_64")]
 use crate::math::lanes::{LANES, Truths};
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::*;
 
 /// Work in loops without branches over rows. What it calls in its loops must be inlined, and no closure, or it is compiled
 /// without the instructions.
@@ -93,4 +94,30 @@ fn avx512_bits(holds: &Truths) -> u32 {
     // SAFETY: sixteen numbers may be read, at any address.
     let row = unsafe { _mm512_loadu_epi32(holds.as_ptr().cast()) };
     u32::from(_mm512_movepi32_mask(row))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::lanes::truths;
+
+    struct Folding(u32);
+
+    impl Loops for Folding {
+        type Done = u32;
+
+        #[inline(always)]
+        fn run(self, folds: impl Folds) -> u32 {
+            folds.bits(&truths(self.0))
+        }
+    }
+
+    #[test]
+    fn rows_are_folded_into_their_bits_by_all_instructions() {
+        for instructions in Instructions::ALL {
+            for bits in 0..1 << 16 {
+                assert_eq!(instructions.run(Folding(bits)), bits, "{instructions:?}");
+            }
+        }
+    }
 }
