@@ -143,9 +143,12 @@ pub struct RenderArgs {
     /// Pixels down
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Picture")]
     pub height: Option<u32>,
-    /// Samples per pixel
+    /// Samples per pixel, at most
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = samples, help_heading = "Picture")]
     pub samples: Option<u32>,
+    /// Stop sampling each tile once its noise is below this part of its brightness; 0: never
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = error, help_heading = "Picture")]
+    pub error: Option<f32>,
     /// Stop after this long, with the samples that there are
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Picture")]
     pub time: Option<f64>,
@@ -208,6 +211,7 @@ impl RenderArgs {
             width: self.width,
             height: self.height,
             samples: self.samples,
+            error: self.error,
             time_seconds: self.time,
             max_depth: self.max_depth,
             integrator: self.integrator,
@@ -300,6 +304,13 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds above 0".to_owned()),
+    }
+}
+
+fn error(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(error) if error >= 0.0 && error.is_finite() => Ok(error),
+        _ => Err("expected a part of the brightness, such as 0.02; 0 for none".to_owned()),
     }
 }
 

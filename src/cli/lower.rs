@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn every_option_arrives() {
         let order = lowered(
-            "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --time 0.5 --max-depth 0 \
+            "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
              --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --progress json --color 256 --poll",
         )
@@ -92,6 +92,7 @@ mod tests {
             width: Some(3),
             height: Some(4),
             samples: Some(5),
+            error: Some(0.02),
             time_seconds: Some(0.5),
             max_depth: Some(0),
             integrator: Some(description::Integrator::Path),

@@ -16,6 +16,7 @@ pub mod stretch;
 mod sums;
 pub mod tone;
 
+pub use noise::{HalfNoise, samples_to};
 pub use preview::Previewer;
 pub use quantity::Quantity;
 pub use srgb::linear_to_srgb8;

@@ -20,8 +20,8 @@ pub(super) fn luminance(radiance: DVec3) -> f64 {
 pub(super) struct Steps {
     /// Luminance of each pixel at the last power of two of its samples.
     last: Vec<f64>,
-    /// Sums over the pixels of the squared steps to 2, 4, 8, … samples.
-    squares: Vec<f64>,
+    /// Sums over the pixels of even and of odd rows of the squared steps to 2, 4, 8, … samples.
+    squares: Vec<[f64; 2]>,
     /// The last step of each pixel.
     recent: Vec<f32>,
 }
@@ -47,13 +47,13 @@ impl Steps {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
-    /// A pixel has a power of two of samples, which make this luminance.
-    pub(super) fn note(&mut self, pixel: usize, count: u32, luminance: f64) {
+    /// A pixel of a half of the tile has a power of two of samples, which make this luminance.
+    pub(super) fn note(&mut self, (pixel, half): (usize, usize), count: u32, luminance: f64) {
         let level = count.trailing_zeros() as usize;
         if level > 0 {
-            self.squares.resize(self.squares.len().max(level), 0.0);
+            self.squares.resize(self.squares.len().max(level), [0.0; 2]);
             let step = luminance - self.last[pixel];
-            self.squares[level - 1] += step * step;
+            self.squares[level - 1][half] += step * step;
             self.recent[pixel] = step as f32;
         }
         self.last[pixel] = luminance;
@@ -65,16 +65,34 @@ impl Steps {
 /// by earlier steps does worse, as few bright pixels may decide it.
 const RATE: f64 = 2.7;
 
-/// The variance of means of `count` samples, by the sums of squared steps to 2, 4, … of them: that of the last step and what
-/// the one before foretells of it together, as each has a spread.
-fn variance(steps: &[f64], count: u32) -> Option<f64> {
+/// The variance of means of `count` samples, by the sums of squared steps of one half to 2, 4, … of them: that of the last step and
+/// what the one before foretells of it together, as each has a spread.
+fn variance(steps: &[[f64; 2]], half: usize, count: u32) -> Option<f64> {
     let level = count.checked_ilog2()? as usize;
-    let last = *steps.get(level.checked_sub(1)?)?;
+    let last = steps.get(level.checked_sub(1)?)?[half];
     let step = match level.checked_sub(2) {
-        Some(before) => 0.5 * (last + steps[before] / RATE),
+        Some(before) => 0.5 * (last + steps[before][half] / RATE),
         None => last,
     };
     Some(pixel_variance(step, count))
+}
+
+/// Samples that bring the standard error of means of `count` samples to a part of itself, as far as its rate is known.
+pub fn samples_to(part: f64, count: u32) -> u32 {
+    // The variance falls with this power of the samples.
+    let power = libm::log2(RATE);
+    (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
+}
+
+/// How much noise there is in the even or the odd rows of a tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfNoise {
+    /// Mean variance of the pixels' luminance.
+    pub variance: f64,
+    /// Mean luminance.
+    pub mean: f64,
+    /// Samples of each pixel.
+    pub samples: u32,
 }
 
 /// The variance of a mean of `count` ≥ 2 samples by the squared step to the last power of two of them.
@@ -92,25 +110,62 @@ impl Film {
     /// Next to 0 where all samples of each pixel are alike; none where a pixel has fewer than two samples,
     /// of which nothing can be told.
     pub fn relative_error(&self) -> Option<f64> {
-        let (mut steps, mut least, mut means) = (Vec::new(), u32::MAX, 0.0);
-        for index in 0..self.tile_count() {
-            let tile = self.tile(index);
+        let (mut variances, mut means) = (0.0, 0.0);
+        for tile in 0..self.tile_count() {
+            if self.tile(tile).counts.is_empty() {
+                return None;
+            }
+            for half in 0..2 {
+                let pixels = self.half_pixels(tile, half).count() as f64;
+                if pixels > 0.0 {
+                    let HalfNoise { variance, mean, .. } = self.half_noise(tile, half)?;
+                    variances += variance * pixels;
+                    means += mean * pixels;
+                }
+            }
+        }
+        let pixels = self.crop().area() as f64;
+        let error = (variances / pixels).sqrt();
+        // Of a black picture too.
+        let relative = if error == 0.0 { 0.0 } else { error / (means / pixels) };
+        Some(relative).filter(|relative| relative.is_finite())
+    }
+
+    /// The noise in the even rows of a tile, counted from its own first, or in the odd ones; none where a pixel has fewer than two
+    /// samples, and where there are no such rows.
+    pub fn half_noise(&self, number: usize, half: usize) -> Option<HalfNoise> {
+        let tile = self.tile(number);
+        let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
+        for pixel in self.half_pixels(number, half) {
+            sum += luminance(tile.mean(pixel)?);
+            samples = samples.min(tile.count(pixel));
+            pixels += 1;
+        }
+        let pixels = Some(f64::from(pixels)).filter(|pixels| *pixels > 0.0)?;
+        let variance = variance(&tile.steps.squares, half, samples)? / pixels;
+        Some(HalfNoise { variance, mean: sum / pixels, samples })
+    }
+
+    /// Places of the pixels of the even or the odd rows of a tile.
+    fn half_pixels(&self, tile: usize, half: usize) -> impl Iterator<Item = usize> {
+        let (columns, rows) =
+            self.tile_rect(tile).map_or((0, 0), |rect| (rect.width as usize, rect.height as usize));
+        (half..rows).step_by(2).flat_map(move |row| row * columns..(row + 1) * columns)
+    }
+
+    /// Mean luminance of the picture; none where a pixel has no sample.
+    pub fn mean_luminance(&self) -> Option<f64> {
+        let mut sum = 0.0;
+        for tile in 0..self.tile_count() {
+            let tile = self.tile(tile);
             if tile.counts.is_empty() {
                 return None;
             }
             for pixel in 0..tile.counts.len() {
-                means += luminance(tile.mean(pixel)?);
-                least = least.min(tile.count(pixel));
+                sum += luminance(tile.mean(pixel)?);
             }
-            let own = &tile.steps.squares;
-            steps.resize(own.len().max(steps.len()), 0.0);
-            steps.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
         }
-        let pixels = self.crop().area() as f64;
-        let error = (variance(&steps, least)? / pixels).sqrt();
-        // Of a black picture too.
-        let relative = if error == 0.0 { 0.0 } else { error / (means / pixels) };
-        Some(relative).filter(|relative| relative.is_finite())
+        Some(sum / self.crop().area() as f64)
     }
 }
 

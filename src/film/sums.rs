@@ -111,9 +111,14 @@ impl Tile {
         self.steps.fill(area);
     }
 
-    /// Add samples of one pixel in their order; how many of them are not finite. `is_negative` tells them apart where the
+    /// Add samples of one pixel of a half of the tile in their order; how many of them are not finite. `is_negative` tells them apart where the
     /// filter has negative lobes of this weight.
-    fn add(&mut self, index: usize, radiances: &[Vec3], lobes: Option<(f64, &[bool])>) -> u64 {
+    fn add(
+        &mut self,
+        (index, half): (usize, usize),
+        radiances: &[Vec3],
+        lobes: Option<(f64, &[bool])>,
+    ) -> u64 {
         let mut non_finite = 0;
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
@@ -132,7 +137,7 @@ impl Tile {
             if part.len() == left
                 && let Some(mean) = self.mean(index)
             {
-                self.steps.note(index, self.counts[index], luminance(mean));
+                self.steps.note((index, half), self.counts[index], luminance(mean));
             }
         }
         non_finite
@@ -258,7 +263,8 @@ impl Film {
             let Some(index) = index_in(rect, samples.rect.x + x, samples.rect.y + y) else { continue };
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
-            non_finite += tile.add(index, pixel, lobes);
+            let half = index / rect.width as usize % 2;
+            non_finite += tile.add((index, half), pixel, lobes);
         }
         tile.revision += 1;
         drop(guard);

@@ -45,6 +45,11 @@ impl Pace {
         Self { total, fraction: 0.0, rate: None, measured: (0.0, done) }
     }
 
+    /// There is as much to do in all.
+    pub(super) fn expect(&mut self, total: u64) {
+        self.total = total;
+    }
+
     /// The fraction done, never falling, and the seconds to go once they can be told.
     pub(super) fn at(&mut self, seconds: f64, done: u64) -> (f64, Option<f64>) {
         let (since, before) = self.measured;

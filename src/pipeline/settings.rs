@@ -23,6 +23,8 @@ pub struct Overrides {
     pub height: Option<u32>,
     /// Samples per pixel.
     pub samples: Option<u32>,
+    /// Noise that ends the sampling of a tile.
+    pub error: Option<f32>,
     /// Stop rendering after this long, with what there is.
     pub time_seconds: Option<f64>,
     /// Scatterings along a path.
@@ -58,6 +60,7 @@ impl Overrides {
             width: self.width.unwrap_or(to.width),
             height: self.height.unwrap_or(to.height),
             samples: self.samples.unwrap_or(to.samples),
+            error: self.error.unwrap_or(to.error),
             max_depth: self.max_depth.unwrap_or(to.max_depth),
             integrator: self.integrator.unwrap_or(to.integrator),
             shadows: self.shadows.unwrap_or(to.shadows),
@@ -76,8 +79,10 @@ pub struct Effective {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Samples per pixel.
+    /// Samples per pixel, at most.
     pub samples: u32,
+    /// Noise that ends the sampling of a tile, relative to its brightness; 0: none does.
+    pub error: f32,
     /// Method.
     #[serde(serialize_with = "choice::serialize")]
     pub integrator: Integrator,
@@ -112,6 +117,7 @@ impl Effective {
             width: render.width,
             height: render.height,
             samples: render.samples,
+            error: render.error,
             integrator: render.integrator,
             shadows: settings.render.shadows,
             clamp: render.clamp,

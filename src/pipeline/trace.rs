@@ -41,20 +41,65 @@ pub(super) struct Tracer<'a> {
 pub(super) struct Job {
     pub(super) tile: usize,
     pub(super) rect: Rect,
+    pub(super) rows: Rows,
     pub(super) samples: Range<u32>,
 }
 
-impl Tracer<'_> {
-    fn trace(&self, job: &Job) -> Result<(TileSamples, RayCounters), Cancelled> {
-        let Self { kernel, world, settings, token, photons, .. } = *self;
-        match photons {
-            Some(_) => render_tile_by(photons, world, settings, job.rect, job.samples.clone(), token),
-            None => kernel(world, settings, job.rect, job.samples.clone(), token),
-        }
+/// Rows of a tile, counted from its own first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rows {
+    All,
+    /// The even ones, or the odd ones.
+    Half(usize),
+}
+
+impl Rows {
+    /// How many pixels of a rectangle they are.
+    pub(super) fn pixels(self, rect: Rect) -> u64 {
+        let rows = match self {
+            Self::All => rect.height as usize,
+            Self::Half(half) => (rect.height as usize + 1 - half) / 2,
+        };
+        u64::from(rect.width) * rows as u64
+    }
+}
+
+impl Job {
+    /// How many there are.
+    pub(super) fn pixels(&self) -> u64 {
+        self.rows.pixels(self.rect)
     }
 
-    /// Do the jobs. `keep` takes the samples of every job that is finished, on the thread that made them, in whose cache they
-    /// are; `each` is then told on this one, in the order in which they end, and every now and then nothing; it says whether
+    /// The rectangles to be rendered.
+    fn rects(&self) -> Vec<Rect> {
+        match self.rows {
+            Rows::All => vec![self.rect],
+            Rows::Half(half) => {
+                let row = |y| Rect { y: self.rect.y + y, height: 1, ..self.rect };
+                (half as u32..self.rect.height).step_by(2).map(row).collect()
+            }
+        }
+    }
+}
+
+impl Tracer<'_> {
+    fn trace(&self, job: &Job) -> Result<(Vec<TileSamples>, RayCounters), Cancelled> {
+        let Self { kernel, world, settings, token, photons, .. } = *self;
+        let (mut pieces, mut all) = (Vec::new(), RayCounters::default());
+        for rect in job.rects() {
+            let samples = job.samples.clone();
+            let (piece, rays) = match photons {
+                Some(_) => render_tile_by(photons, world, settings, rect, samples, token),
+                None => kernel(world, settings, rect, samples, token),
+            }?;
+            pieces.push(piece);
+            all += rays;
+        }
+        Ok((pieces, all))
+    }
+
+    /// Do the jobs. `keep` takes the samples of every job that is finished, in pieces, on the thread that made them, in whose cache
+    /// they are; `each` is then told on this one, in the order in which they end, and every now and then nothing; it says whether
     /// to go on. Jobs that have begun are finished.
     ///
     /// # Errors
@@ -62,7 +107,7 @@ impl Tracer<'_> {
     pub(super) fn run<K: Send>(
         &self,
         jobs: &[Job],
-        keep: impl Fn(&Job, TileSamples) -> K + Sync,
+        keep: impl Fn(&Job, Vec<TileSamples>) -> K + Sync,
         mut each: impl FnMut(Option<(&Job, K, RayCounters)>) -> bool,
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -109,10 +154,11 @@ impl Drop for StopOnPanic<'_> {
 }
 
 /// Samples that every pixel has after the next pass: 1, 2, 4, … so that pictures come early, then in steps that
-/// keep a tile short.
+/// keep a tile short. Every power of two is the end of a pass, as noise is judged there.
 pub(super) fn next_pass(done: u32, total: u32) -> u32 {
     const LONGEST: u32 = 32;
-    done.saturating_add(done.clamp(1, LONGEST)).min(total)
+    let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
+    done.saturating_add(done.clamp(1, LONGEST)).min(power).min(total)
 }
 
 #[cfg(test)]
@@ -132,6 +178,7 @@ mod tests {
         };
         assert_eq!(passes(1), [0, 1]);
         assert_eq!(passes(100), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
+        assert_eq!(next_pass(100, 1000), 128);
         assert_eq!(next_pass(u32::MAX - 1, u32::MAX), u32::MAX);
     }
 }

@@ -133,6 +133,7 @@ pub(super) fn settings() -> Effective {
     Effective {
         width: 640,
         height: 480,
+        error: 0.0,
         samples: 64,
         integrator: Integrator::Whitted,
         shadows: Shadows::Soft,

@@ -280,9 +280,10 @@ const BROKEN: &[(&str, &[Said])] = &[
             (7, 12, "`exposure` must be between -100 and 100; found 101"),
             (8, 18, "`shadow_samples` must be a whole number between 1 and 4096; found 5000"),
             (9, 8, "`seed` must be a whole number between 0 and 4294967295; found 4294967296"),
-            (14, 7, "`fov` must be greater than 0 and less than 180; found 180"),
-            (15, 12, "`aperture` must be at least 0; found -0.1"),
-            (16, 9, "`focus` must be greater than 0; found 0"),
+            (10, 9, "`error` must be at least 0; found -0.5"),
+            (15, 7, "`fov` must be greater than 0 and less than 180; found 180"),
+            (16, 12, "`aperture` must be at least 0; found -0.1"),
+            (17, 9, "`focus` must be greater than 0; found 0"),
         ],
     ),
     (
@@ -325,7 +326,6 @@ const BROKEN: &[(&str, &[Said])] = &[
             (19, 16, "this text is not closed"),
         ],
     ),
-    ("unavailable", &[(5, 9, "`error` > 0 is not available in this version")]),
     (
         "undefined_names",
         &[

@@ -72,7 +72,7 @@ impl Films {
     /// One too large for the budget is dropped alone; the others make room for one that is not.
     fn keep(&mut self, canvas: Canvas) {
         let size = canvas.memory_bytes();
-        if size > self.most_kept_bytes || canvas.units(|tile| canvas.done[tile]) == 0 {
+        if size > self.most_kept_bytes || !canvas.is_begun() {
             return;
         }
         while self.kept.iter().map(Canvas::memory_bytes).sum::<u64>() + size > self.most_kept_bytes {
@@ -100,7 +100,7 @@ mod tests {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
         let mut canvas = Canvas::new(key(name), &plan, u64::MAX).expect("a film");
-        canvas.done.fill(1);
+        canvas.done.fill([1; 2]);
         canvas
     }
 

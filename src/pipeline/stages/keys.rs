@@ -215,6 +215,7 @@ mod tests {
             width,
             height,
             samples,
+            error,
             shadow_samples,
             max_depth,
             integrator,
@@ -242,6 +243,7 @@ mod tests {
         let others = [
             with(Render { width: width + 1, ..render_settings }),
             with(Render { height: height + 1, ..render_settings }),
+            with(Render { error: error + 0.5, ..render_settings }),
             with(Render { shadow_samples: shadow_samples + 1, ..render_settings }),
             with(Render { max_depth: max_depth + 1, ..render_settings }),
             with(Render { shadows: Shadows::Hard, ..render_settings }),

@@ -1,6 +1,7 @@
 //! The stages, one file each: a function of its inputs and of what is kept from before.
 
 pub(super) mod accel;
+mod adaptive;
 pub(super) mod canvas;
 pub(super) mod films;
 pub(super) mod keys;

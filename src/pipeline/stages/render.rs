@@ -12,7 +12,7 @@ use super::super::pace::{Clock, Pace};
 use super::super::plan::Plan;
 use super::super::protocol::{PreviewSize, RenderProgress};
 use super::super::sink::Sink;
-use super::super::trace::{Job, Tracer, next_pass};
+use super::super::trace::{Job, Rows, Tracer, next_pass};
 use super::canvas::Canvas;
 use super::films::Films;
 use super::photons::{PhotonStore, Sending};
@@ -57,16 +57,16 @@ pub(in crate::pipeline) fn render(
     films: &mut Films,
     rendering: &Rendering<'_>,
 ) -> Result<Staged<RayCounters>, Stop> {
-    let wanted = rendering.plan.settings.render.samples;
+    let Render { samples: wanted, error, .. } = rendering.plan.settings.render;
     let is_other = films.current().is_some_and(|current| current.key != key);
-    films.select(key, |kept| !rendering.force && kept.done.iter().all(|done| *done <= wanted));
+    films.select(key, |kept| !rendering.force && kept.has_at_most(wanted));
     if films.current().is_none() {
         films.put(|| Canvas::new(key, rendering.plan, rendering.most_film_bytes)).map_err(Stop::work)?;
     }
     let Some(canvas) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
     let budget = rendering.plan.time_seconds;
     let finished = canvas.is_complete(wanted) || (budget.is_some() && canvas.ended_by == budget);
-    let had = canvas.samples();
+    let had = canvas.samples(wanted);
     let mut painter = Painter::new(canvas, rendering);
     if finished {
         painter.show();
@@ -80,6 +80,9 @@ pub(in crate::pipeline) fn render(
         (true, _) => {
             canvas.ended_by = budget;
             Staged::done(rays, "the time was up")
+        }
+        (false, _) if canvas.goals.are_below(wanted) => {
+            Staged::done(rays, format!("the noise of some tiles is below {error}"))
         }
         (false, 0) => Staged::done(rays, ""),
         (false, _) => Staged::done(rays, format!("went on after {had} samples")),
@@ -106,8 +109,8 @@ struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     fn new(canvas: &'a mut Canvas, rendering: &'a Rendering<'a>) -> Self {
-        let units = canvas.units(|tile| canvas.done[tile]);
-        let total_units = canvas.units(|_| rendering.plan.settings.render.samples);
+        let units = canvas.units();
+        let total_units = canvas.units_to_come(rendering.plan.settings.render.samples);
         let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
         Self {
             is_first: !canvas.is_covered(),
@@ -138,8 +141,15 @@ impl<'a> Painter<'a> {
             self.show();
             self.tick();
         }
-        while !self.canvas.is_complete(self.rendering.plan.settings.render.samples) && !self.is_over_time {
-            self.pass(next_pass(self.canvas.samples(), self.rendering.plan.settings.render.samples))?;
+        let Render { samples, error, .. } = self.rendering.plan.settings.render;
+        while !self.canvas.is_complete(samples) && !self.is_over_time {
+            let target = next_pass(self.canvas.samples(samples), samples);
+            self.pass(target)?;
+            if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
+                self.canvas.judge(error.into());
+                self.total_units = self.canvas.units_to_come(samples);
+                self.pace.expect(self.total_units);
+            }
         }
         self.show();
         self.say_progress(true);
@@ -150,7 +160,7 @@ impl<'a> Painter<'a> {
     fn pass(&mut self, target: u32) -> Result<(), Stop> {
         let Some(photons) = self.rendering.photons else { return self.pass_by(target, None) };
         while !self.canvas.is_complete(target) && !self.is_over_time {
-            let samples = self.canvas.samples();
+            let samples = self.canvas.samples(target);
             let part = target.min(samples.saturating_add(photons.at_once()));
             // Photons that no time is left for are not sent, nor gathered.
             self.tick();
@@ -177,11 +187,11 @@ impl<'a> Painter<'a> {
         let jobs = self.canvas.jobs(target);
         let tracer = Tracer { photons, ..self.rendering.tracer };
         let film = Arc::clone(&self.canvas.film);
-        let keep = |job: &Job, samples: TileSamples| film.add(job.tile, &samples);
+        let keep =
+            |job: &Job, pieces: Vec<TileSamples>| pieces.iter().for_each(|piece| film.add(job.tile, piece));
         tracer.run(&jobs, keep, |result| {
             if let Some((job, (), rays)) = result {
-                self.canvas.done[job.tile] = job.samples.end;
-                self.units += job.rect.area() as u64 * job.samples.len() as u64;
+                self.units += self.canvas.note(job);
                 self.rays += rays;
             }
             self.tick();
@@ -282,10 +292,10 @@ impl<'a> Painter<'a> {
         let mut base = RadianceImage::black(width, height);
         tracer.run(
             &coarse_jobs(rect),
-            |_, samples| samples,
+            |_, pieces| pieces,
             |result| {
-                if let Some((job, samples, _)) = result {
-                    base.put(job.rect, &samples.radiance);
+                for piece in result.into_iter().flat_map(|(_, pieces, _)| pieces) {
+                    base.put(piece.rect, &piece.radiance);
                 }
                 true
             },
@@ -302,7 +312,7 @@ fn coarse_jobs(rect: Rect) -> Vec<Job> {
     let starts = |start: u32, length: u32| (start..start + length).step_by(SIDE as usize);
     let piece = |(x, y)| Rect { x, y, width: SIDE, height: SIDE }.intersection(&rect);
     let places = starts(rect.y, rect.height).flat_map(|y| starts(rect.x, rect.width).map(move |x| (x, y)));
-    let job = |(tile, rect)| Job { tile, rect, samples: 0..1 };
+    let job = |(tile, rect)| Job { tile, rect, rows: Rows::All, samples: 0..1 };
     places.filter_map(piece).enumerate().map(job).collect()
 }
 

@@ -1,5 +1,6 @@
 //! The worker driven by messages, as front ends do it.
 
+mod adaptive;
 mod orders;
 mod reuse;
 mod targets;

@@ -18,6 +18,8 @@ pub struct Render {
     pub height: u32,
     /// Most samples per pixel, ≥ 1.
     pub samples: u32,
+    /// Noise at which a tile gets no more samples, relative to its brightness; 0: none ends it.
+    pub error: f32,
     /// Shadow rays towards each light from each shaded point, ≥ 1.
     pub shadow_samples: u32,
     /// Scatterings along one path: 0 = emitted light only, 1 = direct light.
@@ -97,6 +99,7 @@ impl Fingerprinted for Render {
             height,
             // The film knows how many it has.
             samples: _,
+            error,
             shadow_samples,
             max_depth,
             integrator,
@@ -112,6 +115,7 @@ impl Fingerprinted for Render {
             accel: _,
             seed,
         } = self.heeded();
+        key.f32(error);
         key.u64(width.into()).u64(height.into()).u64(shadow_samples.into()).u64(max_depth.into());
         key.choice(integrator)
             .choice(shadows)

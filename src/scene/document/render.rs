@@ -20,6 +20,7 @@ const DEFAULT: Render = Render {
     width: 640,
     height: 480,
     samples: 64,
+    error: 0.0,
     shadow_samples: 1,
     max_depth: 8,
     integrator: Integrator::Whitted,
@@ -42,6 +43,7 @@ pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
         width: key("width").whole(1..=MAX_SIDE).unwrap_or(DEFAULT.width),
         height: key("height").whole(1..=MAX_SIDE).unwrap_or(DEFAULT.height),
         samples: key("samples").whole(1..=MAX_U32).unwrap_or(DEFAULT.samples),
+        error: key("error").number32(Limits::AtLeast(0.0)).unwrap_or(DEFAULT.error),
         shadow_samples: key("shadow_samples").whole(1..=4096).unwrap_or(DEFAULT.shadow_samples),
         max_depth: key("max_depth").whole(0..=i128::from(MOST_SCATTERINGS)).unwrap_or(DEFAULT.max_depth),
         integrator: key("integrator").choice().unwrap_or(DEFAULT.integrator),
@@ -56,7 +58,6 @@ pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
         seed: key("seed").whole(0..=MAX_U32).unwrap_or(DEFAULT.seed),
     };
     let output = output(&table);
-    refuse_error(&table);
     check_size(&table, &render);
     table.finish();
     (Some(render), output)
@@ -66,17 +67,6 @@ fn output(table: &Table<'_>) -> Option<PathBuf> {
     let key = table.optional("output");
     let text = key.text("the path of a picture, such as \"picture.png\"")?;
     key.has_ending(text, &PICTURES, &["webp"]).then(|| table.context.resolve(text))
-}
-
-/// Stopping at an error is for a later version; not to stop is the default.
-fn refuse_error(table: &Table<'_>) {
-    let key = table.optional("error");
-    let Some((error, span)) = key.number(Limits::AtLeast(0.0)).zip(key.span()) else { return };
-    if error > 0.0 {
-        let message = "`error` > 0 is not available in this version";
-        let help = "use 0.0 and set `samples`: every pixel gets that many";
-        table.context.report(Issue::error(span, message).help(help));
-    }
 }
 
 fn check_size(table: &Table<'_>, render: &Render) {

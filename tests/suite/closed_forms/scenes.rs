@@ -33,6 +33,7 @@ pub struct Build {
 /// Nothing, seen from (0, 0, 0) along −z through a single narrow pixel.
 pub fn scene() -> Build {
     let render = Render {
+        error: 0.0,
         width: 1,
         height: 1,
         samples: 1,

@@ -1,0 +1,199 @@
+//! Which parts of a picture have enough samples.
+//!
+//! To stop by the same samples that the picture is the mean of would make it too dark: what is rare and bright ends no sampling
+//! where it was not met yet, and goes on where it was. So the even rows of a tile stop by the noise of its odd rows, and these by
+//! that of the even ones, whose samples are others; the noise of both is much the same.
+
+use crate::film::{Film, HalfNoise, samples_to};
+
+/// Samples before which noise is not asked for.
+const LEAST: u32 = 16;
+
+/// The part of the noise asked for that is aimed at, as noise is known by some samples only.
+const AIM: f64 = 0.9;
+
+/// The least brightness that noise is held against, as a part of the picture's.
+const LEAST_BRIGHTNESS: f64 = 0.01;
+
+/// Samples that the halves of each tile are to have.
+#[derive(Debug)]
+pub(super) struct Goals {
+    /// What is decided; [`u32::MAX`] before.
+    decided: Vec<[u32; 2]>,
+    /// What is expected to be.
+    expected: Vec<[u32; 2]>,
+    /// Mean luminance of the picture, when noise was first asked for.
+    brightness: Option<f64>,
+}
+
+impl Goals {
+    /// For so many tiles, of which nothing is known.
+    pub(super) fn none(tiles: usize) -> Self {
+        let open = vec![[u32::MAX; 2]; tiles];
+        Self { decided: open.clone(), expected: open, brightness: None }
+    }
+
+    /// Samples that a half of a tile is to have at most.
+    pub(super) fn of(&self, tile: usize, half: usize) -> u32 {
+        self.decided[tile][half]
+    }
+
+    /// Samples that it is expected to get; [`u32::MAX`] where nothing is known.
+    pub(super) fn expected(&self, tile: usize, half: usize) -> u32 {
+        self.expected[tile][half]
+    }
+
+    /// Whether any half gets fewer samples than these.
+    pub(super) fn are_below(&self, samples: u32) -> bool {
+        self.decided.as_flattened().iter().any(|goal| *goal < samples)
+    }
+
+    /// Decide for every half that has no goal yet, by the noise of the other one. `done` are the samples that they have, in those
+    /// without a goal the same power of two.
+    pub(super) fn judge(&mut self, film: &Film, done: &[[u32; 2]], error: f64) {
+        let open = |goals: &[u32; 2], done: &[u32; 2]| {
+            (0..2).any(|half| goals[half] > done[half] && done[half] < LEAST)
+        };
+        if self.decided.iter().zip(done).any(|(goals, done)| open(goals, done)) {
+            return;
+        }
+        let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
+        self.brightness = Some(brightness);
+        for (tile, done) in done.iter().enumerate() {
+            if self.decided[tile].iter().all(|goal| *goal < u32::MAX) {
+                continue;
+            }
+            let [even, odd] = [0, 1].map(|half| film.half_noise(tile, half));
+            // A tile of one row has no other half.
+            let of_others = [odd.or(even), even.or(odd)];
+            let was_decided = self.decided[tile].map(|goal| goal < u32::MAX);
+            for half in 0..2 {
+                let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
+                let wanted = wanted(&noise, brightness, error);
+                self.expected[tile][half] = wanted.max(done[half]);
+                // Where the other half has no more samples to come, nothing more will be known.
+                if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
+                    self.decided[tile][half] = wanted.max(done[half]);
+                }
+            }
+        }
+    }
+}
+
+/// Samples that bring noise to the error asked for.
+fn wanted(noise: &HalfNoise, brightness: f64, error: f64) -> u32 {
+    let HalfNoise { variance, mean, samples } = *noise;
+    let relative = variance.sqrt() / mean.max(LEAST_BRIGHTNESS * brightness);
+    if !(relative > 0.0) {
+        return samples;
+    }
+    samples_to(AIM * error / relative, samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Rect, TileSamples};
+    use crate::math::Vec3;
+    use crate::math::random::unit;
+
+    /// A film of one tile of two rows, whose pixels have samples of a mean and a spread each.
+    fn film(rows: [(f32, f32); 2], samples: u32) -> Film {
+        const COLUMNS: u32 = 32;
+        let film = Film::new(COLUMNS, 2, None).expect("a film");
+        let mut next = unit(3);
+        for (y, (mean, spread)) in (0..).zip(rows) {
+            let rect = Rect { x: 0, y, width: COLUMNS, height: 1 };
+            let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
+            let radiance = (0..COLUMNS * samples).map(sample).collect();
+            film.add(0, &TileSamples { rect, samples, radiance, negative: None });
+        }
+        film
+    }
+
+    fn judged(rows: [(f32, f32); 2], samples: u32, error: f64) -> Goals {
+        let mut goals = Goals::none(1);
+        goals.judge(&film(rows, samples), &[[samples; 2]], error);
+        goals
+    }
+
+    #[test]
+    fn each_half_stops_by_the_noise_of_the_other() {
+        // The even rows are smooth, the odd ones are not.
+        let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        assert_eq!(goals.of(0, 1), 16, "the other half has no noise");
+        assert_eq!(goals.of(0, 0), u32::MAX);
+        assert!((64..1000).contains(&goals.expected(0, 0)), "{}", goals.expected(0, 0));
+    }
+
+    #[test]
+    fn nothing_is_decided_before_there_are_samples_enough() {
+        for (samples, is_open) in [(8, true), (16, false)] {
+            let goals = judged([(1.0, 0.0); 2], samples, 0.01);
+            assert_eq!(goals.of(0, 0) == u32::MAX, is_open, "{samples}");
+        }
+    }
+
+    #[test]
+    fn what_is_within_twice_the_samples_is_decided_and_more_is_asked_for_again() {
+        // A standard error of sqrt(1/12/16) = 0.072, by the estimate some 0.72 of it.
+        let goals = judged([(1.0, 1.0); 2], 16, 0.05);
+        assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
+        assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
+    }
+
+    #[test]
+    fn noise_is_held_against_a_hundredth_of_the_picture_where_it_is_dark() {
+        // A bright tile beside a dark one, with as much noise for their brightness.
+        let film = Film::new(64, 2, None).expect("a film");
+        let mut next = unit(9);
+        for (tile, mean) in [(0, 1.0), (1, 1e-6)] {
+            let rect = Rect { x: 32 * tile, y: 0, width: 32, height: 2 };
+            let radiance = (0..64 * 16).map(|_| Vec3::splat(mean * 2.0 * next())).collect();
+            film.add(tile as usize, &TileSamples { rect, samples: 16, radiance, negative: None });
+        }
+        let mut goals = Goals::none(2);
+        goals.judge(&film, &[[16; 2]; 2], 0.01);
+        assert_eq!((goals.of(0, 0), goals.of(1, 0)), (u32::MAX, 16));
+    }
+
+    /// The mean of a tile whose samples are rarely bright, 1 in the long run, and which stops by its noise; or where each half stops
+    /// by its own.
+    fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
+        const MOST: u32 = 256;
+        let film = Film::new(4, 4, None).expect("a film");
+        let (mut goals, mut done) = (Goals::none(1), [[0; 2]]);
+        for target in [16, 32, 64, 128, MOST] {
+            for half in 0..2 {
+                let goal = goals.of(0, if by_own { 1 - half } else { half }).min(target);
+                let samples = goal.saturating_sub(done[0][half]);
+                for y in (half as u32..4).step_by(2).filter(|_| samples > 0) {
+                    let rect = Rect { x: 0, y, width: 4, height: 1 };
+                    let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
+                    let radiance = (0..4 * samples).map(sample).collect();
+                    film.add(0, &TileSamples { rect, samples, radiance, negative: None });
+                }
+                done[0][half] += samples;
+            }
+            goals.judge(&film, &done, 0.6);
+        }
+        film.mean_luminance().expect("samples")
+    }
+
+    #[test]
+    fn to_stop_by_the_noise_of_the_other_half_is_no_bias() {
+        let mut next = unit(11);
+        let mut mean_of = |by_own| {
+            const TILES: u32 = 20_000;
+            let means: Vec<f64> = (0..TILES).map(|_| stopped(&mut next, by_own)).collect();
+            let mean = means.iter().sum::<f64>() / f64::from(TILES);
+            let variance = means.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / f64::from(TILES);
+            (mean, (variance / f64::from(TILES)).sqrt())
+        };
+        let (mean, error) = mean_of(false);
+        assert!(error < 0.006 && (mean - 1.0).abs() < 4.0 * error, "{mean} ± {error}");
+        // The same test sees the bias of what stops by its own samples.
+        let (own, error) = mean_of(true);
+        assert!(own < 1.0 - 6.0 * error, "{own} ± {error}");
+    }
+}
