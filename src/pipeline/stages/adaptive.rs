@@ -11,7 +11,7 @@ use crate::film::{Film, HalfNoise, samples_to};
 const LEAST: u32 = 16;
 
 /// The part of the noise asked for that is aimed at, as noise is known by some samples only.
-const AIM: f64 = 0.9;
+const AIM: f64 = 0.82;
 
 /// The least brightness that noise is held against, as a part of the picture's.
 const LEAST_BRIGHTNESS: f64 = 0.01;
