@@ -288,7 +288,7 @@ pub struct RenderProgress {
     pub eta_seconds: Option<f64>,
     /// Samples per pixel so far, on average.
     pub samples: u32,
-    /// Samples per pixel asked for.
+    /// Samples per pixel that there will be, on average, as far as that is known.
     pub total_samples: u32,
 }
 

@@ -231,12 +231,13 @@ impl<'a> Painter<'a> {
             fraction = fraction.max(elapsed_seconds / (elapsed_seconds + left)).min(1.0);
         }
         self.fraction = if is_last { 1.0 } else { self.fraction.max(fraction) };
+        let pixels = self.canvas.film.crop().area() as u64;
         self.rendering.sink.progress(RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
             eta_seconds: if is_last { Some(0.0) } else { eta_seconds },
-            samples: (self.units / self.canvas.film.crop().area() as u64) as u32,
-            total_samples: self.rendering.plan.settings.render.samples,
+            samples: (self.units / pixels) as u32,
+            total_samples: self.total_units.div_ceil(pixels) as u32,
         });
     }
 
