@@ -11,6 +11,7 @@ use std::sync::Arc;
 use super::settings::{Effective, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Picture;
+pub use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 
 /// From a front end to the worker.
@@ -113,6 +114,8 @@ pub enum Event {
         generation: u64,
         /// The settings.
         settings: Box<Effective>,
+        /// The camera.
+        camera: Viewpoint,
     },
     /// The render went on.
     Progress {

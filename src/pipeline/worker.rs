@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use super::engine::{Engine, Means, Meanwhile, Orders};
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
-use super::settings::View;
+use super::settings::{CameraChange, View};
 use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
@@ -114,8 +114,8 @@ struct Mailbox {
     is_write_postponed: bool,
     /// The order to write came when the request that waits was there: it is meant.
     is_write_of_waiting: bool,
-    /// What the request under way shows.
-    view: Option<View>,
+    /// What the request under way shows, and from where.
+    shown: (Option<View>, CameraChange),
     /// Another size of the previews.
     preview: Option<Option<PreviewSize>>,
     /// Whether the newest request is held.
@@ -128,6 +128,11 @@ struct Mailbox {
     writing: CancelToken,
     /// Generation of the newest request.
     newest: u64,
+}
+
+/// What a request shows, and from where.
+fn shown(request: &Request) -> (Option<View>, CameraChange) {
+    (request.overrides.view, request.overrides.camera)
 }
 
 /// What the worker does next.
@@ -201,10 +206,8 @@ impl Remote {
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
-        let postponed = mailbox
-            .request
-            .as_ref()
-            .is_some_and(|one| is_meant || !can_write && one.overrides.view == mailbox.view);
+        let postponed =
+            mailbox.request.as_ref().is_some_and(|one| is_meant || !can_write && shown(one) == mailbox.shown);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -224,7 +227,7 @@ impl Remote {
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
-                mailbox.view = request.overrides.view;
+                mailbox.shown = shown(&request);
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }

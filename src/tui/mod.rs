@@ -5,6 +5,7 @@
 //! changed. The help and the bottom line are made from the one table in `keymap`.
 
 mod action;
+mod camera;
 mod color;
 mod display;
 mod event;

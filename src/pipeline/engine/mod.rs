@@ -29,7 +29,7 @@ use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::preview::Screen;
 use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
-use super::stages::world::{Keyed, world};
+use super::stages::world::{Eye, Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop, keys};
 use super::table::StageTable;
@@ -43,7 +43,7 @@ use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::world::{World, origin};
+use crate::world::World;
 
 /// What an engine works with; tests work with other means.
 #[derive(Clone, Copy)]
@@ -244,8 +244,9 @@ impl Engine {
         for warning in warnings(&plan.scene, &plan.settings) {
             findings.warn(&parsed.loaded, 0..0, warning);
         }
-        let settings = Box::new(plan.effective.clone());
-        table.sink.send(Event::Settings { generation: request.generation, settings });
+        let eye = Eye::new(&plan.scene, parsed.orbiter, &request.overrides.camera);
+        let (settings, camera) = (Box::new(plan.effective.clone()), eye.viewpoint());
+        table.sink.send(Event::Settings { generation: request.generation, settings, camera });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
         // The picture at hand, which may yet be written, is of the scene before.
@@ -262,16 +263,16 @@ impl Engine {
         let scene = &plan.scene;
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter's numbers are few: their text stands for them.
-        let orbiter = parsed.orbiter.map(|camera| format!("{camera:?}"));
+        let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
-        let origin = origin(&scene.camera, parsed.orbiter.as_ref());
+        let origin = eye.origin();
         let build = || accel(scene, (&of, origin), &meshes, &mut self.accel, &reading);
         let built = table.run(Stage::Accel, build)?;
         let memos = (&mut self.lights, &mut self.sky);
         let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos, token)?);
         let lights = table.run(Stage::Lights, gather)?;
-        let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
         let surfaces = keys::surfaces(scene, &of, &textures.keys);
+        let world = world(scene, (&surfaces, &of), (built, lights), &textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = textures;
         Ok(Ready { parsed, plan, world, surfaces, origin, texels_loaded, texture_memory_bytes })
     }

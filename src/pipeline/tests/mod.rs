@@ -1,5 +1,6 @@
 //! The worker driven by messages, as front ends do it.
 
+mod camera;
 mod orders;
 mod reuse;
 mod targets;

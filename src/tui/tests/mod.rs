@@ -1,5 +1,6 @@
 //! The front end driven by scripted events, on a screen without a terminal.
 
+mod camera;
 mod flow;
 mod keys;
 mod screen;

@@ -1,6 +1,6 @@
 //! What a key does to the state.
 
-use super::{render, say};
+use super::{camera, render, say};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
@@ -29,6 +29,18 @@ fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::TogglePause => toggle_pause(state),
         Action::RenderAgain => render(state, true),
         Action::WriteNow => write_now(state),
+        Action::OrbitLeft => camera::orbit(state, -1.0, 0.0),
+        Action::OrbitRight => camera::orbit(state, 1.0, 0.0),
+        Action::OrbitUp if state.pane.open => act(state, Action::ScrollUp),
+        Action::OrbitUp => camera::orbit(state, 0.0, 1.0),
+        Action::OrbitDown if state.pane.open => act(state, Action::ScrollDown),
+        Action::OrbitDown => camera::orbit(state, 0.0, -1.0),
+        Action::DollyIn => camera::dolly(state, 1.0),
+        Action::DollyOut => camera::dolly(state, -1.0),
+        Action::NarrowField => camera::zoom(state, -1.0),
+        Action::WidenField => camera::zoom(state, 1.0),
+        Action::Darken => camera::expose(state, -1.0),
+        Action::Brighten => camera::expose(state, 1.0),
         Action::SceneSettings => scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
         Action::ScrollUp => scroll(state, |line, page| line.saturating_sub(page)),
@@ -50,7 +62,7 @@ fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     Vec::new()
 }
 
-fn told(state: &mut State, message: &str) -> Vec<Effect> {
+pub(super) fn told(state: &mut State, message: &str) -> Vec<Effect> {
     say(state, message);
     Vec::new()
 }

@@ -1,5 +1,6 @@
 //! State and event in, effects out. Nothing here touches the world.
 
+mod camera;
 mod keys;
 mod worker;
 
@@ -8,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::ExitStatus;
 use super::event::{Effect, Event, Signal, Source, Window};
 use super::options::Changed;
-use super::state::{Activity, PendingChange, PreviewKind, Shown, State};
+use super::state::{Activity, Nudge, PendingChange, PreviewKind, Shown, State};
 use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{Command, Request, Writing};
@@ -25,7 +26,8 @@ pub(super) fn start(state: &mut State) -> Vec<Effect> {
 pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
     state.now = now;
     let was_paused = state.paused;
-    let effects = happened(state, event);
+    let mut effects = happened(state, event);
+    effects.extend(camera::keep_up(state));
     let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
     if was_paused && effects.iter().any(is_request) {
         let rest = state.message.take().map_or(String::new(), |message| format!(" · {message}"));
@@ -74,6 +76,7 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.generation += 1;
     state.requested = Layout::preview_size(state);
     state.resize_due = None;
+    state.nudge = Nudge::default();
     state.held = None;
     state.are_warnings_known = false;
     state.dirty = true;
@@ -82,7 +85,7 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.scene.clone(),
         overrides: state.overrides(),
         preview: state.requested,
-        write: if state.view() == state.base_view() { Writing::Try } else { Writing::No },
+        write: if state.is_written() { Writing::Try } else { Writing::No },
         force,
     };
     let mut effects = Vec::new();

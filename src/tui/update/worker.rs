@@ -18,7 +18,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Started { .. } => started(state),
         Event::Stage { stage, .. } => record(state, stage),
         Event::Asset { progress, .. } => asset(state, progress),
-        Event::Settings { settings, .. } => {
+        Event::Settings { settings, camera, .. } => {
+            state.camera = Some(camera);
             let pinhole = state.overrides().dof == Some(true) && !settings.dof;
             state.effective = Some(*settings);
             mended(state);
