@@ -4,6 +4,7 @@
 //! under one lock, so that no cancel is lost between two requests.
 
 use std::any::Any;
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -11,6 +12,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::engine::{Engine, Means, Meanwhile, Orders};
+use super::errands::Errand;
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
 use super::settings::{CameraChange, View};
 use super::sink::Sink;
@@ -118,6 +120,7 @@ struct Mailbox {
     shown: (Option<View>, CameraChange),
     /// Another size of the previews.
     preview: Option<Option<PreviewSize>>,
+    errands: VecDeque<Errand>,
     /// Whether the newest request is held.
     paused: bool,
     quit: bool,
@@ -141,6 +144,7 @@ enum Task {
     Render(Box<Request>, CancelToken, CancelToken),
     Write,
     Preview(Option<PreviewSize>, CancelToken),
+    Errand(Errand),
     Quit,
 }
 
@@ -155,6 +159,11 @@ impl Remote {
                 mailbox.is_write_of_waiting = mailbox.request.is_some();
             }
             Command::Preview(size) => mailbox.preview = Some(size),
+            Command::KeepCamera(camera) => mailbox.errands.push_back(Errand::KeepCamera(camera)),
+            Command::Pick(spot) => {
+                mailbox.errands.retain(|errand| !matches!(errand, Errand::Pick(_)));
+                mailbox.errands.push_back(Errand::Pick(spot));
+            }
             Command::Cancel => {
                 mailbox.token.cancel();
                 mailbox.writing.cancel();
@@ -223,6 +232,9 @@ impl Remote {
             if mailbox.quit {
                 return Task::Quit;
             }
+            if let Some(errand) = mailbox.errands.pop_front() {
+                return Task::Errand(errand);
+            }
             mailbox.is_write_postponed = false;
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
@@ -256,6 +268,10 @@ impl Orders for Remote {
     fn take_preview(&self) -> Option<Option<PreviewSize>> {
         self.lock().preview.take()
     }
+
+    fn take_errand(&self) -> Option<Errand> {
+        self.lock().errands.pop_front()
+    }
 }
 
 struct Worker {
@@ -278,6 +294,7 @@ impl Worker {
                 Task::Preview(size, token) => {
                     catch_unwind(AssertUnwindSafe(|| engine.show_now(size, &sink, &token)))
                 }
+                Task::Errand(errand) => catch_unwind(AssertUnwindSafe(|| engine.errand(errand, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
                     let meanwhile = Meanwhile { token: &token, writing: &writing, orders: &self.remote };

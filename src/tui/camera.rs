@@ -1,6 +1,7 @@
 //! How keys and the mouse move the camera. A moved camera has short numbers, so that it can be written into a scene as it is shown.
 
 use crate::math::DVec3;
+use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::Viewpoint;
 use crate::scene::description::Pose;
 
@@ -43,21 +44,9 @@ pub(super) fn zoomed(view: &Viewpoint, factor: f64) -> f64 {
 
 /// With the eye at the end of this arm from `look_at`, to a hundred-thousandth of its length or better.
 fn placed(pose: &Pose, arm: DVec3) -> Pose {
-    let step = step(arm.length());
+    let step = step_at(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));
     Pose { position: DVec3::from_array(position), ..*pose }
-}
-
-/// A power of ten: the last digit of places that are so far from what they look at.
-pub(super) fn step(distance: f64) -> f64 {
-    libm::pow(10.0, libm::floor(libm::log10(distance)) - 4.0)
-}
-
-/// To a multiple of a power of ten: the number nearest to its few decimals.
-pub(super) fn rounded(number: f64, step: f64) -> f64 {
-    let digits = libm::round(-libm::log10(step)).max(0.0) as usize;
-    let whole = libm::round(number / step) * step;
-    format!("{whole:.digits$}").parse().unwrap_or(whole) + 0.0
 }
 
 #[cfg(test)]
@@ -105,21 +94,5 @@ mod tests {
         assert_eq!(zoomed(&view, 1.1), 44.0);
         assert_eq!(zoomed(&view, 100.0), 160.0);
         assert_eq!(zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1), 170.0, "one that is wider stays as it is");
-    }
-
-    #[test]
-    fn numbers_are_short_and_near() {
-        for (number, step, text) in [
-            (1.234_567, 1e-4, "1.2346"),
-            (-1e-9, 1e-4, "0"),
-            (0.1 + 0.2, 1e-4, "0.3"),
-            (1234.5, 10.0, "1230"),
-        ] {
-            assert_eq!(rounded(number, step).to_string(), text);
-        }
-        for distance in [0.003, 1.0, 4.0, 9.99, 12_345.0] {
-            let error = step(distance) / 2.0 / distance;
-            assert!((4e-6..=5.1e-5).contains(&error), "{distance}: {error}");
-        }
     }
 }

@@ -71,6 +71,32 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('>')], "", Action::WidenField, "", ""),
     binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "exposure: darker, brighter", ""),
     binding(&[KeyPress::plain(']')], "", Action::Brighten, "", ""),
+    binding(
+        &[KeyPress::plain('f')],
+        "f",
+        Action::Focus,
+        "then a click: focus there; f f at the crosshair",
+        "",
+    ),
+    binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
+    binding(&[KeyPress::special(KeyCode::Enter)], "Enter, click", Action::Inspect, "say what is there", ""),
+    binding(
+        &[KeyPress::plain('o')],
+        "o",
+        Action::Edit,
+        "the editor at the error, or at what was clicked",
+        "",
+    ),
+    binding(&[KeyPress::plain('m')], "m", Action::ToggleMouse, "mouse on, off (to select text)", ""),
+    binding(
+        &[KeyPress::plain('b')],
+        "b",
+        Action::BeforeAfter,
+        "before and after the last edit, in turns",
+        "",
+    ),
+    binding(&[KeyPress::plain('n')], "n N", Action::OlderPicture, "older, newer pictures", ""),
+    binding(&[KeyPress::plain('N')], "", Action::NewerPicture, "", ""),
     binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
     binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
     binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the image as it is now", "write"),
@@ -135,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_fixed_keys_are_there() {
-        for key in "?qsdpiv rw0hjkl+-<>[]".chars() {
+        for key in "?qsdpiv rw0hjkl+-<>[]fcombnN".chars() {
             assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
         }
     }

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::color::ColorDepth;
+use super::editor::FilePlace;
 use super::event::{Window, Written};
+use super::history::History;
 use crate::film::Picture;
 use crate::pipeline::protocol::{
-    AssetProgress, PreviewSize, RenderProgress, Report, Stage, StageReport, Viewpoint,
+    AssetProgress, PreviewSize, RenderProgress, Report, Spot, Stage, StageReport, Viewpoint,
 };
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
@@ -116,6 +118,23 @@ pub(super) struct Shown {
     pub range: Option<[f32; 2]>,
 }
 
+/// The left button went down over a cell of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Press {
+    /// Where it was seen last.
+    pub column: u16,
+    pub row: u16,
+    pub has_moved: bool,
+}
+
+/// Why it was asked what is at a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Purpose {
+    #[default]
+    Inspect,
+    Focus,
+}
+
 /// How the front end starts.
 pub(super) struct Setup {
     pub scene: PathBuf,
@@ -150,6 +169,19 @@ pub(super) struct State {
     /// The camera of the newest request that was understood.
     pub camera: Option<Viewpoint>,
     pub nudge: Nudge,
+    pub is_mouse_on: bool,
+    pub press: Option<Press>,
+    /// Whether the next click is for the focus.
+    pub is_focusing: bool,
+    /// The last click, else the middle of the picture.
+    pub crosshair: Spot,
+    /// What the last answer about a place is for.
+    pub asked: Purpose,
+    /// What was found there, in the scene file.
+    pub picked: Option<FilePlace>,
+    pub history: History,
+    /// The request of the last edit.
+    pub edit: Option<u64>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
@@ -208,6 +240,14 @@ impl State {
             effective: None,
             camera: None,
             nudge: Nudge::default(),
+            is_mouse_on: true,
+            press: None,
+            is_focusing: false,
+            crosshair: Spot { x: 0.5, y: 0.5 },
+            asked: Purpose::default(),
+            picked: None,
+            history: History::default(),
+            edit: None,
             stages: Default::default(),
             assets: Vec::new(),
             progress: None,

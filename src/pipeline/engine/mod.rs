@@ -5,6 +5,7 @@ mod outputs;
 #[cfg(test)]
 mod tests;
 
+use std::cell::Cell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use std::time::Instant;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::cache::{Memo, Pool};
+use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
 use super::plan::{Plan, cores, plan, warnings};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
@@ -77,6 +79,9 @@ pub(super) struct Engine {
     written: Written,
     /// What the current film is rendered by.
     plan: Option<Plan>,
+    at_hand: Option<AtHand>,
+    /// Pixels of first pictures that are traced in a second, as the last one was.
+    coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
     /// The assets of the last scene that could be read: they stay watched while it is broken.
     assets: Vec<FileRead>,
@@ -94,6 +99,8 @@ pub(super) trait Orders {
     fn take_write(&self) -> bool;
     /// The size that previews are to have from now on.
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
+    /// The next thing that is asked of the picture at hand.
+    fn take_errand(&self) -> Option<Errand>;
 }
 
 /// What a request goes by while it is under way.
@@ -132,6 +139,8 @@ impl Engine {
             films: Films::default(),
             written: Written::default(),
             plan: None,
+            at_hand: None,
+            coarse_rate: Cell::new(None),
             pool: None,
             assets: Vec::new(),
             inputs: Inputs::default(),
@@ -185,6 +194,14 @@ impl Engine {
         }
     }
 
+    /// Do what is asked of the picture at hand, outside of a request.
+    pub(super) fn errand(&self, errand: Errand, sink: &Sink) {
+        match &self.at_hand {
+            Some(at_hand) => at_hand.run(errand, self.films.current(), &self.inputs, sink),
+            None => errand.fail("there is no picture yet", sink),
+        }
+    }
+
     fn run(
         &mut self,
         request: &Request,
@@ -207,6 +224,13 @@ impl Engine {
         table.run(Stage::Photons, || Ok(photons(asked, key, store, sending)?))?;
         let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
+        let at_hand = AtHand {
+            parsed: ready.parsed.clone(),
+            sets: request.overrides.sets.clone(),
+            world: world.clone(),
+            settings: plan.settings,
+        };
+        self.at_hand = Some(at_hand);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons_key, sink, meanwhile))?;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
@@ -314,7 +338,7 @@ impl Engine {
         let (plan, orders) = (&ready.plan, meanwhile.orders);
         let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
         let written = std::cell::RefCell::new(&mut self.written);
-        let is_postponed = std::cell::Cell::new(false);
+        let is_postponed = Cell::new(false);
         let pulse = |canvas: &Canvas, is_covered: bool| {
             if !is_covered {
                 if orders.wants_write() && !is_postponed.replace(true) {
@@ -322,6 +346,9 @@ impl Engine {
                 }
             } else if orders.take_write() {
                 write_by_hand(canvas, to, &mut written.borrow_mut());
+            }
+            if let Some((errand, at_hand)) = orders.take_errand().zip(self.at_hand.as_ref()) {
+                at_hand.run(errand, Some(canvas), &self.inputs, sink);
             }
         };
         let rendering = Rendering {
@@ -341,6 +368,8 @@ impl Engine {
             sink,
             pulse: &pulse,
             take_preview: &|| orders.take_preview(),
+            is_moved: request.overrides.camera.is_any(),
+            coarse_rate: &self.coarse_rate,
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
         render(key, &mut self.films, &rendering)

@@ -18,6 +18,8 @@ pub(in crate::pipeline) struct Canvas {
     pub(super) base: Option<RadianceImage>,
     /// What the last preview was made by.
     pub(super) previewer: Option<Previewer>,
+    /// Whether it was begun for a camera on its way.
+    pub(super) is_passing: bool,
     /// The budget that ended the last render of it.
     pub(super) ended_by: Option<f64>,
 }
@@ -31,7 +33,15 @@ impl Canvas {
         let film =
             Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?;
         let done = vec![0; film.tile_count()];
-        Ok(Self { key, film: Arc::new(film), done, base: None, previewer: None, ended_by: None })
+        Ok(Self {
+            key,
+            film: Arc::new(film),
+            done,
+            base: None,
+            previewer: None,
+            is_passing: false,
+            ended_by: None,
+        })
     }
 
     /// Whether every pixel has this many samples.

@@ -1,6 +1,6 @@
 //! What each key does, and that the help says so.
 
-use super::RED;
+use super::{BLUE, RED, cells_of};
 use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::protocol::{self, Command, Writing};
@@ -102,6 +102,46 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             );
             assert!(desk.text().contains(&format!("exposure {stops:+}")), "{}", desk.text());
         }
+        Action::KeepCamera => {
+            assert!(desk.key(key).is_empty(), "it has not moved");
+            desk.press('l');
+            let wanted = desk.state.viewpoint().expect("a camera");
+            assert!(
+                matches!(desk.key(key)[..], [Effect::Send(Command::KeepCamera(camera))] if camera == wanted)
+            );
+        }
+        Action::Inspect => {
+            assert!(
+                matches!(desk.key(key)[..], [Effect::Send(Command::Pick(spot))] if (spot.x, spot.y) == (0.5, 0.5))
+            );
+        }
+        Action::Focus => {
+            assert!(desk.key(key).is_empty(), "a click is waited for");
+            assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Pick(_))]));
+        }
+        Action::ToggleMouse => {
+            assert!(matches!(desk.key(key)[..], [Effect::Mouse(false)]));
+            assert!(matches!(desk.key(key)[..], [Effect::Mouse(true)]));
+        }
+        Action::Edit => assert!(matches!(desk.key(key)[..], [Effect::Edit(_)])),
+        Action::BeforeAfter => {
+            desk.event(Event::Changed(Changed { noticed: desk.now }));
+            desk.finish(BLUE);
+            for (color, other) in [(RED, BLUE), (BLUE, RED)] {
+                desk.key(key);
+                assert!(cells_of(desk, color) > 0 && cells_of(desk, other) == 0);
+            }
+        }
+        Action::OlderPicture | Action::NewerPicture => {
+            desk.press('s');
+            desk.finish(BLUE);
+            let is_older = action == Action::OlderPicture;
+            if !is_older {
+                desk.press('n');
+            }
+            desk.key(key);
+            assert_eq!(cells_of(desk, RED) > 0, is_older);
+        }
         Action::TogglePause => {
             desk.press('r');
             assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Pause(true))]));
@@ -142,8 +182,8 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
 }
 
 #[test]
-fn the_help_shows_every_line_of_the_table_at_80_by_24() {
-    let mut desk = Desk::new();
+fn the_help_shows_every_line_of_the_table() {
+    let mut desk = Desk::with(state(80, 40));
     desk.press('?');
     let text = desk.text();
     for binding in KEYMAP {

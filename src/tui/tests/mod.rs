@@ -3,6 +3,7 @@
 mod camera;
 mod flow;
 mod keys;
+mod pointer;
 mod screen;
 
 use ratatui::style::Color;

@@ -3,7 +3,10 @@
 
 use super::keys::told;
 use super::{render, say};
+use crate::pipeline::protocol::{Command, Kept};
+use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
+use crate::scene::sanitize::visible;
 use crate::tui::camera::{dollied, orbited, zoomed};
 use crate::tui::event::Effect;
 use crate::tui::state::State;
@@ -19,7 +22,12 @@ const STOPS: f32 = 0.25;
 
 /// So many steps to the right and up.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
-    moved(state, |pose| orbited(pose, right * TURN, up * TURN))
+    turn(state, right * TURN, up * TURN)
+}
+
+/// So many degrees to the right and up.
+pub(super) fn turn(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
+    moved(state, |pose| orbited(pose, right, up))
 }
 
 /// So many steps nearer.
@@ -54,9 +62,40 @@ fn unknown(state: &mut State) -> Vec<Effect> {
     told(state, "the scene has not been read yet")
 }
 
-fn step_of_camera(state: &mut State) -> Vec<Effect> {
+pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
     let effects = step(state);
-    say(state, "camera moved: shown, not written; w writes it, 0 goes back");
+    say(state, "camera moved: shown, not written; w writes it, c keeps it, 0 goes back");
+    effects
+}
+
+/// The camera as it is now is to be put into the scene file.
+pub(super) fn keep(state: &mut State) -> Vec<Effect> {
+    let Some(view) = state.viewpoint() else { return unknown(state) };
+    let is_set = state.base.sets.iter().any(|set| set.trim_start().starts_with("camera"));
+    if !state.toggles.camera.is_any() && !is_set {
+        return told(state, "the camera is where the scene has it: there is nothing to write");
+    }
+    vec![Effect::Send(Command::KeepCamera(view))]
+}
+
+/// What came of that. A camera that the file gives now is no longer one of the keys.
+pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
+    let Kept { path, is_new, is_own } = match outcome {
+        Ok(kept) => kept,
+        Err(why) => return told(state, &format!("error: {}", visible(&why))),
+    };
+    let name = visible(&path.to_string_lossy()).into_owned();
+    let words = match (is_new, is_own) {
+        (true, true) => format!("the camera is in {name} now"),
+        (true, false) => format!("the camera is in {name}; in this call --set comes first"),
+        (false, _) => format!("{name} has this camera already"),
+    };
+    let mut effects = Vec::new();
+    if is_own && state.toggles.camera.is_any() {
+        state.toggles.camera = CameraChange::default();
+        effects = render(state, false);
+    }
+    say(state, words);
     effects
 }
 

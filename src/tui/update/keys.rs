@@ -1,6 +1,6 @@
 //! What a key does to the state.
 
-use super::{camera, render, say};
+use super::{camera, history, places, pointer, render, say};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
@@ -15,10 +15,11 @@ use crate::tui::view::diagnostics;
 pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     let Some(action) = keymap::action(key) else { return Vec::new() };
     state.dirty |= state.message.take().is_some();
+    state.is_focusing &= action == Action::Focus;
     act(state, action)
 }
 
-fn act(state: &mut State, action: Action) -> Vec<Effect> {
+pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
     match action {
         Action::CycleShadows => cycle_shadows(state),
         Action::ToggleDepthOfField => toggle_depth_of_field(state),
@@ -41,6 +42,14 @@ fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::WidenField => camera::zoom(state, 1.0),
         Action::Darken => camera::expose(state, -1.0),
         Action::Brighten => camera::expose(state, 1.0),
+        Action::KeepCamera => camera::keep(state),
+        Action::Inspect => pointer::inspect(state),
+        Action::Focus => pointer::focus(state),
+        Action::ToggleMouse => pointer::toggle_mouse(state),
+        Action::Edit => vec![Effect::Edit(places::to_edit(state))],
+        Action::BeforeAfter => history::before_and_after(state),
+        Action::OlderPicture => history::browse(state, 1),
+        Action::NewerPicture => history::browse(state, -1),
         Action::SceneSettings => scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
         Action::ScrollUp => scroll(state, |line, page| line.saturating_sub(page)),

@@ -2,6 +2,7 @@
 
 mod camera;
 mod endings;
+mod hands;
 mod input;
 mod keys;
 mod outputs;
