@@ -63,6 +63,8 @@ pub(crate) fn render(
             | Event::WritePostponed { .. }
             | Event::Warnings { .. }
             | Event::Refused { .. }
+            | Event::CameraKept { .. }
+            | Event::Picked { .. }
             | Event::Cancelled { .. } => {}
         }
     }

@@ -10,7 +10,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
-use crate::pipeline::settings::{Overrides, View};
+use crate::pipeline::settings::{CameraChange, Overrides, View};
 use crate::scene::description::{Accel, Integrator, MOST_SCATTERINGS, Shadows};
 use crate::tui::{ColorChoice, PreviewChoice};
 
@@ -221,6 +221,8 @@ impl RenderArgs {
             dof: self.dof.map(bool::from),
             accel: self.accel,
             view: self.view,
+            camera: CameraChange::default(),
+            exposure: None,
             seed: self.seed,
             crop: self.crop,
             threads: self.threads,

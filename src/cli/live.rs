@@ -51,7 +51,12 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
             match command {
                 Command::Write => asked.order(),
                 Command::Quit => asked.leave(),
-                Command::Render(_) | Command::Preview(_) | Command::Cancel | Command::Pause(_) => {}
+                Command::Render(_)
+                | Command::Preview(_)
+                | Command::KeepCamera(_)
+                | Command::Pick(_)
+                | Command::Cancel
+                | Command::Pause(_) => {}
             }
             remote.send(command);
         }),
@@ -137,6 +142,8 @@ impl Writes {
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
+            | Event::CameraKept { .. }
+            | Event::Picked { .. }
             | Event::Files { .. } => {}
         }
     }

@@ -106,6 +106,7 @@ mod tests {
             crop: Some(Rect { x: 1, y: 2, width: 3, height: 4 }),
             threads: Some(2),
             bit_depth: Some(16),
+            ..Default::default()
         };
         assert_eq!(order.overrides, expected);
         assert!(order.is_once && order.poll);

@@ -295,6 +295,21 @@ impl Film {
         image
     }
 
+    /// One pixel of that; none where it has no sample, or lies outside the crop.
+    pub fn pixel(&self, quantity: Quantity, x: u32, y: u32) -> Option<Vec3> {
+        let Rect { x: left, y: top, .. } = self.crop;
+        let (right, down) = (x.checked_sub(left)?, y.checked_sub(top)?);
+        if right >= self.crop.width || down >= self.crop.height {
+            return None;
+        }
+        let index = (down / TILE_SIZE) as usize * tile_grid(self.crop).0 + (right / TILE_SIZE) as usize;
+        let place = (down % TILE_SIZE, right % TILE_SIZE);
+        let columns = tile_rect(self.crop, index).width as usize;
+        let value =
+            lock(&self.tiles[index]).value(quantity, place.0 as usize * columns + place.1 as usize, columns);
+        value.map(DVec3::as_vec3)
+    }
+
     /// Samples of the crop's pixels.
     pub fn samples(&self) -> SampleStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);

@@ -1,6 +1,7 @@
 //! Numbers, vectors, transforms and colour: what every other room may use.
 
 pub mod color;
+pub mod decimal;
 pub mod elementary;
 pub mod float;
 pub mod frame;

@@ -5,9 +5,11 @@
 //! `cache` and says whether it was done, reused or skipped. [`watch`] says when a file that a request read has
 //! another content.
 
+mod answers;
 mod cache;
 mod check;
 mod engine;
+mod errands;
 mod inputs;
 mod pace;
 mod plan;

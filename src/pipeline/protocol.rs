@@ -8,9 +8,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use super::answers::{Kept, Picked, Spot, Thing};
 use super::settings::{Effective, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Picture;
+pub use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 
 /// From a front end to the worker.
@@ -22,6 +24,10 @@ pub enum Command {
     Write,
     /// Previews are to have this size from now on; the picture at hand is shown again. What is rendered goes on.
     Preview(Option<PreviewSize>),
+    /// Put this camera into the scene file; [`Event::CameraKept`] says what came of it. What is rendered goes on.
+    KeepCamera(Viewpoint),
+    /// Say what is at a place of the picture; [`Event::Picked`] does. What is rendered goes on.
+    Pick(Spot),
     /// Stop the render under way.
     Cancel,
     /// Hold the work, or let it go on: that of the newest request, whether it has begun or not. A request that comes
@@ -113,6 +119,8 @@ pub enum Event {
         generation: u64,
         /// The settings.
         settings: Box<Effective>,
+        /// The camera.
+        camera: Viewpoint,
     },
     /// The render went on.
     Progress {
@@ -154,6 +162,20 @@ pub enum Event {
     WritePostponed {
         /// Of which request.
         generation: u64,
+    },
+    /// What came of [`Command::KeepCamera`].
+    CameraKept {
+        /// Of which request.
+        generation: u64,
+        /// What came of it, or why nothing was written.
+        outcome: Result<Kept, String>,
+    },
+    /// What is at the place of [`Command::Pick`].
+    Picked {
+        /// Of which request.
+        generation: u64,
+        /// What is there.
+        picked: Box<Picked>,
     },
     /// Everything that was asked for is done.
     Done {

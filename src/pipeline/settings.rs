@@ -6,6 +6,7 @@ use crate::choice;
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
 pub use crate::integrators::View;
+pub use crate::scene::description::CameraChange;
 use crate::scene::description::{Accel, Integrator, Render, Shadows};
 
 /// Changes to a scene's settings for this run; `None` leaves the scene's own.
@@ -43,6 +44,10 @@ pub struct Overrides {
     pub accel: Option<Accel>,
     /// What is shown.
     pub view: Option<View>,
+    /// The camera.
+    pub camera: CameraChange,
+    /// In stops.
+    pub exposure: Option<f32>,
     /// Seed.
     pub seed: Option<u32>,
     /// Render these pixels only; the rest of the picture stays black.
@@ -67,6 +72,7 @@ impl Overrides {
             clamp: self.clamp.unwrap_or(to.clamp),
             accel: self.accel.unwrap_or(to.accel),
             seed: self.seed.unwrap_or(to.seed),
+            exposure: self.exposure.unwrap_or(to.exposure),
             ..*to
         }
     }
@@ -101,6 +107,8 @@ pub struct Effective {
     /// What is shown.
     #[serde(serialize_with = "choice::serialize")]
     pub view: View,
+    /// In stops.
+    pub exposure: f32,
     /// The seed.
     pub seed: u32,
     /// Threads that render.
@@ -125,6 +133,7 @@ impl Effective {
             dof,
             accel: render.accel,
             view,
+            exposure: render.exposure,
             seed: render.seed,
             threads,
             outputs: outputs.to_vec(),

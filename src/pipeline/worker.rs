@@ -4,6 +4,7 @@
 //! under one lock, so that no cancel is lost between two requests.
 
 use std::any::Any;
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -11,8 +12,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::engine::{Engine, Means, Meanwhile, Orders};
+use super::errands::Errand;
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
-use super::settings::View;
+use super::settings::{CameraChange, View};
 use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
@@ -114,10 +116,11 @@ struct Mailbox {
     is_write_postponed: bool,
     /// The order to write came when the request that waits was there: it is meant.
     is_write_of_waiting: bool,
-    /// What the request under way shows.
-    view: Option<View>,
+    /// What the request under way shows, and from where.
+    shown: (Option<View>, CameraChange),
     /// Another size of the previews.
     preview: Option<Option<PreviewSize>>,
+    errands: VecDeque<Errand>,
     /// Whether the newest request is held.
     paused: bool,
     quit: bool,
@@ -130,12 +133,18 @@ struct Mailbox {
     newest: u64,
 }
 
+/// What a request shows, and from where.
+fn shown(request: &Request) -> (Option<View>, CameraChange) {
+    (request.overrides.view, request.overrides.camera)
+}
+
 /// What the worker does next.
 enum Task {
     /// With the tokens of the work and of the writing at its end.
     Render(Box<Request>, CancelToken, CancelToken),
     Write,
     Preview(Option<PreviewSize>, CancelToken),
+    Errand(Errand),
     Quit,
 }
 
@@ -150,6 +159,11 @@ impl Remote {
                 mailbox.is_write_of_waiting = mailbox.request.is_some();
             }
             Command::Preview(size) => mailbox.preview = Some(size),
+            Command::KeepCamera(camera) => mailbox.errands.push_back(Errand::KeepCamera(camera)),
+            Command::Pick(spot) => {
+                mailbox.errands.retain(|errand| !matches!(errand, Errand::Pick(_)));
+                mailbox.errands.push_back(Errand::Pick(spot));
+            }
             Command::Cancel => {
                 mailbox.token.cancel();
                 mailbox.writing.cancel();
@@ -201,10 +215,8 @@ impl Remote {
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
-        let postponed = mailbox
-            .request
-            .as_ref()
-            .is_some_and(|one| is_meant || !can_write && one.overrides.view == mailbox.view);
+        let postponed =
+            mailbox.request.as_ref().is_some_and(|one| is_meant || !can_write && shown(one) == mailbox.shown);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -220,11 +232,14 @@ impl Remote {
             if mailbox.quit {
                 return Task::Quit;
             }
+            if let Some(errand) = mailbox.errands.pop_front() {
+                return Task::Errand(errand);
+            }
             mailbox.is_write_postponed = false;
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
-                mailbox.view = request.overrides.view;
+                mailbox.shown = shown(&request);
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }
@@ -253,6 +268,10 @@ impl Orders for Remote {
     fn take_preview(&self) -> Option<Option<PreviewSize>> {
         self.lock().preview.take()
     }
+
+    fn take_errand(&self) -> Option<Errand> {
+        self.lock().errands.pop_front()
+    }
 }
 
 struct Worker {
@@ -275,6 +294,7 @@ impl Worker {
                 Task::Preview(size, token) => {
                     catch_unwind(AssertUnwindSafe(|| engine.show_now(size, &sink, &token)))
                 }
+                Task::Errand(errand) => catch_unwind(AssertUnwindSafe(|| engine.errand(errand, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
                     let meanwhile = Meanwhile { token: &token, writing: &writing, orders: &self.remote };

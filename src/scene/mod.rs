@@ -6,6 +6,7 @@
 pub mod description;
 pub mod diagnostic;
 mod document;
+mod edit;
 pub mod fingerprint;
 mod nearest;
 mod read;
@@ -18,7 +19,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use description::Scene;
+use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use source::Source;
 
@@ -47,7 +48,35 @@ pub struct Loaded {
     pub named: Vec<PathBuf>,
 }
 
+/// The text of a scene file as it is now.
+///
+/// # Errors
+/// Why it cannot be read, with its name.
+pub fn text_now(path: &Path) -> Result<Arc<str>, Diagnostic> {
+    read::text(path).map_err(|problem| *problem)
+}
+
 impl Loaded {
+    /// The text of the file with this camera in place of its own: numbers take the place of numbers, keys that are not there
+    /// are added, all else stays as it is.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub fn text_with_camera(&self, camera: &Viewpoint) -> Result<String, String> {
+        edit::with_camera(self.source.text(), camera)
+    }
+
+    /// The camera of a text with what the call sets, if both can be read.
+    pub fn camera_of(text: &str, sets: &[String]) -> Option<Camera> {
+        document::camera_of(&Source::with_sets(text.into(), sets).ok()?)
+    }
+
+    /// The line of the file, from 1, in which something begins.
+    pub fn line(&self, span: &Range<usize>) -> usize {
+        let before = self.source.text().get(..span.start).unwrap_or_default();
+        before.bytes().filter(|byte| *byte == b'\n').count() + 1
+    }
+
     /// A diagnostic at a place of this scene file, for what shows only later: a mesh without a usable face, a
     /// texture that does not decode.
     pub fn diagnostic_at(

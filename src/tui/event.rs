@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
+use super::editor::FilePlace;
 use super::input::Answer;
 use super::options::{Changed, News};
 use super::state::FrameReport;
@@ -17,6 +18,8 @@ use crate::pipeline::protocol;
 pub(super) enum Event {
     /// A key was pressed.
     Key(KeyPress),
+    /// The mouse was used.
+    Mouse(Mouse),
     /// Text was pasted.
     Paste,
     /// The terminal answered a question.
@@ -45,6 +48,8 @@ pub(super) enum Event {
     Tick,
     /// Ctrl-z where nothing could continue the program again.
     NoShell,
+    /// The editor could not be used: why.
+    NoEditor(String),
     /// A source of events ended.
     Lost(Source),
 }
@@ -81,6 +86,27 @@ impl KeyPress {
     pub(super) const fn special(code: KeyCode) -> Self {
         Self { code, modifiers: KeyModifiers::NONE }
     }
+}
+
+/// The left button or the wheel, over a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Mouse {
+    pub kind: MouseKind,
+    /// From 0.
+    pub column: u16,
+    /// From 0.
+    pub row: u16,
+}
+
+/// What the mouse did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MouseKind {
+    Press,
+    /// Moved while pressed.
+    Drag,
+    Release,
+    WheelUp,
+    WheelDown,
 }
 
 /// The terminal's window.
@@ -132,6 +158,10 @@ pub(super) enum Effect {
     Suspend,
     /// SIGCONT came: take the terminal again and draw everything.
     Redraw,
+    /// Whether the terminal is to report the mouse.
+    Mouse(bool),
+    /// Leave the terminal to the editor, at this place.
+    Edit(FilePlace),
     /// Ask how large the window is.
     Measure,
 }

@@ -13,12 +13,13 @@ use super::state::{PreviewKind, Setup, State};
 use super::update::{start, update};
 use super::view;
 use crate::film::Picture;
+use crate::math::DVec3;
 use crate::pipeline::protocol::{
     self, AssetProgress, Command, Counters, Failure, ImageReport, RenderProgress, Report, Request,
-    SampleCounts, Stage, StageReport, Status,
+    SampleCounts, Stage, StageReport, Status, Viewpoint,
 };
 use crate::pipeline::settings::{Effective, Overrides, View};
-use crate::scene::description::{Accel, Integrator, Shadows};
+use crate::scene::description::{Accel, Integrator, Pose, Shadows};
 use crate::scene::diagnostic::{Diagnostic, Place, Severity};
 
 pub(super) fn window(columns: u16, rows: u16) -> Window {
@@ -86,7 +87,11 @@ impl Desk {
     pub(super) fn finish(&mut self, color: [u8; 3]) {
         let generation = self.state.generation;
         self.worker(protocol::Event::Started { generation });
-        self.worker(protocol::Event::Settings { generation, settings: Box::new(settings()) });
+        self.worker(protocol::Event::Settings {
+            generation,
+            settings: Box::new(settings()),
+            camera: camera(),
+        });
         self.event(Event::Picture { generation, picture: plain_picture(50, 38, color), range: None });
         self.worker(done(generation, Vec::new(), false));
     }
@@ -142,10 +147,17 @@ pub(super) fn settings() -> Effective {
         dof: true,
         accel: Accel::Bvh,
         view: View::Beauty,
+        exposure: 0.0,
         seed: 0,
         threads: 2,
         outputs: vec![PathBuf::from("cornell.png")],
     }
+}
+
+/// At (0, 1, 4), which looks along −z at a point 4 away.
+pub(super) fn camera() -> Viewpoint {
+    let pose = Pose { position: DVec3::new(0.0, 1.0, 4.0), look_at: DVec3::Y, up: DVec3::Y };
+    Viewpoint { pose, fov: 40.0, aperture: 0.1, focus: 4.0 }
 }
 
 pub(super) fn stage(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {

@@ -9,10 +9,10 @@ use super::event::KeyPress;
 pub(super) struct Binding {
     /// The keys that do it.
     pub keys: &'static [KeyPress],
-    /// How they are written in the help.
+    /// How they are written in the help; empty: the line before says it.
     pub label: &'static str,
     pub action: Action,
-    /// What it does, for the help.
+    /// What it does, for the help; empty: the line before says it.
     pub help: &'static str,
     /// One word for the bottom line; empty: not there. Those of the pane of errors are there while it is open.
     pub hint: &'static str,
@@ -28,6 +28,11 @@ const fn binding(
     Binding { keys, label, action, help, hint }
 }
 
+const LEFT: KeyPress = KeyPress::special(KeyCode::Left);
+const RIGHT: KeyPress = KeyPress::special(KeyCode::Right);
+const UP: KeyPress = KeyPress::special(KeyCode::Up);
+const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
+
 /// Every key, in the order of the help.
 pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, "show or hide this help", "help"),
@@ -36,27 +41,75 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", "dof"),
     binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on, off", ""),
     binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", "path"),
-    binding(&[KeyPress::plain('v')], "v", Action::NextView, "next view: normals, depth, …", "view"),
-    binding(&[KeyPress::plain('V')], "V", Action::PreviousView, "previous view", ""),
+    binding(
+        &[KeyPress::plain('v')],
+        "v",
+        Action::NextView,
+        "next view: normals, depth, …; V: previous view",
+        "view",
+    ),
+    binding(&[KeyPress::plain('V')], "", Action::PreviousView, "", ""),
+    binding(
+        &[LEFT, KeyPress::plain('h')],
+        "arrows hjkl",
+        Action::OrbitLeft,
+        "the camera around what it looks at",
+        "",
+    ),
+    binding(&[DOWN, KeyPress::plain('j')], "", Action::OrbitDown, "", ""),
+    binding(&[UP, KeyPress::plain('k')], "", Action::OrbitUp, "", ""),
+    binding(&[RIGHT, KeyPress::plain('l')], "", Action::OrbitRight, "", ""),
+    binding(
+        &[KeyPress::plain('+'), KeyPress::plain('=')],
+        "+ -",
+        Action::DollyIn,
+        "the camera nearer, farther",
+        "",
+    ),
+    binding(&[KeyPress::plain('-')], "", Action::DollyOut, "", ""),
+    binding(&[KeyPress::plain('<')], "< >", Action::NarrowField, "field of view narrower, wider", ""),
+    binding(&[KeyPress::plain('>')], "", Action::WidenField, "", ""),
+    binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "exposure: darker, brighter", ""),
+    binding(&[KeyPress::plain(']')], "", Action::Brighten, "", ""),
+    binding(
+        &[KeyPress::plain('f')],
+        "f",
+        Action::Focus,
+        "then a click: focus there; f f at the crosshair",
+        "",
+    ),
+    binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
+    binding(&[KeyPress::special(KeyCode::Enter)], "Enter, click", Action::Inspect, "say what is there", ""),
+    binding(
+        &[KeyPress::plain('o')],
+        "o",
+        Action::Edit,
+        "the editor at the error, or at what was clicked",
+        "",
+    ),
+    binding(&[KeyPress::plain('m')], "m", Action::ToggleMouse, "mouse on, off (to select text)", ""),
+    binding(
+        &[KeyPress::plain('b')],
+        "b",
+        Action::BeforeAfter,
+        "before and after the last edit, in turns",
+        "",
+    ),
+    binding(&[KeyPress::plain('n')], "n N", Action::OlderPicture, "older, newer pictures", ""),
+    binding(&[KeyPress::plain('N')], "", Action::NewerPicture, "", ""),
     binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
     binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
     binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the image as it is now", "write"),
     binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "back to the scene's own settings", "reset"),
     binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", ""),
     binding(
-        &[KeyPress::special(KeyCode::PageUp), KeyPress::special(KeyCode::Up)],
-        "PgUp, up",
+        &[KeyPress::special(KeyCode::PageUp)],
+        "PgUp PgDn",
         Action::ScrollUp,
-        "scroll the errors up",
+        "scroll the errors, as up and down do",
         "scroll",
     ),
-    binding(
-        &[KeyPress::special(KeyCode::PageDown), KeyPress::special(KeyCode::Down)],
-        "PgDn, down",
-        Action::ScrollDown,
-        "scroll the errors down",
-        "",
-    ),
+    binding(&[KeyPress::special(KeyCode::PageDown)], "", Action::ScrollDown, "", ""),
     binding(
         &[KeyPress::special(KeyCode::Esc)],
         "Esc",
@@ -103,12 +156,12 @@ mod tests {
         assert_eq!(action(shifted), Some(Action::ToggleHelp));
         assert_eq!(action(KeyPress::plain('V')), Some(Action::PreviousView));
         assert_eq!(action(KeyPress::ctrl('q')), None);
-        assert_eq!(action(KeyPress::plain('x')), None);
+        assert_eq!(action(KeyPress::plain('y')), None);
     }
 
     #[test]
     fn the_fixed_keys_are_there() {
-        for key in "?qsdpiv rw0".chars() {
+        for key in "?qsdpiv rw0hjkl+-<>[]fcombnN".chars() {
             assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
         }
     }

@@ -5,9 +5,12 @@
 //! changed. The help and the bottom line are made from the one table in `keymap`.
 
 mod action;
+mod camera;
 mod color;
 mod display;
+mod editor;
 mod event;
+mod history;
 mod input;
 mod keymap;
 mod line;

@@ -12,6 +12,7 @@ use ratatui::layout::Rect;
 
 use super::color::{self, ColorDepth};
 use super::display::{Display, Way};
+use super::editor::{self, FilePlace};
 use super::event::{Effect, Event, Source};
 use super::input;
 use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
@@ -229,9 +230,10 @@ impl Ui {
             Event::Answer(answer) => self.display.answered(answer, Instant::now()),
             Event::Written { bytes } => self.display.written(bytes),
             Event::Unwritable(kind) => return Some(unwritable(kind.into())),
-            Event::Key(_) => {
+            Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply(event);
-                self.state.urgent |= self.state.dirty;
+                // A step of the camera is drawn with its picture, which comes at once and has need of the processor.
+                self.state.urgent |= self.state.dirty && !self.state.awaits_step();
                 return end;
             }
             event => return self.apply(event),
@@ -323,6 +325,8 @@ impl Ui {
                 signals::stop();
             }
             Effect::Suspend => {}
+            Effect::Mouse(is_on) => self.screen.set_mouse(is_on),
+            Effect::Edit(place) => return self.edit(&place),
             Effect::Redraw => return self.redraw(),
             Effect::Measure => {
                 // It may have shrunk and grown again, and cut what was shown.
@@ -331,6 +335,17 @@ impl Ui {
             }
         }
         None
+    }
+
+    /// The terminal is the editor's until it ends.
+    fn edit(&mut self, place: &FilePlace) -> Option<End> {
+        self.leave();
+        input::hold(true);
+        self.screen.suspend();
+        let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
+        input::hold(false);
+        let end = self.redraw();
+        end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
     }
 
     fn redraw(&mut self) -> Option<End> {

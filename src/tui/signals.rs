@@ -55,6 +55,24 @@ impl Drop for Listener {
     }
 }
 
+/// Whether signals that keys send are a child's.
+static KEYS_OF_CHILD: AtomicBool = AtomicBool::new(false);
+
+/// Signals that keys send are a child's until the result is dropped.
+pub(super) fn leave_keys_to_child() -> KeysOfChild {
+    KEYS_OF_CHILD.store(true, Ordering::Release);
+    KeysOfChild(())
+}
+
+/// See [`leave_keys_to_child`].
+pub(super) struct KeysOfChild(());
+
+impl Drop for KeysOfChild {
+    fn drop(&mut self) {
+        KEYS_OF_CHILD.store(false, Ordering::Release);
+    }
+}
+
 struct Ear {
     over: Arc<AtomicBool>,
     events: Sender<Event>,
@@ -64,6 +82,10 @@ impl Ear {
     fn hear(&self, number: i32) {
         if self.over.load(Ordering::Acquire) {
             let _ = low_level::emulate_default_handler(number);
+            return;
+        }
+        let is_of_keys = matches!(number, SIGINT | SIGQUIT | SIGTSTP | SIGCONT);
+        if is_of_keys && KEYS_OF_CHILD.load(Ordering::Acquire) {
             return;
         }
         let signal = match number {

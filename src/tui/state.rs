@@ -5,10 +5,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::color::ColorDepth;
+use super::editor::FilePlace;
 use super::event::{Window, Written};
+use super::history::History;
 use crate::film::Picture;
-use crate::pipeline::protocol::{AssetProgress, PreviewSize, RenderProgress, Report, Stage, StageReport};
-use crate::pipeline::settings::{Effective, Overrides, View};
+use crate::pipeline::protocol::{
+    AssetProgress, PreviewSize, RenderProgress, Report, Spot, Stage, StageReport, Viewpoint,
+};
+use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
 use crate::scene::diagnostic::Diagnostic;
 
@@ -28,6 +32,17 @@ pub(super) struct Toggles {
     pub dof: Option<bool>,
     pub photons: Option<bool>,
     pub view: Option<View>,
+    pub camera: CameraChange,
+    pub exposure: Option<f32>,
+}
+
+/// Steps of the camera come faster than pictures: the newest one waits until the step before has its first picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Nudge {
+    /// The request of a step.
+    pub request: Option<u64>,
+    /// Whether there is a newer step.
+    pub is_waiting: bool,
 }
 
 /// What the worker is doing for the current generation.
@@ -103,6 +118,23 @@ pub(super) struct Shown {
     pub range: Option<[f32; 2]>,
 }
 
+/// The left button went down over a cell of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Press {
+    /// Where it was seen last.
+    pub column: u16,
+    pub row: u16,
+    pub has_moved: bool,
+}
+
+/// Why it was asked what is at a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Purpose {
+    #[default]
+    Inspect,
+    Focus,
+}
+
 /// How the front end starts.
 pub(super) struct Setup {
     pub scene: PathBuf,
@@ -134,6 +166,22 @@ pub(super) struct State {
     pub resize_due: Option<Instant>,
 
     pub effective: Option<Effective>,
+    /// The camera of the newest request that was understood.
+    pub camera: Option<Viewpoint>,
+    pub nudge: Nudge,
+    pub is_mouse_on: bool,
+    pub press: Option<Press>,
+    /// Whether the next click is for the focus.
+    pub is_focusing: bool,
+    /// The last click, else the middle of the picture.
+    pub crosshair: Spot,
+    /// What the last answer about a place is for.
+    pub asked: Purpose,
+    /// What was found there, in the scene file.
+    pub picked: Option<FilePlace>,
+    pub history: History,
+    /// The request of the last edit.
+    pub edit: Option<u64>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
@@ -190,6 +238,16 @@ impl State {
             paused_at: None,
             resize_due: None,
             effective: None,
+            camera: None,
+            nudge: Nudge::default(),
+            is_mouse_on: true,
+            press: None,
+            is_focusing: false,
+            crosshair: Spot { x: 0.5, y: 0.5 },
+            asked: Purpose::default(),
+            picked: None,
+            history: History::default(),
+            edit: None,
             stages: Default::default(),
             assets: Vec::new(),
             progress: None,
@@ -224,7 +282,36 @@ impl State {
         overrides.dof = self.toggles.dof.or(overrides.dof);
         overrides.photons = self.toggles.photons.or(overrides.photons);
         overrides.view = self.toggles.view.or(overrides.view);
+        overrides.camera = self.toggles.camera;
+        overrides.exposure = self.toggles.exposure.or(overrides.exposure);
         overrides
+    }
+
+    /// The camera as the keys have it; none: no scene has been understood yet.
+    pub(super) fn viewpoint(&self) -> Option<Viewpoint> {
+        self.camera.map(|camera| camera.changed(&self.toggles.camera))
+    }
+
+    /// What the keys changed that the picture alone does not tell.
+    pub(super) fn changes(&self) -> Vec<String> {
+        let moved = self.toggles.camera.is_any().then(|| "camera moved".to_owned());
+        let exposed = self.toggles.exposure.map(|stops| format!("exposure {stops:+}"));
+        moved.into_iter().chain(exposed).collect()
+    }
+
+    /// Whether a picture is written without being asked for: one of the scene's own camera, in the view that the run was started
+    /// with.
+    pub(super) fn is_written(&self) -> bool {
+        self.view() == self.base_view() && !self.toggles.camera.is_any()
+    }
+
+    /// Whether the last step of the camera has no picture yet.
+    pub(super) fn awaits_step(&self) -> bool {
+        let is_shown = self.picture.as_ref().is_some_and(|shown| shown.generation == self.generation);
+        self.nudge.request == Some(self.generation)
+            && self.is_running()
+            && self.requested.is_some()
+            && !is_shown
     }
 
     /// The view that the run was started with: the only one that is written without being asked.

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use crossterm::cursor::{Hide, Show};
 use crossterm::event::{DisableBracketedPaste, EnableBracketedPaste};
-use crossterm::style::ResetColor;
+use crossterm::style::{Print, ResetColor};
 use crossterm::terminal::{
     Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode,
     enable_raw_mode,
@@ -26,12 +26,18 @@ use super::writer;
 
 /// Whether the screen is taken.
 static TAKEN: AtomicBool = AtomicBool::new(false);
+/// Whether the mouse is wanted.
+static MOUSE: AtomicBool = AtomicBool::new(true);
 /// Whether keys come raw.
 static RAW: AtomicBool = AtomicBool::new(false);
 /// The thread whose panic gives the terminal back; those of other threads are kept in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
 /// What the last panic of another thread said.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
+
+/// Presses, movements with a button down, in SGR form. (crossterm's own command turns on all movements.)
+const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1002h\x1b[?1006h";
+const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 
 /// Half blocks are about square at this height over width of a cell.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
@@ -72,6 +78,12 @@ impl Screen {
             disable_raw_mode()?;
         }
         take()
+    }
+
+    /// Has the terminal report the mouse, or leave it to its own.
+    pub(super) fn set_mouse(&mut self, is_on: bool) {
+        MOUSE.store(is_on, Ordering::Release);
+        writer::send(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
     }
 
     /// The terminal is gone: nothing more is written to it.
@@ -139,12 +151,21 @@ pub(super) fn rescue() {
 
 /// The bytes that take the screen.
 fn enter(out: &mut impl Write) -> io::Result<()> {
-    execute!(out, EnterAlternateScreen, Hide, EnableBracketedPaste, Clear(ClearType::All))
+    let mouse = if MOUSE.load(Ordering::Acquire) { MOUSE_ON } else { MOUSE_OFF };
+    execute!(out, EnterAlternateScreen, Hide, EnableBracketedPaste, Print(mouse), Clear(ClearType::All))
 }
 
 /// The bytes that give it back, from any state that a frame can be cut in.
 fn leave(out: &mut impl Write) -> io::Result<()> {
-    execute!(out, EndSynchronizedUpdate, ResetColor, DisableBracketedPaste, LeaveAlternateScreen, Show)
+    execute!(
+        out,
+        EndSynchronizedUpdate,
+        ResetColor,
+        Print(MOUSE_OFF),
+        DisableBracketedPaste,
+        LeaveAlternateScreen,
+        Show
+    )
 }
 
 /// While the terminal is taken, a panic of its owner gives it back and is then reported as always; a panic of
@@ -226,7 +247,7 @@ mod tests {
     fn leaving_undoes_entering() {
         let enter = bytes(enter);
         let leave = bytes(leave);
-        for mode in ["?1049", "?25", "?2004"] {
+        for mode in ["?1049", "?25", "?2004", "?1000", "?1002", "?1006"] {
             assert!(enter.contains(mode) && leave.contains(mode), "{mode}: {enter:?} {leave:?}");
         }
         assert!(enter.contains("\x1b[?1049h") && enter.contains("\x1b[?25l"), "{enter:?}");

@@ -11,7 +11,8 @@ impl World {
     /// Put the parts together.
     pub fn new(scene: &Scene, parts: &Parts, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
         let (materials, object_materials) = lower_materials(scene, parts);
-        let camera = Camera::new(&scene.camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
+        let camera = parts.camera.as_ref().unwrap_or(&scene.camera);
+        let camera = Camera::new(camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
         let is_mipmapped = materials.iter().any(Material::is_mipmapped);
         let glass_at_eye = Vec::new();
         let world =

@@ -2,9 +2,10 @@
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::Ray;
+use crate::math::decimal::{rounded, step_at};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
-use crate::scene::description;
+use crate::scene::description::{self, Pose, Viewpoint};
 
 /// A perspective camera with a flat plane of focus.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +60,33 @@ impl Camera {
             description::Camera::Orbiter { .. } => {
                 let orbiter = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
                 (DVec3::from_array(orbiter.center), orbiter.size)
+            }
+        }
+    }
+
+    /// A scene's camera by vectors. That of an orbiter file has short numbers, near enough to look the same, and looks at the
+    /// point of its axis that is as far away as its centre.
+    pub fn viewpoint(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Viewpoint {
+        match camera {
+            description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => Viewpoint {
+                pose: Pose { position: *position, look_at: *look_at, up: *up },
+                fov: *fov,
+                aperture: *aperture,
+                focus: *focus,
+            },
+            description::Camera::Orbiter { fov, focus, .. } => {
+                let file = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
+                let Self { position, up, forward, aperture, .. } = Self::new(camera, Some(&file));
+                let look_at = position + forward * file.size;
+                let short = |place: DVec3| {
+                    DVec3::from_array(place.to_array().map(|at| rounded(at, step_at(file.size))))
+                };
+                let (position, look_at) = (short(position), short(look_at));
+                // An orbiter does not roll, so that y is up in its picture too, unless it is upside down.
+                let is_upright = up.y > UPRIGHT;
+                let pose = Pose { position, look_at, up: if is_upright { DVec3::Y } else { up } };
+                let focus = focus.unwrap_or_else(|| pose.distance());
+                Viewpoint { pose, fov: fov.unwrap_or(file.fov), aperture, focus }
             }
         }
     }
@@ -120,6 +148,9 @@ impl Camera {
         (point - self.position).dot(self.forward)
     }
 }
+
+/// A camera whose upward axis has at least this much of y is not upside down, and does not look straight up or down.
+const UPRIGHT: f64 = 1e-3;
 
 /// Stands where an orbiter camera is without its file, which the pipeline does not let happen.
 const DEFAULT_ORBITER: OrbiterCamera = OrbiterCamera {
@@ -183,5 +214,35 @@ mod tests {
         let expected = DVec3::new(-30.0_f64.to_radians().cos(), 30.0_f64.to_radians().sin(), 0.0) * 5.0;
         assert!((-to_center - expected).length() < 1e-12, "{to_center}");
         assert!(camera.up.y > 0.8);
+    }
+
+    #[test]
+    fn an_orbiter_by_vectors_is_the_same_camera() {
+        let file = description::Located { value: "camera.txt".into(), span: 0..0 };
+        for rotation in [[30.0, 90.0], [18.0, 16.0], [90.0, 20.0], [120.0, -7.0], [-90.0, 0.0]] {
+            let orbiter = OrbiterCamera {
+                center: [1.0, 2.0, 3.0],
+                position: [0.5, -0.25],
+                rotation,
+                size: 5.0,
+                ..DEFAULT_ORBITER
+            };
+            let scene =
+                description::Camera::Orbiter { file: file.clone(), fov: None, aperture: 0.1, focus: None };
+            let of_file = Camera::new(&scene, Some(&orbiter));
+            let view = Camera::viewpoint(&scene, Some(&orbiter));
+            let by_vectors = Camera::new(&view.into(), None);
+            for (a, b) in [
+                (of_file.position, by_vectors.position),
+                (of_file.right, by_vectors.right),
+                (of_file.up, by_vectors.up),
+                (of_file.forward, by_vectors.forward),
+            ] {
+                assert!((a - b).length() < 1e-4 * 5.0, "{rotation:?}: {a} {b}");
+            }
+            assert_eq!(of_file.tan_half_fov, by_vectors.tan_half_fov);
+            assert!((by_vectors.focus - 5.0).abs() < 1e-4 * 5.0 && by_vectors.aperture == 0.1);
+            assert!(view.is_focused_on_look_at());
+        }
     }
 }

@@ -34,6 +34,7 @@ use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
 use crate::materials::{Bsdf, Material, Mipmaps, Phong};
+use crate::scene::description;
 
 /// The images of a scene.
 pub type Images = HashMap<TextureSource, Image>;
@@ -56,6 +57,8 @@ pub struct Parts {
     pub images: Images,
     /// Where the scene's camera is an orbiter file: that file.
     pub orbiter: Option<OrbiterCamera>,
+    /// A camera in place of the scene's.
+    pub camera: Option<description::Camera>,
 }
 
 /// A scene that can be traced.

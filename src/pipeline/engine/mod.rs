@@ -5,6 +5,7 @@ mod outputs;
 #[cfg(test)]
 mod tests;
 
+use std::cell::Cell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use std::time::Instant;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::cache::{Memo, Pool};
+use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
 use super::plan::{Plan, cores, plan, warnings};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
@@ -29,7 +31,7 @@ use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::preview::Screen;
 use super::stages::render::{Rendering, render};
 use super::stages::textures::{TextureCache, Textures, add_declared, textures};
-use super::stages::world::{Keyed, world};
+use super::stages::world::{Eye, Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop, keys};
 use super::table::StageTable;
@@ -43,7 +45,7 @@ use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::world::{World, origin};
+use crate::world::World;
 
 /// What an engine works with; tests work with other means.
 #[derive(Clone, Copy)]
@@ -77,6 +79,9 @@ pub(super) struct Engine {
     written: Written,
     /// What the current film is rendered by.
     plan: Option<Plan>,
+    at_hand: Option<AtHand>,
+    /// Pixels of first pictures that are traced in a second, as the last one was.
+    coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
     /// The assets of the last scene that could be read: they stay watched while it is broken.
     assets: Vec<FileRead>,
@@ -94,6 +99,8 @@ pub(super) trait Orders {
     fn take_write(&self) -> bool;
     /// The size that previews are to have from now on.
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
+    /// The next thing that is asked of the picture at hand.
+    fn take_errand(&self) -> Option<Errand>;
 }
 
 /// What a request goes by while it is under way.
@@ -132,6 +139,8 @@ impl Engine {
             films: Films::default(),
             written: Written::default(),
             plan: None,
+            at_hand: None,
+            coarse_rate: Cell::new(None),
             pool: None,
             assets: Vec::new(),
             inputs: Inputs::default(),
@@ -185,6 +194,14 @@ impl Engine {
         }
     }
 
+    /// Do what is asked of the picture at hand, outside of a request.
+    pub(super) fn errand(&self, errand: Errand, sink: &Sink) {
+        match &self.at_hand {
+            Some(at_hand) => at_hand.run(errand, self.films.current(), &self.inputs, sink),
+            None => errand.fail("there is no picture yet", sink),
+        }
+    }
+
     fn run(
         &mut self,
         request: &Request,
@@ -207,6 +224,13 @@ impl Engine {
         table.run(Stage::Photons, || Ok(photons(asked, key, store, sending)?))?;
         let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
+        let at_hand = AtHand {
+            parsed: ready.parsed.clone(),
+            sets: request.overrides.sets.clone(),
+            world: world.clone(),
+            settings: plan.settings,
+        };
+        self.at_hand = Some(at_hand);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons_key, sink, meanwhile))?;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
@@ -244,8 +268,9 @@ impl Engine {
         for warning in warnings(&plan.scene, &plan.settings) {
             findings.warn(&parsed.loaded, 0..0, warning);
         }
-        let settings = Box::new(plan.effective.clone());
-        table.sink.send(Event::Settings { generation: request.generation, settings });
+        let eye = Eye::new(&plan.scene, parsed.orbiter, &request.overrides.camera);
+        let (settings, camera) = (Box::new(plan.effective.clone()), eye.viewpoint());
+        table.sink.send(Event::Settings { generation: request.generation, settings, camera });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
         // The picture at hand, which may yet be written, is of the scene before.
@@ -262,16 +287,16 @@ impl Engine {
         let scene = &plan.scene;
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter's numbers are few: their text stands for them.
-        let orbiter = parsed.orbiter.map(|camera| format!("{camera:?}"));
+        let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
-        let origin = origin(&scene.camera, parsed.orbiter.as_ref());
+        let origin = eye.origin();
         let build = || accel(scene, (&of, origin), &meshes, &mut self.accel, &reading);
         let built = table.run(Stage::Accel, build)?;
         let memos = (&mut self.lights, &mut self.sky);
         let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos, token)?);
         let lights = table.run(Stage::Lights, gather)?;
-        let world = world(scene, &of, (built, lights), &textures, parsed.orbiter, &mut self.world);
         let surfaces = keys::surfaces(scene, &of, &textures.keys);
+        let world = world(scene, (&surfaces, &of), (built, lights), &textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = textures;
         Ok(Ready { parsed, plan, world, surfaces, origin, texels_loaded, texture_memory_bytes })
     }
@@ -313,7 +338,7 @@ impl Engine {
         let (plan, orders) = (&ready.plan, meanwhile.orders);
         let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
         let written = std::cell::RefCell::new(&mut self.written);
-        let is_postponed = std::cell::Cell::new(false);
+        let is_postponed = Cell::new(false);
         let pulse = |canvas: &Canvas, is_covered: bool| {
             if !is_covered {
                 if orders.wants_write() && !is_postponed.replace(true) {
@@ -321,6 +346,9 @@ impl Engine {
                 }
             } else if orders.take_write() {
                 write_by_hand(canvas, to, &mut written.borrow_mut());
+            }
+            if let Some((errand, at_hand)) = orders.take_errand().zip(self.at_hand.as_ref()) {
+                at_hand.run(errand, Some(canvas), &self.inputs, sink);
             }
         };
         let rendering = Rendering {
@@ -340,6 +368,8 @@ impl Engine {
             sink,
             pulse: &pulse,
             take_preview: &|| orders.take_preview(),
+            is_moved: request.overrides.camera.is_any(),
+            coarse_rate: &self.coarse_rate,
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
         render(key, &mut self.films, &rendering)

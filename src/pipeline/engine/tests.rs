@@ -23,6 +23,10 @@ impl Orders for Silence {
     fn take_preview(&self) -> Option<Option<PreviewSize>> {
         None
     }
+
+    fn take_errand(&self) -> Option<Errand> {
+        None
+    }
 }
 
 /// What was made for a request.

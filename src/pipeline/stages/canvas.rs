@@ -21,6 +21,8 @@ pub(in crate::pipeline) struct Canvas {
     pub(super) base: Option<RadianceImage>,
     /// What the last preview was made by.
     pub(super) previewer: Option<Previewer>,
+    /// Whether it was begun for a camera on its way.
+    pub(super) is_passing: bool,
     /// The budget that ended the last render of it.
     pub(super) ended_by: Option<f64>,
 }
@@ -34,7 +36,16 @@ impl Canvas {
         let film =
             Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?;
         let (done, goals) = (vec![[0; 2]; film.tile_count()], Goals::none(film.tile_count()));
-        Ok(Self { key, film: Arc::new(film), done, goals, base: None, previewer: None, ended_by: None })
+        Ok(Self {
+            key,
+            film: Arc::new(film),
+            done,
+            goals,
+            base: None,
+            previewer: None,
+            is_passing: false,
+            ended_by: None,
+        })
     }
 
     /// Whether every pixel has this many samples, or those that it is to have.

@@ -72,7 +72,9 @@ impl Films {
     /// One too large for the budget is dropped alone; the others make room for one that is not.
     fn keep(&mut self, canvas: Canvas) {
         let size = canvas.memory_bytes();
-        if size > self.most_kept_bytes || !canvas.is_begun() {
+        // A camera on its way would fill the memory with what nobody comes back to.
+        let is_left_behind = canvas.is_passing && !canvas.is_covered();
+        if size > self.most_kept_bytes || is_left_behind || !canvas.is_begun() {
             return;
         }
         while self.kept.iter().map(Canvas::memory_bytes).sum::<u64>() + size > self.most_kept_bytes {
@@ -142,6 +144,24 @@ mod tests {
             .expect("a film");
         assert!(finds(&mut films, "a"));
         assert!(!finds(&mut films, "large"));
+    }
+
+    #[test]
+    fn of_a_camera_on_its_way_only_whole_pictures_are_kept() {
+        for is_whole in [false, true] {
+            let mut films = films(&["a"], u64::MAX);
+            films.select(key("b"), |_| true);
+            let passing = || {
+                let mut passing = canvas("b");
+                passing.is_passing = true;
+                passing.done[0] = u32::from(is_whole);
+                Ok::<_, ()>(passing)
+            };
+            films.put(passing).expect("a film");
+            films.select(key("c"), |_| true);
+            assert_eq!(finds(&mut films, "b"), is_whole);
+            assert!(finds(&mut films, "a"));
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::math::DVec3;
-use crate::scene::description::{Accel, Render, Scene};
+use crate::scene::description::{Accel, Camera, Render, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
 /// What the descriptions of a scene refer to by index.
@@ -85,8 +85,8 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
 }
 
 /// Everything that a world is made of but the kind of its trees, which all have the same hits: views that show the trees add it.
-pub(in crate::pipeline) fn world(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
-    Fingerprint::new("world").key(&surfaces(scene, of, textures)).add(&scene.camera, of).finish()
+pub(in crate::pipeline) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
+    Fingerprint::new("world").key(surfaces).add(camera, of).finish()
 }
 
 /// Everything that photons depend on: what they meet, in coordinates that start somewhere, how they are sent and how far they go.
@@ -144,7 +144,7 @@ mod tests {
         (
             geometry(&scene, &of, DVec3::ZERO),
             lights(&scene, &of, DVec3::ZERO, (None, &[])),
-            world(&scene, &of, &[]),
+            world(&surfaces(&scene, &of, &[]), &scene.camera, &of),
         )
     }
 

@@ -4,6 +4,7 @@
 //! and both give the bits of an uninterrupted one, because every sample is a function of its pixel and number and
 //! every pixel's sum has the order of its samples.
 
+use std::cell::Cell;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -30,6 +31,9 @@ const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
 /// A preview may take this part of the time at most.
 const PREVIEW_SHARE: u32 = 10;
 
+/// What the first picture of a moved camera may take.
+const HASTE: Duration = Duration::from_millis(6);
+
 /// What the stage is given.
 pub(in crate::pipeline) struct Rendering<'a> {
     pub(in crate::pipeline) tracer: Tracer<'a>,
@@ -46,6 +50,10 @@ pub(in crate::pipeline) struct Rendering<'a> {
     pub(in crate::pipeline) pulse: &'a dyn Fn(&Canvas, bool),
     /// Takes an order for another size of the previews.
     pub(in crate::pipeline) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
+    /// Whether somebody is moving the camera: the first picture must come soon, however small it is.
+    pub(in crate::pipeline) is_moved: bool,
+    /// Pixels of first pictures that are traced in a second, as the last one was.
+    pub(in crate::pipeline) coarse_rate: &'a Cell<Option<f64>>,
 }
 
 /// Bring the film of this key to what is asked for.
@@ -74,6 +82,7 @@ pub(in crate::pipeline) fn render(
         return Ok(Staged::reused(RayCounters::default(), why));
     }
     painter.canvas.ended_by = None;
+    painter.canvas.is_passing = rendering.is_moved;
     painter.paint()?;
     let rays = painter.rays;
     Ok(match (!painter.canvas.is_complete(wanted), had) {
@@ -270,20 +279,35 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// A first picture with one sample at about the preview's own resolution, where that is much less work than one pass.
+    /// First pictures with one sample at about the preview's own resolution, where that is much less work than one pass: of a
+    /// moved camera a hasty one before.
     fn coarse(&mut self) -> Result<(), Stop> {
-        let plan = self.rendering.plan;
-        let (full_width, full_height) = (plan.settings.render.width, plan.settings.render.height);
         let Some(shown) = self.screen.size() else { return Ok(()) };
-        let (width, height) = self.coarse_size(shown);
-        let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
-        if pixels(width, height) * 2 > pixels(full_width, full_height) {
-            return Ok(());
+        let usual = self.coarse_size(shown);
+        let rate = self.rendering.coarse_rate.get().filter(|_| self.rendering.is_moved);
+        let hasty = rate.and_then(|rate| hasty_size(usual, rate));
+        for size in hasty.into_iter().chain([usual]) {
+            if self.is_less_work(size) {
+                self.coarse_of(size, shown)?;
+            }
         }
+        Ok(())
+    }
+
+    fn is_less_work(&self, (width, height): (u32, u32)) -> bool {
+        let Render { width: full_width, height: full_height, .. } = self.rendering.plan.settings.render;
+        let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
+        pixels(width, height) * 2 <= pixels(full_width, full_height)
+    }
+
+    /// A first picture of this size, shown at another one.
+    fn coarse_of(&mut self, (width, height): (u32, u32), shown: (u32, u32)) -> Result<(), Stop> {
+        let plan = self.rendering.plan;
+        let full = (plan.settings.render.width, plan.settings.render.height);
         let render = Render { width, height, ..plan.settings.render };
         let settings = RenderSettings { render, ..plan.settings };
         let whole = Rect { x: 0, y: 0, width, height };
-        let rect = plan.crop.map_or(whole, |rect| scale(rect, (full_width, full_height), (width, height)));
+        let rect = plan.crop.map_or(whole, |rect| scale(rect, full, (width, height)));
         let tracer = Tracer { settings: &settings, ..self.rendering.tracer };
         let maps = match self.rendering.photons {
             Some(photons) => Some(self.maps(photons, 0..1)?),
@@ -291,6 +315,7 @@ impl<'a> Painter<'a> {
         };
         let tracer = Tracer { photons: maps.as_ref(), ..tracer };
         let mut base = RadianceImage::black(width, height);
+        let begin = Instant::now();
         tracer.run(
             &coarse_jobs(rect),
             |_, pieces| pieces,
@@ -301,17 +326,31 @@ impl<'a> Painter<'a> {
                 true
             },
         )?;
+        let rate = rect.area() as f64 / begin.elapsed().as_secs_f64().max(1e-6);
+        self.rendering.coarse_rate.set(Some(rate));
         self.canvas.base = Some(base.resized(shown.0, shown.1));
         self.show();
         Ok(())
     }
 }
 
+/// The size of a first picture that takes [`HASTE`] where so many pixels are traced in a second; none: the usual one takes
+/// hardly longer.
+fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
+    /// Pixels across of the smallest.
+    const LEAST: f64 = 16.0;
+    let share = (rate * HASTE.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
+    let side =
+        |length: u32| ((f64::from(length) * share.max(LEAST / f64::from(width))).round() as u32).max(1);
+    (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
+}
+
 /// Small pieces, so that all threads end at about the same time.
 fn coarse_jobs(rect: Rect) -> Vec<Job> {
-    const SIDE: u32 = 16;
-    let starts = |start: u32, length: u32| (start..start + length).step_by(SIDE as usize);
-    let piece = |(x, y)| Rect { x, y, width: SIDE, height: SIDE }.intersection(&rect);
+    const FEW: usize = 5000;
+    let side = if rect.area() < FEW { 8 } else { 16 };
+    let starts = |start: u32, length: u32| (start..start + length).step_by(side as usize);
+    let piece = |(x, y)| Rect { x, y, width: side, height: side }.intersection(&rect);
     let places = starts(rect.y, rect.height).flat_map(|y| starts(rect.x, rect.width).map(move |x| (x, y)));
     let job = |(tile, rect)| Job { tile, rect, rows: Rows::All, samples: 0..1 };
     places.filter_map(piece).enumerate().map(job).collect()
@@ -350,6 +389,15 @@ mod tests {
             let is_inside = Rect { x: i % 64, y: i / 64, ..one }.intersection(&rect).is_some();
             assert_eq!(times, i32::from(is_inside), "pixel {i}");
         }
+    }
+
+    #[test]
+    fn a_hasty_picture_is_as_large_as_its_time_allows() {
+        let pixels_of = |rate: f64| hasty_size((120, 80), rate / HASTE.as_secs_f64());
+        assert_eq!(pixels_of(9600.0), None, "there is time for the usual one");
+        assert_eq!(pixels_of(2400.0), Some((60, 40)));
+        assert_eq!(pixels_of(1.0), Some((16, 11)), "one that still shows something");
+        assert_eq!(hasty_size((10, 5), 0.0), Some((10, 5)));
     }
 
     #[test]

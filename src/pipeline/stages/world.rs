@@ -8,28 +8,63 @@ use super::keys;
 use super::textures::Textures;
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
-use crate::scene::description::Scene;
+use crate::math::DVec3;
+use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
 use crate::scene::fingerprint::{Key, Referents};
-use crate::world::{Parts, World};
+use crate::world::{self, Parts, World};
 
 /// A world with the key of all that its pictures depend on.
 pub(in crate::pipeline) type Keyed = (Key, Arc<World>);
 
+/// The camera of a request: the scene's, or what the request makes of it.
+#[derive(Clone, Debug)]
+pub(in crate::pipeline) struct Eye {
+    pub(in crate::pipeline) camera: Camera,
+    /// The file that the camera is in, where it is in one.
+    pub(in crate::pipeline) orbiter: Option<OrbiterCamera>,
+}
+
+impl Eye {
+    pub(in crate::pipeline) fn new(
+        scene: &Scene,
+        orbiter: Option<OrbiterCamera>,
+        change: &CameraChange,
+    ) -> Self {
+        let own = Self { camera: scene.camera.clone(), orbiter };
+        if change.is_any() {
+            Self { camera: own.viewpoint().changed(change).into(), orbiter: None }
+        } else {
+            own
+        }
+    }
+
+    pub(in crate::pipeline) fn viewpoint(&self) -> Viewpoint {
+        world::Camera::viewpoint(&self.camera, self.orbiter.as_ref())
+    }
+
+    /// Where the coordinates start in which it sees best.
+    pub(in crate::pipeline) fn origin(&self) -> DVec3 {
+        world::origin(&self.camera, self.orbiter.as_ref())
+    }
+}
+
 /// Put it together, unless the last one is of the same parts.
 pub(in crate::pipeline) fn world(
     scene: &Scene,
-    of: &Referents<'_>,
+    (surfaces, of): (&Key, &Referents<'_>),
     (built, lights): (Built, Arc<Lights>),
     textures: &Textures,
-    orbiter: Option<OrbiterCamera>,
+    eye: &Eye,
     memo: &mut Memo<Arc<World>>,
 ) -> Keyed {
-    let key = keys::world(scene, of, &textures.keys);
+    let key = keys::world(surfaces, &eye.camera, of);
     let built_key = keys::in_trees(&key, scene.render.accel);
     if let Some(world) = memo.get(built_key) {
         return (key, world.clone());
     }
-    let parts = Parts { meshes: built.meshes, images: textures.images.clone(), orbiter };
+    let Eye { camera, orbiter } = eye.clone();
+    let parts =
+        Parts { meshes: built.meshes, images: textures.images.clone(), orbiter, camera: Some(camera) };
     let world = Arc::new(World::new(scene, &parts, built.geometry, lights));
     memo.set(built_key, world.clone());
     (key, world)

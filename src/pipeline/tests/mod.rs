@@ -1,6 +1,7 @@
 //! The worker driven by messages, as front ends do it.
 
 mod adaptive;
+mod camera;
 mod orders;
 mod reuse;
 mod targets;

@@ -37,6 +37,81 @@ pub enum Camera {
     },
 }
 
+/// A camera by vectors, however the scene gives it. What [`Camera::LookAt`] says of its fields holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// Where it is, and which way up.
+    pub pose: Pose,
+    /// Vertical whole angle in degrees.
+    pub fov: f64,
+    /// Lens radius.
+    pub aperture: f64,
+    /// Distance along the view axis to the plane in focus.
+    pub focus: f64,
+}
+
+/// Where a camera is, what it looks at and which way up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// The eye.
+    pub position: DVec3,
+    /// The point in the middle of the picture.
+    pub look_at: DVec3,
+    /// Up in the picture.
+    pub up: DVec3,
+}
+
+/// What is changed of a camera; `None` leaves its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraChange {
+    /// Where it is.
+    pub pose: Option<Pose>,
+    /// Vertical whole angle in degrees, in (0, 180).
+    pub fov: Option<f64>,
+    /// Distance to the plane in focus, > 0.
+    pub focus: Option<f64>,
+}
+
+impl Pose {
+    /// From the eye to the point that it looks at.
+    pub fn distance(&self) -> f64 {
+        self.position.distance(self.look_at)
+    }
+}
+
+impl CameraChange {
+    /// Whether it changes anything.
+    pub fn is_any(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+impl Viewpoint {
+    /// With a change. Where the plane in focus goes through `look_at`, as it does in a scene that does not say, it stays there.
+    pub fn changed(&self, change: &CameraChange) -> Self {
+        let pose = change.pose.unwrap_or(self.pose);
+        let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };
+        Self {
+            pose,
+            fov: change.fov.unwrap_or(self.fov),
+            focus: change.focus.unwrap_or(focus),
+            aperture: self.aperture,
+        }
+    }
+
+    /// Whether the plane in focus goes through `look_at`.
+    pub fn is_focused_on_look_at(&self) -> bool {
+        self.focus == self.pose.distance()
+    }
+}
+
+impl From<Viewpoint> for Camera {
+    fn from(view: Viewpoint) -> Self {
+        let Viewpoint { pose: Pose { position, look_at, up }, fov, aperture, focus } = view;
+        Self::LookAt { position, look_at, up, fov, aperture, focus }
+    }
+}
+
 impl Camera {
     /// Lens radius, ≥ 0.
     pub fn aperture(&self) -> f64 {

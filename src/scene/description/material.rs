@@ -78,6 +78,17 @@ pub struct Material {
     pub normal_map: Option<NormalMap>,
 }
 
+impl MaterialKind {
+    /// What a scene file calls it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Phong { .. } => "phong",
+            Self::Mirror { .. } => "mirror",
+            Self::Glass { .. } => "glass",
+        }
+    }
+}
+
 /// A tangent-space normal map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalMap {

@@ -12,7 +12,7 @@ mod shape;
 use std::ops::Range;
 use std::path::PathBuf;
 
-pub use camera::Camera;
+pub use camera::{Camera, CameraChange, Pose, Viewpoint};
 pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
     ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,

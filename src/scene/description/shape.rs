@@ -170,6 +170,22 @@ impl Shape {
         })
     }
 
+    /// What a scene file calls it.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Sphere { .. } => "sphere",
+            Self::Quad { .. } => "quad",
+            Self::Plane { .. } => "plane",
+            Self::Box { .. } => "box",
+            Self::Triangle { .. } => "triangle",
+            Self::Disk { .. } => "disk",
+            Self::Cylinder { .. } => "cylinder",
+            Self::Cone { .. } => "cone",
+            Self::Torus { .. } => "torus",
+            Self::Mesh(_) => "mesh",
+        }
+    }
+
     /// The instance of a mesh file that it is, if it is one.
     pub fn mesh(&self) -> Option<&Mesh> {
         match self {

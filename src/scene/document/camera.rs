@@ -6,7 +6,8 @@ use super::limits::Limits;
 use super::table::Table;
 use crate::math::DVec3;
 
-const FOV_DEGREES: f64 = 40.0;
+/// Where a scene does not say.
+pub(in super::super) const FOV_DEGREES: f64 = 40.0;
 
 /// Below this sine of the angle between them, `up` and the view count as parallel.
 const PARALLEL: f64 = 1e-6;

@@ -20,13 +20,14 @@ mod value;
 
 use std::path::{Path, PathBuf};
 
-use super::description::Scene;
+use super::description::{Camera, Scene};
 use super::source::Source;
 use super::{MAX_FILE_BYTES, Outcome, toml};
 use crate::math::Vec3;
 use context::{Context, Issue};
 use table::Table;
 
+pub(super) use camera::FOV_DEGREES;
 pub(super) use shapes::is_mesh;
 
 /// Reads and validates a scene; `path` says where the files are that it names.
@@ -49,6 +50,15 @@ pub(super) fn lower(source: &Source, path: &Path) -> Outcome {
     let scene = scene(&Table::root(&context, document.root()));
     let has_errors = context.has_errors();
     Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines) }
+}
+
+/// The camera of a scene, if that is right.
+pub(super) fn camera_of(source: &Source) -> Option<Camera> {
+    let context = Context::new(source.clone(), Path::new(""));
+    let (document, errors) = toml::parse(source.text());
+    let document = sets::put(&context, source, document);
+    let camera = camera::read(&Table::root(&context, document.root()));
+    camera.filter(|_| errors.is_empty() && !context.has_errors())
 }
 
 /// The files that a text names, whatever else it says.

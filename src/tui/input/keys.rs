@@ -4,7 +4,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
 
 use super::{Answer, Input};
-use crate::tui::event::KeyPress;
+use crate::tui::event::{KeyPress, Mouse, MouseKind};
 
 /// What the parser calls back; it holds the meaning of what was read last.
 #[derive(Debug, Default)]
@@ -40,6 +40,22 @@ impl Meaning {
 
     fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) {
         self.found.push(Input::Key(KeyPress { code, modifiers }));
+    }
+
+    /// A report in SGR form (mode 1006): the button with bits for what else is, and the cell from 1.
+    fn mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
+        const MODIFIERS: u16 = 4 | 8 | 16;
+        let kind = match (code & !MODIFIERS, is_pressed) {
+            (0, true) => MouseKind::Press,
+            (0 | 32, false) => MouseKind::Release,
+            (32, true) => MouseKind::Drag,
+            (64, true) => MouseKind::WheelUp,
+            (65, true) => MouseKind::WheelDown,
+            // Other buttons.
+            _ => return self.answer(Answer::Other),
+        };
+        let (column, row) = (column.saturating_sub(1), row.saturating_sub(1));
+        self.found.push(Input::Mouse(Mouse { kind, column, row }));
     }
 
     fn answer(&mut self, answer: Answer) {
@@ -110,6 +126,7 @@ impl Perform for Meaning {
         self.has_ended = true;
         match (intermediates, action) {
             ([], 'n') if first == 0 => self.answer(Answer::Ready),
+            (b"<", 'M' | 'm') => self.mouse(first, (second, number(2)), action == 'M'),
             (b"?", 'c') => self.answer(Answer::Attributes),
             (b"?$", 'y') if first == 2026 => {
                 // 1: set, 2: reset; others: not known, or it cannot be changed.

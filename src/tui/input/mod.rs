@@ -10,6 +10,7 @@ mod paste;
 use std::io;
 use std::os::fd::AsFd;
 use std::sync::mpsc::Sender;
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::Instant;
 
@@ -17,12 +18,13 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use self::decoder::Decoder;
-use super::event::{Event, KeyPress, Source};
+use super::event::{Event, KeyPress, Mouse, Source};
 
 /// One thing that the terminal sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Input {
     Key(KeyPress),
+    Mouse(Mouse),
     /// Text was pasted; what it was is not kept.
     Paste,
     Answer(Answer),
@@ -37,7 +39,7 @@ pub(super) enum Answer {
     Attributes,
     /// Whether mode 2026 is known, by which large changes appear at once.
     Synchronized { is_known: bool },
-    /// Any other report: the cursor's position, modes, colours, names, focus, the mouse.
+    /// Any other report: the cursor's position, modes, colours, names, focus.
     Other,
 }
 
@@ -45,6 +47,7 @@ impl From<Input> for Event {
     fn from(input: Input) -> Self {
         match input {
             Input::Key(key) => Self::Key(key),
+            Input::Mouse(mouse) => Self::Mouse(mouse),
             Input::Paste => Self::Paste,
             Input::Answer(answer) => Self::Answer(answer),
         }
@@ -72,12 +75,31 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
+/// Whether what is typed is for another program.
+static HELD: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
+
+/// Leaves what is typed from now on to another program, or takes it again.
+pub(super) fn hold(is_held: bool) {
+    *HELD.0.lock().unwrap_or_else(PoisonError::into_inner) = is_held;
+    HELD.1.notify_all();
+}
+
+/// Waits for as long as what is typed is another program's; whether it was.
+fn was_held() -> bool {
+    let held = HELD.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let was_held = *held;
+    drop(HELD.1.wait_while(held, |held| *held));
+    was_held
+}
+
 /// What the next bytes mean, or that there are none for as long as the decoder waits; none: the terminal is gone.
 fn next(decoder: &mut Decoder) -> Option<Vec<Input>> {
     let mut bytes = [0; 4096];
-    match wait(decoder.deadline())
-        .and_then(|is_readable| if is_readable { read(&mut bytes) } else { Ok(None) })
-    {
+    let waited = wait(decoder.deadline());
+    if was_held() {
+        return Some(Vec::new());
+    }
+    match waited.and_then(|is_readable| if is_readable { read(&mut bytes) } else { Ok(None) }) {
         Ok(Some(0)) => None,
         Ok(Some(count)) => Some(decoder.decode(&bytes[..count], Instant::now())),
         Ok(None) | Err(Errno::EINTR | Errno::EAGAIN) => Some(decoder.expire(Instant::now())),

@@ -4,6 +4,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use proptest::prelude::*;
 
 use super::*;
+use crate::tui::event::{Mouse, MouseKind};
 use crate::tui::input::Answer;
 
 /// A decoder and its clock.
@@ -103,7 +104,8 @@ fn answers_are_told_from_keys() {
         (b"\x1b]11;rgb:ffff/ffff/ffff\x07", Answer::Other),
         (b"\x1bP1+r524742=38\x1b\\", Answer::Other),
         (b"\x1b[I", Answer::Other),
-        (b"\x1b[<0;10;20M", Answer::Other),
+        (b"\x1b[<2;10;20M", Answer::Other),
+        (b"\x1b[<35;10;20M", Answer::Other),
         (b"\x1b[?997;1n", Answer::Other),
     ] {
         let name = String::from_utf8_lossy(bytes).into_owned();
@@ -115,6 +117,25 @@ fn answers_are_told_from_keys() {
             inputs.extend(bench.wait(40));
         }
         assert_eq!(inputs, [Input::Answer(answer)], "{name:?} byte by byte");
+    }
+}
+
+#[test]
+fn the_left_button_and_the_wheel_are_heard() {
+    use MouseKind::{Drag, Press, Release, WheelDown, WheelUp};
+    for (bytes, kind) in [
+        (&b"\x1b[<0;10;20M"[..], Press),
+        (b"\x1b[<20;10;20M", Press),
+        (b"\x1b[<32;10;20M", Drag),
+        (b"\x1b[<0;10;20m", Release),
+        (b"\x1b[<64;10;20M", WheelUp),
+        (b"\x1b[<65;10;20M", WheelDown),
+    ] {
+        let expected = Input::Mouse(Mouse { kind, column: 9, row: 19 });
+        assert_eq!(read(bytes), [expected], "{bytes:?}");
+        let mut bench = Bench::new();
+        let inputs: Vec<Input> = bytes.iter().flat_map(|byte| bench.read(&[*byte])).collect();
+        assert_eq!(inputs, [expected], "{bytes:?} byte by byte");
     }
 }
 

@@ -75,11 +75,11 @@ fn nothing_is_drawn_when_nothing_changed() {
     let mut desk = Desk::new();
     desk.finish(RED);
     desk.screen();
-    desk.press('x');
+    desk.press('y');
     desk.wait(10_000);
     desk.event(Event::Shown { generation: 1 });
     desk.worker(protocol::Event::Preview { generation: 1 });
-    desk.key(KeyPress::special(crossterm::event::KeyCode::Up));
+    desk.key(KeyPress::special(crossterm::event::KeyCode::PageUp));
     assert!(!desk.state.dirty);
     assert_eq!(desk.state.next_tick(), None);
 }

@@ -1,10 +1,11 @@
 //! What each key does, and that the help says so.
 
-use super::RED;
+use super::{BLUE, RED, cells_of};
 use crate::choice::Choice;
+use crate::math::DVec3;
 use crate::pipeline::protocol::{self, Command, Writing};
 use crate::pipeline::settings::{Effective, Overrides, View};
-use crate::scene::description::{Integrator, Shadows};
+use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
 use crate::tui::action::Action;
 use crate::tui::color::ColorDepth;
@@ -24,6 +25,11 @@ fn every_key_has_its_effect() {
             check(binding.action, *key, &mut desk);
         }
     }
+}
+
+/// Where a key puts the camera.
+fn moved(effects: &[Effect]) -> Pose {
+    request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
 
 fn check(action: Action, key: KeyPress, desk: &mut Desk) {
@@ -67,6 +73,75 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
             assert!(desk.text().contains(&format!("view {}", wanted.name())));
         }
+        Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
+            let moved = moved(&desk.key(key)).position - DVec3::Y;
+            let expected = match action {
+                Action::OrbitLeft => -DVec3::X,
+                Action::OrbitRight => DVec3::X,
+                Action::OrbitUp => DVec3::Y,
+                _ => -DVec3::Y,
+            };
+            assert!(moved.dot(expected) > 0.1 && (moved.length() - 4.0).abs() < 1e-3, "{moved}");
+        }
+        Action::DollyIn | Action::DollyOut => {
+            let distance = moved(&desk.key(key)).distance();
+            assert_eq!(distance < 4.0, action == Action::DollyIn);
+            assert_ne!(distance, 4.0);
+        }
+        Action::NarrowField | Action::WidenField => {
+            let overrides = overrides(&desk.key(key)).expect("a request");
+            assert_eq!(overrides.camera.fov.map(|fov| fov < 40.0), Some(action == Action::NarrowField));
+            assert_eq!(overrides.camera.pose, None);
+        }
+        Action::Darken | Action::Brighten => {
+            let stops = if action == Action::Darken { -0.25 } else { 0.25 };
+            let effects = desk.key(key);
+            assert_eq!(
+                request(&effects).map(|it| (it.overrides.exposure, it.write)),
+                Some((Some(stops), Writing::Try))
+            );
+            assert!(desk.text().contains(&format!("exposure {stops:+}")), "{}", desk.text());
+        }
+        Action::KeepCamera => {
+            assert!(desk.key(key).is_empty(), "it has not moved");
+            desk.press('l');
+            let wanted = desk.state.viewpoint().expect("a camera");
+            assert!(
+                matches!(desk.key(key)[..], [Effect::Send(Command::KeepCamera(camera))] if camera == wanted)
+            );
+        }
+        Action::Inspect => {
+            assert!(
+                matches!(desk.key(key)[..], [Effect::Send(Command::Pick(spot))] if (spot.x, spot.y) == (0.5, 0.5))
+            );
+        }
+        Action::Focus => {
+            assert!(desk.key(key).is_empty(), "a click is waited for");
+            assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Pick(_))]));
+        }
+        Action::ToggleMouse => {
+            assert!(matches!(desk.key(key)[..], [Effect::Mouse(false)]));
+            assert!(matches!(desk.key(key)[..], [Effect::Mouse(true)]));
+        }
+        Action::Edit => assert!(matches!(desk.key(key)[..], [Effect::Edit(_)])),
+        Action::BeforeAfter => {
+            desk.event(Event::Changed(Changed { noticed: desk.now }));
+            desk.finish(BLUE);
+            for (color, other) in [(RED, BLUE), (BLUE, RED)] {
+                desk.key(key);
+                assert!(cells_of(desk, color) > 0 && cells_of(desk, other) == 0);
+            }
+        }
+        Action::OlderPicture | Action::NewerPicture => {
+            desk.press('s');
+            desk.finish(BLUE);
+            let is_older = action == Action::OlderPicture;
+            if !is_older {
+                desk.press('n');
+            }
+            desk.key(key);
+            assert_eq!(cells_of(desk, RED) > 0, is_older);
+        }
         Action::TogglePause => {
             desk.press('r');
             assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Pause(true))]));
@@ -107,8 +182,8 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
 }
 
 #[test]
-fn the_help_shows_every_line_of_the_table_at_80_by_24() {
-    let mut desk = Desk::new();
+fn the_help_shows_every_line_of_the_table() {
+    let mut desk = Desk::with(state(80, 40));
     desk.press('?');
     let text = desk.text();
     for binding in KEYMAP {
@@ -164,16 +239,16 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
 fn depth_of_field_of_a_pinhole_is_explained() {
     let mut desk = Desk::new();
     let pinhole = || Box::new(Effective { dof: false, ..settings() });
-    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole() });
+    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole(), camera: camera() });
     assert!(desk.press('d').is_empty());
     assert!(desk.text().contains("no `aperture`"));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
     let mut desk = Desk::with(state);
-    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole() });
+    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole(), camera: camera() });
     assert_eq!(request(&desk.press('d')).expect("a request").overrides.dof, Some(true));
-    desk.worker(protocol::Event::Settings { generation: 2, settings: pinhole() });
+    desk.worker(protocol::Event::Settings { generation: 2, settings: pinhole(), camera: camera() });
     assert!(desk.text().contains("no `aperture`"));
 }
 

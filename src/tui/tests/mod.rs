@@ -1,7 +1,9 @@
 //! The front end driven by scripted events, on a screen without a terminal.
 
+mod camera;
 mod flow;
 mod keys;
+mod pointer;
 mod screen;
 
 use ratatui::style::Color;

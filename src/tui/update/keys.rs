@@ -1,6 +1,6 @@
 //! What a key does to the state.
 
-use super::{render, say};
+use super::{camera, history, places, pointer, render, say};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
@@ -15,10 +15,11 @@ use crate::tui::view::diagnostics;
 pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     let Some(action) = keymap::action(key) else { return Vec::new() };
     state.dirty |= state.message.take().is_some();
+    state.is_focusing &= action == Action::Focus;
     act(state, action)
 }
 
-fn act(state: &mut State, action: Action) -> Vec<Effect> {
+pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
     match action {
         Action::CycleShadows => cycle_shadows(state),
         Action::ToggleDepthOfField => toggle_depth_of_field(state),
@@ -29,6 +30,26 @@ fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::TogglePause => toggle_pause(state),
         Action::RenderAgain => render(state, true),
         Action::WriteNow => write_now(state),
+        Action::OrbitLeft => camera::orbit(state, -1.0, 0.0),
+        Action::OrbitRight => camera::orbit(state, 1.0, 0.0),
+        Action::OrbitUp if state.pane.open => act(state, Action::ScrollUp),
+        Action::OrbitUp => camera::orbit(state, 0.0, 1.0),
+        Action::OrbitDown if state.pane.open => act(state, Action::ScrollDown),
+        Action::OrbitDown => camera::orbit(state, 0.0, -1.0),
+        Action::DollyIn => camera::dolly(state, 1.0),
+        Action::DollyOut => camera::dolly(state, -1.0),
+        Action::NarrowField => camera::zoom(state, -1.0),
+        Action::WidenField => camera::zoom(state, 1.0),
+        Action::Darken => camera::expose(state, -1.0),
+        Action::Brighten => camera::expose(state, 1.0),
+        Action::KeepCamera => camera::keep(state),
+        Action::Inspect => pointer::inspect(state),
+        Action::Focus => pointer::focus(state),
+        Action::ToggleMouse => pointer::toggle_mouse(state),
+        Action::Edit => vec![Effect::Edit(places::to_edit(state))],
+        Action::BeforeAfter => history::before_and_after(state),
+        Action::OlderPicture => history::browse(state, 1),
+        Action::NewerPicture => history::browse(state, -1),
         Action::SceneSettings => scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
         Action::ScrollUp => scroll(state, |line, page| line.saturating_sub(page)),
@@ -50,7 +71,7 @@ fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     Vec::new()
 }
 
-fn told(state: &mut State, message: &str) -> Vec<Effect> {
+pub(super) fn told(state: &mut State, message: &str) -> Vec<Effect> {
     say(state, message);
     Vec::new()
 }

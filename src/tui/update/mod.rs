@@ -1,6 +1,10 @@
 //! State and event in, effects out. Nothing here touches the world.
 
+mod camera;
+mod history;
 mod keys;
+mod places;
+mod pointer;
 mod worker;
 
 use std::time::{Duration, Instant};
@@ -8,7 +12,7 @@ use std::time::{Duration, Instant};
 use super::ExitStatus;
 use super::event::{Effect, Event, Signal, Source, Window};
 use super::options::Changed;
-use super::state::{Activity, PendingChange, PreviewKind, Shown, State};
+use super::state::{Activity, Nudge, PendingChange, PreviewKind, Shown, State};
 use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{Command, Request, Writing};
@@ -25,7 +29,8 @@ pub(super) fn start(state: &mut State) -> Vec<Effect> {
 pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
     state.now = now;
     let was_paused = state.paused;
-    let effects = happened(state, event);
+    let mut effects = happened(state, event);
+    effects.extend(camera::keep_up(state));
     let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
     if was_paused && effects.iter().any(is_request) {
         let rest = state.message.take().map_or(String::new(), |message| format!(" · {message}"));
@@ -37,6 +42,7 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
 fn happened(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
         Event::Key(key) => keys::update(state, key),
+        Event::Mouse(mouse) => pointer::update(state, mouse),
         // There is nothing to type text into; the loop tells the line what that has to know.
         Event::Paste | Event::Answer(_) | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
         Event::Frame(report) => {
@@ -50,7 +56,10 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Changed(Changed { noticed }) => {
             state.message = None;
             state.is_settled = false;
+            history::record(state);
+            state.history.edited();
             let effects = render(state, false);
+            state.edit = Some(state.generation);
             state.change = Some(PendingChange { generation: state.generation, noticed });
             effects
         }
@@ -62,6 +71,10 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Shown { generation } => shown(state, generation),
         Event::Tick => tick(state),
         Event::Lost(source) => lost(state, source),
+        Event::NoEditor(why) => {
+            say(state, why);
+            Vec::new()
+        }
         Event::NoShell => {
             say(state, "there is no shell to go back to");
             Vec::new()
@@ -71,9 +84,15 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
 
 /// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
 fn render(state: &mut State, force: bool) -> Vec<Effect> {
+    // A camera on its way has too many pictures.
+    if state.nudge.request != Some(state.generation) {
+        history::record(state);
+    }
+    state.picture = state.history.close().or_else(|| state.picture.take());
     state.generation += 1;
     state.requested = Layout::preview_size(state);
     state.resize_due = None;
+    state.nudge = Nudge::default();
     state.held = None;
     state.are_warnings_known = false;
     state.dirty = true;
@@ -82,7 +101,7 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.scene.clone(),
         overrides: state.overrides(),
         preview: state.requested,
-        write: if state.view() == state.base_view() { Writing::Try } else { Writing::No },
+        write: if state.is_written() { Writing::Try } else { Writing::No },
         force,
     };
     let mut effects = Vec::new();
@@ -98,6 +117,9 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
 fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
     if shown.generation == state.generation && is_whole(&shown.picture) && state.preview != PreviewKind::None
     {
+        if state.history.holds_back(&shown) {
+            return Vec::new();
+        }
         state.urgent |= state.picture.as_ref().is_none_or(|last| last.generation != shown.generation);
         state.picture = Some(shown);
         state.dirty = true;

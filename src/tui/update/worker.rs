@@ -1,6 +1,6 @@
 //! What the worker's events do to the state. Those of older generations do nothing.
 
-use super::say;
+use super::{camera, history, pointer, say};
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
@@ -8,6 +8,12 @@ use crate::tui::event::{Effect, Written};
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
+    let event = match event {
+        // Whatever is rendered meanwhile, these answer a person.
+        Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
+        Event::Picked { picked, .. } => return pointer::picked(state, &picked),
+        event => event,
+    };
     if generation(&event) != state.generation {
         return Vec::new();
     }
@@ -18,7 +24,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Started { .. } => started(state),
         Event::Stage { stage, .. } => record(state, stage),
         Event::Asset { progress, .. } => asset(state, progress),
-        Event::Settings { settings, .. } => {
+        Event::Settings { settings, camera, .. } => {
+            state.camera = Some(camera);
             let pinhole = state.overrides().dof == Some(true) && !settings.dof;
             state.effective = Some(*settings);
             mended(state);
@@ -28,7 +35,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => state.progress = Some(progress),
-        Event::Preview { .. } | Event::Files { .. } => {}
+        Event::Preview { .. } | Event::Files { .. } | Event::CameraKept { .. } | Event::Picked { .. } => {}
         Event::Written { path, bytes, .. } => wrote(state, Written { path, bytes }),
         Event::WriteFailed { message, .. } => {
             state.asked_to_write = false;
@@ -63,6 +70,8 @@ fn generation(event: &Event) -> u64 {
         | Event::Refused { generation, .. }
         | Event::WritePostponed { generation }
         | Event::Files { generation, .. }
+        | Event::CameraKept { generation, .. }
+        | Event::Picked { generation, .. }
         | Event::Done { generation, .. }
         | Event::Failed { generation, .. }
         | Event::Cancelled { generation } => *generation,
@@ -133,6 +142,10 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.unchanged = unchanged;
     state.renders += u64::from(!unchanged);
     warn(state, warnings);
+    history::record(state);
+    if unchanged && state.edit.take_if(|edit| *edit == state.generation).is_some() {
+        state.history.edited_nothing();
+    }
     if unchanged && state.change.is_some_and(|change| change.generation == state.generation) {
         state.change = None;
         state.first_change = None;

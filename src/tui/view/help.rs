@@ -15,7 +15,8 @@ const NOTES: &[(&str, &str)] =
 
 /// In the middle of the screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
-    let entries = || KEYMAP.iter().map(|it| (it.label, it.help)).chain(NOTES.iter().copied());
+    let keys = || KEYMAP.iter().filter(|it| !it.help.is_empty());
+    let entries = || keys().map(|it| (it.label, it.help)).chain(NOTES.iter().copied());
     let labels = entries().map(|(label, _)| columns(label)).max().unwrap_or(0);
     let helps = entries().map(|(_, help)| columns(help)).max().unwrap_or(0);
     let lines = u16::try_from(entries().count()).unwrap_or(u16::MAX);

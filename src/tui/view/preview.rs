@@ -6,10 +6,12 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 
+use super::layout::Layout;
 use super::text::{Tone, put};
 use crate::film::Picture;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb8_to_linear};
+use crate::pipeline::protocol::Spot;
 use crate::tui::color::{self, ColorDepth};
 use crate::tui::state::{PreviewKind, State};
 
@@ -34,6 +36,16 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         }
         None => {}
     }
+}
+
+/// The place of the picture that a cell shows.
+pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
+    let picture = &state.picture.as_ref()?.picture;
+    let area = Layout::of(state).preview;
+    let cells = Placed::fit(picture, area, state.preview, state.window.cell_aspect).cells;
+    let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
+    let spot = || Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
+    cells.contains((column, row).into()).then(spot)
 }
 
 /// Where a picture lies: its cells, and how many pixels it has there.

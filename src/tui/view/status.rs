@@ -112,6 +112,7 @@ pub(super) fn status(state: &State, layout: &Layout, buffer: &mut Buffer) {
         format!("view {}{}", state.view().name(), range(state)),
     ];
     words.push(state.integrator().name().to_owned());
+    words.splice(0..0, state.changes());
     if !layout.hidden.is_empty() {
         words.insert(0, format!("{} (too small: {} hidden)", activity(state).0, layout.hidden.join(", ")));
     }

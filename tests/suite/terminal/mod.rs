@@ -1,6 +1,8 @@
 //! The live program in a pseudo-terminal, as a person sees it.
 
+mod camera;
 mod endings;
+mod hands;
 mod input;
 mod keys;
 mod outputs;

@@ -1,0 +1,34 @@
+//! Numbers of few decimals, as a person would write them.
+
+/// To a multiple of a power of ten: the number nearest to its few decimals.
+pub fn rounded(number: f64, step: f64) -> f64 {
+    let digits = libm::round(-libm::log10(step)).max(0.0) as usize;
+    let whole = libm::round(number / step) * step;
+    format!("{whole:.digits$}").parse().unwrap_or(whole) + 0.0
+}
+
+/// The last decimal of places that are so far from what is looked at: a power of ten, from 1e-5 to 1e-4 of the distance.
+pub fn step_at(distance: f64) -> f64 {
+    libm::pow(10.0, libm::floor(libm::log10(distance)) - 4.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_near() {
+        for (number, step, text) in [
+            (1.234_567, 1e-4, "1.2346"),
+            (-1e-9, 1e-4, "0"),
+            (0.1 + 0.2, 1e-4, "0.3"),
+            (1234.5, 10.0, "1230"),
+        ] {
+            assert_eq!(rounded(number, step).to_string(), text);
+        }
+        for distance in [0.003, 1.0, 4.0, 9.99, 12_345.0] {
+            let error = step_at(distance) / 2.0 / distance;
+            assert!((4e-6..=5.1e-5).contains(&error), "{distance}: {error}");
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! What a person asks of the picture at hand, whatever else is going on: what is at a place of it; and to put the camera
+//! into the scene file.
+
+use std::sync::Arc;
+
+use super::inputs::Inputs;
+use super::protocol::{Event, Kept, Picked, Spot, Thing, Viewpoint};
+use super::sink::Sink;
+use super::stages::canvas::Canvas;
+use super::stages::parse::Parsed;
+use crate::control::CancelToken;
+use crate::film::Quantity;
+use crate::integrators::RenderSettings;
+use crate::math::DVec2;
+use crate::output::{OutputError, write};
+use crate::scene::{Loaded, text_now};
+use crate::world::World;
+
+/// What is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Errand {
+    KeepCamera(Viewpoint),
+    Pick(Spot),
+}
+
+impl Errand {
+    /// There is nothing to ask.
+    pub(super) fn fail(self, why: &str, sink: &Sink) {
+        let generation = sink.generation;
+        match self {
+            Self::KeepCamera(_) => {
+                sink.send(Event::CameraKept { generation, outcome: Err(why.to_owned()) });
+            }
+            Self::Pick(_) => {}
+        }
+    }
+}
+
+/// The picture that somebody looks at.
+#[derive(Clone)]
+pub(super) struct AtHand {
+    pub(super) parsed: Arc<Parsed>,
+    /// What the call sets in the scene.
+    pub(super) sets: Vec<String>,
+    pub(super) world: Arc<World>,
+    pub(super) settings: RenderSettings,
+}
+
+impl AtHand {
+    pub(super) fn run(&self, errand: Errand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
+        let generation = sink.generation;
+        sink.send(match errand {
+            Errand::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(spot, canvas)) },
+            Errand::KeepCamera(camera) => {
+                Event::CameraKept { generation, outcome: self.keep_camera(&camera, inputs) }
+            }
+        });
+    }
+
+    /// What the ray through the middle of a pixel meets.
+    fn pick(&self, spot: Spot, canvas: Option<&Canvas>) -> Picked {
+        let (width, height) = (self.settings.render.width, self.settings.render.height);
+        let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
+        let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
+        let color = canvas.and_then(|canvas| canvas.film.pixel(Quantity::Radiance, x, y));
+        let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let thing = self.thing(self.settings.from_middle(middle));
+        Picked { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
+    }
+
+    fn thing(&self, place: DVec2) -> Option<Thing> {
+        let (world, loaded) = (&self.world, &self.parsed.loaded);
+        let ray = world.camera.middle_ray(place);
+        let hit = world.geometry.closest(&ray)?;
+        let surface = world.geometry.surface(&ray, &hit);
+        let object = loaded.scene.objects.get(hit.object as usize)?;
+        let material = match object.material.map(|index| &loaded.scene.materials[index]) {
+            Some(material) => format!("{} {}", material.kind.name(), material.name),
+            None => "of the file".to_owned(),
+        };
+        let is_front = surface.shading_normal.dot(ray.direction) <= 0.0;
+        Some(Thing {
+            shape: object.shape.kind(),
+            name: object.name.as_deref().map(str::to_owned),
+            path: loaded.path.clone(),
+            line: loaded.line(&object.span),
+            material,
+            position: (surface.point.as_dvec3() + world.geometry.origin()).to_array(),
+            normal: surface.shading_normal.to_array(),
+            is_front,
+            distance: f64::from(hit.shape.t),
+            depth: world.camera.depth_of(surface.point.as_dvec3()),
+        })
+    }
+
+    /// Writes the scene file with this camera, unless it is another one than was read.
+    fn keep_camera(&self, camera: &Viewpoint, inputs: &Inputs) -> Result<Kept, String> {
+        let loaded = &self.parsed.loaded;
+        let path = loaded.path.clone();
+        let is_as_read = || text_now(&path).is_ok_and(|now| *now == *loaded.source.text());
+        let changed =
+            || "the scene file has changed since it was read: the camera is not written into it".to_owned();
+        if !is_as_read() {
+            return Err(changed());
+        }
+        let text = loaded.text_with_camera(camera)?;
+        let is_new = text != loaded.source.text();
+        if is_new {
+            let refused = || OutputError::Refused { reason: changed() };
+            let may_replace = |_: &std::path::Path| is_as_read().then_some(()).ok_or_else(refused);
+            let guard = write::Guard { is_kept: &|path| inputs.contain(path), may_replace: &may_replace };
+            write::atomic_until(&path, text.as_bytes(), &guard, &CancelToken::new())
+                .map_err(|error| error.to_string())?;
+        }
+        let is_own = Loaded::camera_of(&text, &self.sets) == Some((*camera).into());
+        Ok(Kept { path, is_new, is_own })
+    }
+}

@@ -1,0 +1,98 @@
+//! How keys and the mouse move the camera. A moved camera has short numbers, so that it can be written into a scene as it is shown.
+
+use crate::math::DVec3;
+use crate::math::decimal::{rounded, step_at};
+use crate::pipeline::protocol::Viewpoint;
+use crate::scene::description::Pose;
+
+/// The eye keeps this angle from the axis that it goes around, in degrees.
+const POLE: f64 = 1.0;
+/// The field of view stays within these angles, in degrees.
+const FIELD: (f64, f64) = (1.0, 160.0);
+/// Distances from what is looked at.
+const DISTANCE: (f64, f64) = (1e-9, 1e12);
+
+/// Around `look_at`: so many degrees to the right and up.
+pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
+    let axis = pose.up.normalize_or(DVec3::Y);
+    let arm = pose.position - pose.look_at;
+    let distance = arm.length();
+    let polar = libm::acos((arm.dot(axis) / distance).clamp(-1.0, 1.0)).to_degrees();
+    // Whoever starts at a pole stays there until it is left.
+    let (least, most) = (POLE.min(polar), (180.0 - POLE).max(polar));
+    let lifted = (polar - up).clamp(least, most);
+    let level = (arm - axis * arm.dot(axis)).normalize_or(axis.any_orthonormal_vector());
+    let (sine, cosine) = libm::sincos(right.to_radians());
+    let level = level * cosine + axis.cross(level) * sine;
+    let (sine, cosine) = libm::sincos(lifted.to_radians());
+    placed(pose, (level * sine + axis * cosine) * distance)
+}
+
+/// Towards `look_at`, or away from it: the distance becomes `factor` times as long.
+pub(super) fn dollied(pose: &Pose, factor: f64) -> Pose {
+    let arm = pose.position - pose.look_at;
+    let distance = arm.length();
+    let wanted = (distance * factor).clamp(DISTANCE.0.min(distance), DISTANCE.1.max(distance));
+    placed(pose, arm * (wanted / distance))
+}
+
+/// The field of view, `factor` times as wide.
+pub(super) fn zoomed(view: &Viewpoint, factor: f64) -> f64 {
+    let (least, most) = (FIELD.0.min(view.fov), FIELD.1.max(view.fov));
+    rounded((view.fov * factor).clamp(least, most), 0.01)
+}
+
+/// With the eye at the end of this arm from `look_at`, to a hundred-thousandth of its length or better.
+fn placed(pose: &Pose, arm: DVec3) -> Pose {
+    let step = step_at(arm.length());
+    let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));
+    Pose { position: DVec3::from_array(position), ..*pose }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const POSE: Pose =
+        Pose { position: DVec3::new(0.0, 1.0, 4.0), look_at: DVec3::new(0.0, 1.0, 0.0), up: DVec3::Y };
+
+    #[test]
+    fn the_eye_goes_around_what_it_looks_at() {
+        let right = orbited(&POSE, 90.0, 0.0);
+        assert_eq!(right.position, DVec3::new(4.0, 1.0, 0.0), "to the right is towards +x");
+        let up = orbited(&POSE, 0.0, 30.0);
+        assert!((up.position - DVec3::new(0.0, 3.0, 4.0 * 0.75_f64.sqrt())).length() < 1e-4);
+        let mut pose = POSE;
+        for _ in 0..360 {
+            pose = orbited(&pose, 1.0, 0.0);
+        }
+        assert!((pose.position - POSE.position).length() < 5e-3, "{:?}", pose.position);
+    }
+
+    #[test]
+    fn the_poles_are_not_reached() {
+        let mut pose = POSE;
+        for _ in 0..100 {
+            pose = orbited(&pose, 0.0, 5.0);
+        }
+        let arm = (pose.position - pose.look_at).normalize();
+        assert!((arm.dot(DVec3::Y).acos().to_degrees() - POLE).abs() < 0.01, "{arm}");
+        assert!(arm.z > 0.0, "the eye did not go over the top");
+        let above = Pose { position: DVec3::new(0.0, 9.0, 0.0), up: DVec3::Y, look_at: DVec3::ZERO };
+        assert!(orbited(&above, 10.0, -40.0).position.is_finite());
+    }
+
+    #[test]
+    fn dolly_and_zoom_have_their_ends() {
+        assert_eq!(dollied(&POSE, 0.5).position, DVec3::new(0.0, 1.0, 2.0));
+        let mut pose = POSE;
+        for _ in 0..1000 {
+            pose = dollied(&pose, 0.5);
+        }
+        assert!(pose.distance() > 0.0);
+        let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
+        assert_eq!(zoomed(&view, 1.1), 44.0);
+        assert_eq!(zoomed(&view, 100.0), 160.0);
+        assert_eq!(zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1), 170.0, "one that is wider stays as it is");
+    }
+}

@@ -1,0 +1,127 @@
+//! A person's own editor, in the foreground of the same terminal.
+
+use std::ffi::{OsStr, OsString};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use nix::errno::Errno;
+use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
+use nix::unistd::Pid;
+
+use super::signals;
+
+/// Where nothing says which editor it is.
+const DEFAULT: &str = "vi";
+
+/// A place in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct FilePlace {
+    pub path: PathBuf,
+    /// From 1.
+    pub line: usize,
+    /// From 1.
+    pub column: usize,
+}
+
+/// The editor that the environment names: words for a shell.
+pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {
+    let set = |name: &str| variable(name).filter(|value| !value.trim().is_empty());
+    set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| DEFAULT.to_owned())
+}
+
+/// Runs the editor at this place until it ends. Where it is stopped, so is this program, until both are continued. Signals
+/// from keys are the editor's.
+///
+/// # Errors
+/// It could not be started, or says that it failed.
+pub(super) fn run(editor: &str, place: &FilePlace) -> Result<(), String> {
+    let _foreground = signals::leave_keys_to_child();
+    let failed = |error: io::Error| format!("cannot start the editor `{editor}`: {error}");
+    let mut shell = Command::new("/bin/sh");
+    shell.arg("-c").arg(format!("{editor} \"$@\"")).arg(editor).args(arguments(editor, place));
+    let child = shell.spawn().map_err(failed)?;
+    let id = i32::try_from(child.id()).map_err(|_| format!("the editor `{editor}` is lost"))?;
+    loop {
+        match waitpid(Pid::from_raw(id), Some(WaitPidFlag::WUNTRACED)) {
+            Ok(WaitStatus::Stopped(..)) => signals::stop(),
+            Ok(WaitStatus::Exited(_, 0) | WaitStatus::Signaled(..)) => return Ok(()),
+            Ok(WaitStatus::Exited(_, 127)) => {
+                return Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR"));
+            }
+            Ok(WaitStatus::Exited(_, code)) => {
+                return Err(format!("the editor `{editor}` ended with code {code}"));
+            }
+            Ok(_) | Err(Errno::EINTR) => {}
+            Err(error) => return Err(failed(error.into())),
+        }
+    }
+}
+
+/// What leads an editor to a place.
+fn arguments(editor: &str, place: &FilePlace) -> Vec<OsString> {
+    let FilePlace { path, line, column } = place;
+    // A name that begins with a dash is no option.
+    let path = if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
+        Path::new(".").join(path)
+    } else {
+        path.clone()
+    };
+    let with_place = || {
+        let mut text = path.clone().into_os_string();
+        text.push(format!(":{line}:{column}"));
+        text
+    };
+    match program(editor) {
+        "vi" | "vim" | "nvim" | "view" | "gvim" | "ex" | "nano" | "emacs" | "emacsclient" | "kak"
+        | "micro" | "joe" | "ne" | "mg" | "jed" | "pico" => vec![format!("+{line}").into(), path.into()],
+        "hx" | "helix" | "subl" | "zed" => vec![with_place()],
+        "code" | "codium" | "code-insiders" | "cursor" => {
+            let wait = if editor.contains("-w") { None } else { Some(OsString::from("--wait")) };
+            let goto =
+                if editor.contains(" -g") || editor.contains("--goto") { None } else { Some("-g".into()) };
+            wait.into_iter().chain(goto).chain([with_place()]).collect()
+        }
+        // Of others nobody knows how they are told.
+        _ => vec![path.into()],
+    }
+}
+
+/// The name of the program, without folder and options.
+fn program(editor: &str) -> &str {
+    let first = editor.split_whitespace().next().unwrap_or_default();
+    Path::new(first).file_name().and_then(OsStr::to_str).unwrap_or(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn visual_goes_before_editor() {
+        let of = |pairs: &[(&str, &str)]| {
+            name(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
+        };
+        assert_eq!(of(&[("VISUAL", "hx"), ("EDITOR", "ed")]), "hx");
+        assert_eq!(of(&[("VISUAL", " "), ("EDITOR", "ed")]), "ed");
+        assert_eq!(of(&[]), "vi");
+    }
+
+    #[test]
+    fn each_editor_is_led_to_the_line_in_its_way() {
+        let place = FilePlace { path: "a b.toml".into(), line: 7, column: 3 };
+        for (editor, expected) in [
+            ("vi", "+7 a b.toml"),
+            ("/usr/bin/nvim -u NONE", "+7 a b.toml"),
+            ("emacs -nw", "+7 a b.toml"),
+            ("hx", "a b.toml:7:3"),
+            ("code", "--wait -g a b.toml:7:3"),
+            ("code -g --wait", "a b.toml:7:3"),
+            ("my-editor", "a b.toml"),
+        ] {
+            assert_eq!(arguments(editor, &place).join(OsStr::new(" ")), expected, "{editor}");
+        }
+        let dash = FilePlace { path: "-a.toml".into(), line: 1, column: 1 };
+        assert_eq!(arguments("vi", &dash)[1], "./-a.toml");
+    }
+}

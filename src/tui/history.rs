@@ -1,0 +1,177 @@
+//! The last pictures, within bounds.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use super::state::Shown;
+
+/// Bytes that all of them take, at most.
+const MOST_BYTES: usize = 16 << 20;
+
+/// The last pictures, and which of them is looked at.
+#[derive(Debug, Default)]
+pub(super) struct History {
+    /// The oldest first.
+    past: VecDeque<Past>,
+    /// Edits of the scene so far.
+    edits: u64,
+    /// Which one is looked at, and the newest picture meanwhile.
+    open: Option<(usize, Shown)>,
+}
+
+#[derive(Debug)]
+struct Past {
+    shown: Shown,
+    time: Instant,
+    edits: u64,
+}
+
+impl History {
+    /// The scene was edited: what is recorded from now on is after that.
+    pub(super) fn edited(&mut self) {
+        self.edits += 1;
+    }
+
+    /// That edit changed nothing that is seen.
+    pub(super) fn edited_nothing(&mut self) {
+        self.edits = self.edits.saturating_sub(1);
+    }
+
+    /// Keeps a picture, in place of an earlier one of the same request.
+    pub(super) fn record(&mut self, shown: Shown, time: Instant) {
+        let is_same = |past: &Past| past.shown.picture == shown.picture;
+        let last = self.past.len().wrapping_sub(1);
+        let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
+        match known.or_else(|| self.past.get(last).is_some_and(is_same).then_some(last)) {
+            Some(at) => self.past[at].shown = shown,
+            None => self.past.push_back(Past { shown, time, edits: self.edits }),
+        }
+        while self.past.len() > 1 && self.past.iter().map(Past::bytes).sum::<usize>() > MOST_BYTES {
+            self.past.pop_front();
+            if let Some((at, _)) = &mut self.open {
+                *at = at.saturating_sub(1);
+            }
+        }
+    }
+
+    /// Whether an older picture is looked at.
+    pub(super) fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// The newest picture, while an older one is looked at.
+    pub(super) fn newest(&self) -> Option<Shown> {
+        self.open.as_ref().map(|(_, newest)| newest.clone())
+    }
+
+    /// There is a newer picture: whether an older one is looked at, so that it waits.
+    pub(super) fn holds_back(&mut self, shown: &Shown) -> bool {
+        if let Some((_, newest)) = &mut self.open {
+            *newest = shown.clone();
+        }
+        self.is_open()
+    }
+
+    /// So many pictures back; negative: forth.
+    pub(super) fn step(&mut self, back: isize, newest: Shown) -> Option<Shown> {
+        let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
+        let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
+        self.look_at(next, newest)
+    }
+
+    /// The last picture from before the last edit.
+    pub(super) fn before_edit(&mut self, newest: Shown) -> Option<Shown> {
+        let at = self.past.iter().rposition(|past| past.edits < self.edits)?;
+        self.look_at(at, newest)
+    }
+
+    fn look_at(&mut self, at: usize, newest: Shown) -> Option<Shown> {
+        let shown = self.past.get(at)?.shown.clone();
+        self.open = Some((at, newest));
+        Some(shown)
+    }
+
+    /// Back to the newest one.
+    pub(super) fn close(&mut self) -> Option<Shown> {
+        self.open.take().map(|(_, newest)| newest)
+    }
+
+    /// The number of the picture that is looked at, of how many, and when it was made.
+    pub(super) fn place(&self) -> Option<(usize, usize, Instant)> {
+        let (at, _) = self.open.as_ref()?;
+        Some((at + 1, self.past.len(), self.past.get(*at)?.time))
+    }
+}
+
+impl Past {
+    fn bytes(&self) -> usize {
+        self.shown.picture.pixels.len() * size_of::<[u8; 3]>()
+    }
+}
+
+/// How long ago, in words.
+pub(super) fn ago(time: Duration) -> String {
+    match time.as_secs() {
+        seconds @ ..120 => format!("{seconds} s ago"),
+        seconds @ ..7200 => format!("{} min ago", seconds / 60),
+        seconds => format!("{} h ago", seconds / 3600),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::fixtures::plain_picture;
+
+    fn shown(generation: u64, side: u32) -> Shown {
+        Shown { generation, picture: plain_picture(side, side, [1, 2, 3]), range: None }
+    }
+
+    #[test]
+    fn the_oldest_go_where_memory_ends() {
+        let mut history = History::default();
+        for generation in 0..10 {
+            history.record(shown(generation, 1000), Instant::now());
+        }
+        assert_eq!(history.past.len(), 5, "3 MB each");
+        history.record(shown(10, 10_000), Instant::now());
+        assert_eq!(history.past.len(), 1, "the last one stays whatever it takes");
+    }
+
+    #[test]
+    fn what_looks_the_same_is_one_picture() {
+        let mut history = History::default();
+        for generation in 0..3 {
+            history.edited();
+            history.record(shown(generation, 10), Instant::now());
+        }
+        assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
+    }
+
+    #[test]
+    fn an_edit_that_changed_nothing_is_none_to_look_back_over() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now());
+        history.edited();
+        history.record(shown(2, 20), Instant::now());
+        history.edited();
+        history.edited_nothing();
+        let before = history.before_edit(shown(2, 20)).expect("a picture");
+        assert_eq!(before.generation, 1);
+    }
+
+    #[test]
+    fn one_request_has_one_picture() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now());
+        history.record(shown(1, 20), Instant::now());
+        assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
+    }
+
+    #[test]
+    fn times_in_words() {
+        for (seconds, words) in [(0, "0 s ago"), (119, "119 s ago"), (120, "2 min ago"), (7300, "2 h ago")] {
+            assert_eq!(ago(Duration::from_secs(seconds)), words);
+        }
+    }
+}

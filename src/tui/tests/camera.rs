@@ -1,0 +1,107 @@
+//! Keys on the camera: what is asked for, how often, and what is said.
+
+use super::{BLUE, RED};
+use crate::pipeline::protocol::{self, Writing};
+use crate::scene::diagnostic::Severity;
+use crate::tui::Changed;
+use crate::tui::event::{Event, KeyPress};
+use crate::tui::fixtures::*;
+use crossterm::event::KeyCode;
+
+fn show(desk: &mut Desk) -> Vec<crate::tui::event::Effect> {
+    let generation = desk.state.generation;
+    desk.event(Event::Picture { generation, picture: plain_picture(50, 38, BLUE), range: None })
+}
+
+#[test]
+fn a_moved_camera_is_shown_and_not_written_until_it_goes_back() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let effects = desk.press('l');
+    let moved = request(&effects).expect("a request");
+    assert_eq!((moved.write, moved.force), (Writing::No, false));
+    let text = desk.text();
+    assert!(text.contains("camera moved: shown, not written; w writes it"), "{text}");
+    assert!(text.contains("camera moved · shadows soft"), "{text}");
+    show(&mut desk);
+    let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let edited = request(&effects).expect("a request");
+    assert_eq!(edited.overrides.camera, moved.overrides.camera, "a save does not move it back");
+    assert_eq!(edited.write, Writing::No);
+    let effects = desk.press('0');
+    let own = request(&effects).expect("a request");
+    assert_eq!((own.write, own.overrides.camera.is_any()), (Writing::Try, false));
+    assert!(!desk.text().contains("camera moved"));
+}
+
+#[test]
+fn of_many_steps_the_newest_is_rendered_once_the_one_before_is_seen() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let effects = desk.press('l');
+    let first = request(&effects).expect("the first step at once").overrides.camera.pose.expect("a pose");
+    for key in ['l', 'l', 'k', '<'] {
+        assert!(desk.press(key).is_empty(), "the first has no picture yet");
+    }
+    let effects = show(&mut desk);
+    let newest = request(&effects).expect("the newest").overrides.camera;
+    let pose = newest.pose.expect("a pose");
+    assert!(pose.position.x > 2.9 * first.position.x && pose.position.y > 1.1, "{pose:?}");
+    assert!(newest.fov.is_some_and(|fov| fov < 40.0));
+    assert!(show(&mut desk).is_empty(), "nothing waits any more");
+    assert!(request(&desk.press('l')).is_some(), "and the next goes at once");
+    // What is not a step goes at once, with all steps before it.
+    desk.press('l');
+    let effects = desk.press('s');
+    assert!(request(&effects).expect("a request").overrides.camera != newest);
+    assert!(show(&mut desk).is_empty());
+}
+
+#[test]
+fn a_step_that_can_have_no_picture_holds_nothing_up() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.press('l');
+    desk.press('l');
+    let generation = desk.state.generation;
+    let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
+    let failure = protocol::Failure::Scene(diagnostics);
+    let effects = desk.worker(protocol::Event::Failed { generation, failure });
+    assert!(request(&effects).is_some(), "the scene broke meanwhile");
+    let mut desk = Desk::with(state(80, 1));
+    desk.finish(RED);
+    for _ in 0..3 {
+        assert!(request(&desk.press('l')).is_some(), "there is no room for a picture");
+    }
+}
+
+#[test]
+fn the_arrows_scroll_the_errors_while_they_are_open() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.fail((0..9).map(|_| diagnostic(Severity::Error, "wrong")).collect());
+    let down = KeyPress::special(KeyCode::Down);
+    assert!(desk.key(down).is_empty());
+    assert!(desk.state.pane.scroll > 0);
+    desk.key(KeyPress::special(KeyCode::Esc));
+    assert!(request(&desk.key(down)).is_some(), "closed, they move the camera");
+}
+
+#[test]
+fn before_a_scene_is_read_there_is_no_camera_to_move() {
+    let mut desk = Desk::new();
+    assert!(desk.press('l').is_empty() && desk.press('>').is_empty() && desk.press(']').is_empty());
+    assert!(desk.text().contains("has not been read yet"));
+}
+
+#[test]
+fn exposure_starts_from_the_scene_s_own() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.state.effective.as_mut().expect("settings").exposure = 1.0;
+    desk.press(']');
+    show(&mut desk);
+    let effects = desk.press(']');
+    assert_eq!(request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
+    assert!(desk.text().contains("exposure +1.5 · shadows"), "{}", desk.text());
+}

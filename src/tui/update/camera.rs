@@ -1,0 +1,117 @@
+//! Keys and the mouse on the camera. Steps come faster than pictures: a step waits until the one before has its first picture, and
+//! only the newest of those that wait is rendered.
+
+use super::keys::told;
+use super::{render, say};
+use crate::pipeline::protocol::{Command, Kept};
+use crate::pipeline::settings::CameraChange;
+use crate::scene::description::Pose;
+use crate::scene::sanitize::visible;
+use crate::tui::camera::{dollied, orbited, zoomed};
+use crate::tui::event::Effect;
+use crate::tui::state::State;
+
+/// Degrees of a step around.
+const TURN: f64 = 3.0;
+/// What a step brings the eye nearer by.
+const NEARER: f64 = 0.95;
+/// What a step widens the field of view by.
+const WIDER: f64 = 1.05;
+/// Stops of a step of exposure.
+const STOPS: f32 = 0.25;
+
+/// So many steps to the right and up.
+pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
+    turn(state, right * TURN, up * TURN)
+}
+
+/// So many degrees to the right and up.
+pub(super) fn turn(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
+    moved(state, |pose| orbited(pose, right, up))
+}
+
+/// So many steps nearer.
+pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
+    moved(state, |pose| dollied(pose, libm::pow(NEARER, steps)))
+}
+
+/// So many steps wider.
+pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
+    let Some(view) = state.viewpoint() else { return unknown(state) };
+    state.toggles.camera.fov = Some(zoomed(&view, libm::pow(WIDER, steps)));
+    step_of_camera(state)
+}
+
+/// So many steps brighter.
+pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
+    let Some(effective) = &state.effective else { return unknown(state) };
+    let stops = state.toggles.exposure.unwrap_or(effective.exposure) + steps * STOPS;
+    state.toggles.exposure = Some(stops);
+    let effects = step(state);
+    say(state, format!("exposure {stops:+}"));
+    effects
+}
+
+fn moved(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
+    let Some(view) = state.viewpoint() else { return unknown(state) };
+    state.toggles.camera.pose = Some(how(&view.pose));
+    step_of_camera(state)
+}
+
+fn unknown(state: &mut State) -> Vec<Effect> {
+    told(state, "the scene has not been read yet")
+}
+
+pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
+    let effects = step(state);
+    say(state, "camera moved: shown, not written; w writes it, c keeps it, 0 goes back");
+    effects
+}
+
+/// The camera as it is now is to be put into the scene file.
+pub(super) fn keep(state: &mut State) -> Vec<Effect> {
+    let Some(view) = state.viewpoint() else { return unknown(state) };
+    let is_set = state.base.sets.iter().any(|set| set.trim_start().starts_with("camera"));
+    if !state.toggles.camera.is_any() && !is_set {
+        return told(state, "the camera is where the scene has it: there is nothing to write");
+    }
+    vec![Effect::Send(Command::KeepCamera(view))]
+}
+
+/// What came of that. A camera that the file gives now is no longer one of the keys.
+pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
+    let Kept { path, is_new, is_own } = match outcome {
+        Ok(kept) => kept,
+        Err(why) => return told(state, &format!("error: {}", visible(&why))),
+    };
+    let name = visible(&path.to_string_lossy()).into_owned();
+    let words = match (is_new, is_own) {
+        (true, true) => format!("the camera is in {name} now"),
+        (true, false) => format!("the camera is in {name}; in this call --set comes first"),
+        (false, _) => format!("{name} has this camera already"),
+    };
+    let mut effects = Vec::new();
+    if is_own && state.toggles.camera.is_any() {
+        state.toggles.camera = CameraChange::default();
+        effects = render(state, false);
+    }
+    say(state, words);
+    effects
+}
+
+/// The newest step, now or as soon as the one before has a picture.
+fn step(state: &mut State) -> Vec<Effect> {
+    state.dirty = true;
+    if state.awaits_step() {
+        state.nudge.is_waiting = true;
+        return Vec::new();
+    }
+    let effects = render(state, false);
+    state.nudge.request = Some(state.generation);
+    effects
+}
+
+/// The step that waits, if its turn has come.
+pub(super) fn keep_up(state: &mut State) -> Vec<Effect> {
+    if state.nudge.is_waiting && !state.awaits_step() { step(state) } else { Vec::new() }
+}

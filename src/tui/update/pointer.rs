@@ -1,0 +1,189 @@
+//! The mouse on the picture, and what is asked of a place there.
+
+use super::keys::{self, told};
+use super::{camera, say};
+use crate::math::decimal::{rounded, step_at};
+use crate::pipeline::protocol::{Command, Picked, Thing};
+use crate::scene::sanitize::visible;
+use crate::tui::action::Action;
+use crate::tui::editor::FilePlace;
+use crate::tui::event::{Effect, Mouse, MouseKind};
+use crate::tui::state::{Press, Purpose, State};
+use crate::tui::view::layout::Layout;
+use crate::tui::view::preview::spot_at;
+
+/// Degrees that a drag over the width of the picture's area turns by.
+const TURN_ACROSS: f64 = 180.0;
+
+/// What the mouse did.
+pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    match mouse.kind {
+        MouseKind::Press => {
+            let is_on_picture = Layout::of(state).preview.contains((mouse.column, mouse.row).into());
+            let Mouse { column, row, .. } = mouse;
+            state.press = is_on_picture.then_some(Press { column, row, has_moved: false });
+            Vec::new()
+        }
+        MouseKind::Drag => drag(state, mouse),
+        MouseKind::Release => match state.press.take() {
+            Some(press) if !press.has_moved => click(state, mouse),
+            Some(_) | None => Vec::new(),
+        },
+        MouseKind::WheelUp | MouseKind::WheelDown if is_on_pane(state, mouse) => keys::act(
+            state,
+            if mouse.kind == MouseKind::WheelUp { Action::ScrollUp } else { Action::ScrollDown },
+        ),
+        MouseKind::WheelUp => camera::dolly(state, 1.0),
+        MouseKind::WheelDown => camera::dolly(state, -1.0),
+    }
+}
+
+fn is_on_pane(state: &State, mouse: Mouse) -> bool {
+    state.pane.open && Layout::of(state).pane.contains((mouse.column, mouse.row).into())
+}
+
+/// The scene turns with the hand.
+fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    let Some(press) = state.press else { return Vec::new() };
+    let cells = |now: u16, before: u16| f64::from(now) - f64::from(before);
+    let (right, down) = (cells(mouse.column, press.column), cells(mouse.row, press.row));
+    if right == 0.0 && down == 0.0 {
+        return Vec::new();
+    }
+    state.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true });
+    let degrees = TURN_ACROSS / f64::from(Layout::of(state).preview.width.max(1));
+    camera::turn(state, -right * degrees, down * f64::from(state.window.cell_aspect) * degrees)
+}
+
+fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    let Some(spot) = spot_at(state, mouse.column, mouse.row) else { return Vec::new() };
+    state.crosshair = spot;
+    let purpose = if std::mem::take(&mut state.is_focusing) { Purpose::Focus } else { Purpose::Inspect };
+    ask(state, purpose)
+}
+
+/// What is at the crosshair?
+pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
+    ask(state, Purpose::Inspect)
+}
+
+/// First it waits for a click; asked again it takes the crosshair.
+pub(super) fn focus(state: &mut State) -> Vec<Effect> {
+    if state.is_mouse_on && !state.is_focusing {
+        state.is_focusing = true;
+        return told(
+            state,
+            "click where to focus; f again focuses at the crosshair: the last click, else the middle",
+        );
+    }
+    state.is_focusing = false;
+    ask(state, Purpose::Focus)
+}
+
+fn ask(state: &mut State, purpose: Purpose) -> Vec<Effect> {
+    if state.camera.is_none() {
+        return told(state, "the scene has not been read yet");
+    }
+    state.asked = purpose;
+    vec![Effect::Send(Command::Pick(state.crosshair))]
+}
+
+pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
+    state.is_mouse_on = !state.is_mouse_on;
+    (state.press, state.is_focusing) = (None, false);
+    let words = if state.is_mouse_on {
+        "mouse on: drag turns, the wheel goes nearer, a click says what is there"
+    } else {
+        "mouse off: it selects text"
+    };
+    say(state, words);
+    vec![Effect::Mouse(state.is_mouse_on)]
+}
+
+/// The answer.
+pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
+    state.picked = picked.thing.as_ref().map(|thing| FilePlace {
+        path: thing.path.clone(),
+        line: thing.line,
+        column: 1,
+    });
+    match (state.asked, &picked.thing) {
+        (Purpose::Inspect, _) => {
+            say(state, words(picked));
+            Vec::new()
+        }
+        (Purpose::Focus, None) => told(state, "there is nothing to focus on"),
+        (Purpose::Focus, Some(thing)) => focus_at(state, thing.depth),
+    }
+}
+
+fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
+    let distance = rounded(depth, step_at(depth));
+    if !(distance > 0.0) {
+        return told(state, "there is nothing to focus on");
+    }
+    if state.viewpoint().is_none_or(|view| view.aperture == 0.0) {
+        return told(state, "everything is in focus: the scene's camera has no `aperture`");
+    }
+    state.toggles.camera.focus = Some(distance);
+    let effects = camera::step_of_camera(state);
+    say(state, format!("focus {distance} away: shown, not written; w writes it, c keeps it, 0 goes back"));
+    effects
+}
+
+/// Shape, name, line, material, place, normal, distance, colour.
+fn words(Picked { thing, color, pixel: [x, y] }: &Picked) -> String {
+    let light = color.map(|color| format!(" · L {}", numbers(color.map(f64::from))));
+    let light = light.unwrap_or_default();
+    let Some(thing) = thing else { return format!("nothing at pixel {x}, {y}{light}") };
+    let Thing { shape, name, path, line, material, position, normal, is_front, distance, .. } = thing;
+    let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", visible(name)));
+    let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let back = if *is_front { "" } else { " (back)" };
+    format!(
+        "{shape}{name} · {}:{line} · {} · {} · n {}{back} · {} away{light}",
+        visible(&file),
+        visible(material),
+        numbers(*position),
+        numbers(normal.map(f64::from)),
+        number(*distance),
+    )
+}
+
+fn numbers(all: [f64; 3]) -> String {
+    format!("({})", all.map(number).join(", "))
+}
+
+/// Three digits, or all those before the point.
+fn number(number: f64) -> String {
+    let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
+    rounded(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_there_is_said_in_a_line() {
+        let thing = Thing {
+            shape: "sphere",
+            name: Some("ball".to_owned()),
+            path: "scenes/still.toml".into(),
+            line: 47,
+            material: "glass crystal".to_owned(),
+            position: [0.214, 0.4996, -33.06],
+            normal: [0.0, 1.0, -0.0],
+            is_front: true,
+            distance: 3.8167,
+            depth: 3.5,
+        };
+        let picked = Picked { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
+        assert_eq!(
+            words(&picked),
+            "sphere \"ball\" · still.toml:47 · glass crystal · (0.214, 0.5, -33.1) · n (0, 1, 0) · 3.82 away · L \
+             (0.61, 1235, 0)"
+        );
+        assert_eq!(words(&Picked { thing: None, color: None, ..picked }), "nothing at pixel 3, 4");
+    }
+}

@@ -1,0 +1,67 @@
+//! The camera by keys, as seen on the screen and on disk.
+
+use super::pty::{Colors, Folder, Terminal};
+
+/// Waits for a picture with at least, or less than, so many red cells.
+#[track_caller]
+fn wait_for_red(terminal: &Terminal, what: &str, holds: impl Fn(usize) -> bool) {
+    terminal.wait(what, |screen| holds(Colors::of(screen).red));
+}
+
+#[test]
+fn the_camera_moves_and_goes_back_and_nothing_is_written() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let own = folder.bytes("scene.png");
+    let red = terminal.settled(|screen| Colors::of(screen).red);
+    for (keys, is_more) in [
+        ("\x1b[C".repeat(20), false),
+        ("h".repeat(20), false),
+        ("\x1b[A".repeat(20), false),
+        ("j".repeat(20), false),
+        ("+".repeat(10), true),
+        ("-".repeat(10), false),
+        ("<".repeat(10), true),
+        (">".repeat(10), false),
+    ] {
+        terminal.press(&keys);
+        terminal.wait_for("camera moved: shown, not written; w writes it");
+        terminal.wait_for("camera moved · shadows soft");
+        wait_for_red(&terminal, &keys, |now| if is_more { now > red + 20 } else { now + 20 < red });
+        terminal.wait_for("done");
+        terminal.press("0");
+        terminal.wait_for("back to the scene's own settings");
+        wait_for_red(&terminal, "the picture as it was", |now| now == red);
+        terminal.wait_for("done");
+        assert_eq!(folder.bytes("scene.png"), own, "{keys}");
+    }
+}
+
+#[test]
+fn a_moved_camera_is_written_when_asked_and_is_that_of_the_call() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press(">");
+    terminal.wait_for_render(2);
+    terminal.press("w");
+    terminal.wait_for("wrote scene.png");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&["--set", "camera.fov=42"]));
+}
+
+#[test]
+fn the_exposure_is_written_as_other_settings_are() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("[");
+    terminal.wait_for_render(2);
+    terminal.wait_for("exposure -0.25");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&["--set", "render.exposure=-0.25"]));
+    terminal.press("]]");
+    terminal.wait_for("exposure +0.25");
+    terminal.wait("the picture on disk", |_| {
+        folder.bytes("scene.png") == folder.once(&["--set", "render.exposure=0.25"])
+    });
+}

@@ -1,0 +1,157 @@
+//! The mouse, the camera in the scene file, the editor and pictures of before, as a person meets them.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+
+use super::pty::{Colors, Folder, GREEN, RED, SCENE, Terminal};
+
+/// What a terminal sends for the left button: down, moved or up, over a cell from 1.
+fn press(column: u16, row: u16) -> String {
+    format!("\x1b[<0;{column};{row}M")
+}
+
+fn drag(column: u16, row: u16) -> String {
+    format!("\x1b[<32;{column};{row}M")
+}
+
+fn release(column: u16, row: u16) -> String {
+    format!("\x1b[<0;{column};{row}m")
+}
+
+fn red(terminal: &Terminal) -> usize {
+    terminal.settled(|screen| Colors::of(screen).red)
+}
+
+#[test]
+fn the_mouse_turns_goes_nearer_and_asks() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let before = red(&terminal);
+    terminal.press(&(press(20, 10) + &drag(26, 10) + &drag(32, 10) + &release(32, 10)));
+    terminal.wait_for("camera moved: shown, not written");
+    terminal.wait("a narrower board", |screen| Colors::of(screen).red + 20 < before);
+    terminal.press("0");
+    terminal.wait("the board as before", |screen| Colors::of(screen).red == before);
+    terminal.press("\x1b[<64;20;10M\x1b[<64;20;10M");
+    terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 20);
+    terminal.press("0");
+    terminal.wait_for("back to the scene's own settings");
+    terminal.press(&(press(20, 16) + &release(20, 16)));
+    let line = SCENE.lines().position(|line| line == "[[quad]]").expect("a quad") + 1;
+    terminal.wait_for(&format!("quad · scene.toml:{line} · phong board · ("));
+}
+
+#[test]
+fn the_mouse_is_given_back() {
+    use vt100::MouseProtocolMode::{ButtonMotion, None};
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let is_on = |screen: &vt100::Screen| screen.mouse_protocol_mode() == ButtonMotion;
+    terminal.wait("the mouse", is_on);
+    terminal.press("m");
+    terminal.wait_for("mouse off");
+    terminal.wait("no mouse", |screen| screen.mouse_protocol_mode() == None);
+    terminal.press("m");
+    terminal.wait("the mouse", is_on);
+    terminal.press("q");
+    terminal.wait("no mouse", |screen| screen.mouse_protocol_mode() == None);
+    terminal.end();
+}
+
+#[test]
+fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
+    let folder = Folder::new();
+    let text = SCENE.replace("[camera]", "# the eye\n[camera]");
+    folder.write("scene.toml", &text);
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("c");
+    terminal.wait_for("there is nothing to write");
+    terminal.press(">");
+    terminal.wait_for_render(2);
+    terminal.press("c");
+    terminal.wait_for("the camera is in scene.toml now");
+    let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
+    assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
+    terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
+    terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
+    // What it wrote itself is no edit: the table of stages has what was kept.
+    terminal.wait("nothing rendered anew", |screen| screen.contents().contains("reused"));
+    folder.write("scene.toml", &kept.replace(RED, GREEN));
+    terminal.wait_for_color("green");
+}
+
+#[test]
+fn the_focus_goes_where_was_clicked() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("f");
+    terminal.wait_for("click where to focus");
+    terminal.press(&(press(20, 16) + &release(20, 16)));
+    terminal.wait_for("focus 4 away: shown, not written");
+    terminal.press("ff");
+    terminal.wait_for("focus 4 away: shown, not written");
+}
+
+/// An editor that says what it was called with, reads a line of keys, and changes the scene.
+const EDITOR: &str =
+    "#!/bin/sh\nprintf 'editing %s at %s\\r\\n' \"$2\" \"$1\"\nread -r line\necho \"# $line\" >> \"$2\"\n";
+
+#[test]
+fn the_editor_has_the_terminal_and_gives_it_back() {
+    let folder = Folder::new();
+    folder.write("vi", EDITOR);
+    fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
+    let editor = folder.path("vi");
+    let variables = [("VISUAL", ""), ("EDITOR", editor.to_str().expect("a name"))];
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
+    terminal.wait_for_render(1);
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
+    terminal.wait_for("scene.toml:4:11");
+    terminal.press("o");
+    terminal.wait_for("editing scene.toml at +4");
+    terminal.wait("the shell's screen", |screen| !screen.alternate_screen());
+    terminal.press("hello q\n");
+    terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
+    terminal.wait_for("scene.toml:4:11");
+    let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
+    assert!(text.ends_with("# hello q\n"), "the keys were the editor's: {text}");
+    terminal.press("q");
+    terminal.end();
+}
+
+#[test]
+fn an_editor_that_is_not_there_is_said() {
+    let folder = Folder::new();
+    let variables = [("VISUAL", "no-such-editor")];
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
+    terminal.wait_for_render(1);
+    terminal.press("o");
+    terminal.wait_for("there is no editor `no-such-editor`");
+    terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
+}
+
+#[test]
+fn pictures_of_before_are_looked_at_in_turns() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    terminal.wait_for_color("green");
+    terminal.wait_for_render(2);
+    terminal.press("b");
+    terminal.wait_for_color("red");
+    terminal.wait_for("before the last edit");
+    terminal.press("b");
+    terminal.wait_for_color("green");
+    terminal.press("n");
+    terminal.wait_for_color("red");
+    terminal.wait_for("picture 1 of 2");
+    terminal.press("n");
+    terminal.wait_for("this is the oldest picture");
+    terminal.press("N");
+    terminal.wait_for_color("green");
+}
