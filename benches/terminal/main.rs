@@ -2,10 +2,12 @@
 //!
 //! `cargo bench --bench terminal` renders bundled scenes and edits of them, replays their previews as the front end gets
 //! them and prints the bytes: of the painter, of plain ratatui on crossterm, which draws every preview, and of chafa
-//! where there is one, which draws the last one.
+//! where there is one, which draws the last one. `-- fidelity` prints how near what is shown comes to the picture in
+//! each number of colours and by each set of characters.
 
 #![allow(clippy::print_stdout)]
 
+mod fidelity;
 mod others;
 mod sequence;
 
@@ -70,6 +72,9 @@ const EDITS: [Edit; 6] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
+    if std::env::args().any(|argument| argument == "fidelity") {
+        return fidelity::print();
+    }
     for (columns, rows) in WINDOWS {
         println!("\n{columns}×{rows}: bytes a cell, in brackets those of ratatui and chafa");
         println!(

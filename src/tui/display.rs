@@ -6,14 +6,18 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::color::ColorDepth;
+use super::graphics::{Images, Placement};
 use super::input::Answer;
+use super::known::Ask;
 use super::line::{Line, Question};
 use super::paint::{Fidelity, Painter};
 use super::state::FrameReport;
 use super::writer;
 
-/// Whether the terminal draws what lies between two marks at once (mode 2026), and, last of all, what it is (DA1).
-const FIRST_QUESTIONS: &[u8] = b"\x1b[?2026$p\x1b[c";
+/// Whether the terminal draws what lies between two marks at once (mode 2026).
+const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
+/// What it is (DA1): the last of the first questions.
+const ATTRIBUTES: &[u8] = b"\x1b[c";
 /// A status report (DSR).
 const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
@@ -32,6 +36,8 @@ pub(super) struct Way {
     pub(super) is_remote: bool,
     /// Whether the terminal knows REP.
     pub(super) can_repeat: bool,
+    /// What the terminal is asked of itself.
+    pub(super) ask: Ask,
 }
 
 impl Way {
@@ -44,6 +50,8 @@ impl Way {
 /// The screen as the loop sees it.
 pub(super) struct Display {
     painter: Painter,
+    /// The picture, where it is drawn in pixels.
+    images: Option<Images>,
     line: Line,
     way: Way,
     /// Whether the terminal knows mode 2026.
@@ -60,9 +68,10 @@ pub(super) struct Display {
 
 impl Display {
     /// A screen of which nothing is known.
-    pub(super) fn new(depth: ColorDepth, way: Way, now: Instant) -> Self {
+    pub(super) fn new(depth: ColorDepth, way: Way, images: Option<Images>, now: Instant) -> Self {
         let mut display = Self {
             painter: Painter::new(depth).repeating(way.can_repeat),
+            images,
             line: way.line(now),
             way,
             is_synchronized: false,
@@ -77,16 +86,31 @@ impl Display {
 
     /// Somebody else used the terminal: its content is unknown, and so is the line.
     pub(super) fn restart(&mut self, now: Instant) {
-        self.painter.forget();
+        self.forget();
         self.line = self.way.line(now);
-        self.is_complete = false;
-        self.send(FIRST_QUESTIONS.to_vec(), Some(Question::Attributes), now);
+        let questions = [SYNCHRONIZED, &self.way.ask.questions(), ATTRIBUTES].concat();
+        self.send(questions, Some(Question::Attributes), now);
     }
 
     /// The content of the screen is unknown; the line is the same.
     pub(super) fn forget(&mut self) {
         self.painter.forget();
+        if let Some(images) = &mut self.images {
+            images.forget();
+        }
         self.is_complete = false;
+    }
+
+    /// Whether the picture is drawn in pixels.
+    pub(super) fn draws_pixels(&self) -> bool {
+        self.images.is_some()
+    }
+
+    /// The picture in pixels that is to be seen from now on, if there is one; none: cells are in its place.
+    pub(super) fn place(&mut self, wanted: Option<Placement>, is_still: bool) {
+        if let Some(uncovered) = self.images.as_mut().and_then(|images| images.aim(wanted, is_still)) {
+            self.painter.damage(uncovered);
+        }
     }
 
     /// Leads to this from now on. `is_new`: with a picture that was not wanted before.
@@ -106,7 +130,12 @@ impl Display {
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());
         let late = now + TURN;
-        let slice = self.painter.slice_until(room, || Instant::now() >= late);
+        let mut slice = self.painter.slice_until(room, || Instant::now() >= late);
+        if slice.is_empty() {
+            let rate = self.line.bytes_per_second();
+            let images = self.images.as_mut();
+            slice = images.and_then(|images| images.slice(room, rate)).unwrap_or_default();
+        }
         if slice.is_empty() {
             self.complete();
             return false;
@@ -149,7 +178,11 @@ impl Display {
             Answer::Ready => self.line.answered(Question::Status, now),
             Answer::Attributes => self.line.answered(Question::Attributes, now),
             Answer::Synchronized { is_known } => self.is_synchronized = is_known,
-            Answer::Other => {}
+            Answer::Blocks(_)
+            | Answer::TrueColor
+            | Answer::Background(_)
+            | Answer::Ink { .. }
+            | Answer::Other => {}
         }
     }
 

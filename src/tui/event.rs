@@ -116,6 +116,8 @@ pub(super) struct Window {
     pub rows: u16,
     /// Height of a cell over its width.
     pub cell_aspect: f32,
+    /// Width and height of a cell in pixels; likely ones where it is not known.
+    pub cell_pixels: (u16, u16),
 }
 
 /// The signals that are handled.

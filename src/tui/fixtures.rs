@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::color::ColorDepth;
+use super::color::{ColorDepth, XTERM};
 use super::event::{Effect, Event, KeyPress, Window};
+use super::known::Ask;
 use super::state::{PreviewKind, Setup, State};
 use super::update::{start, update};
 use super::view;
@@ -23,7 +24,7 @@ use crate::scene::description::{Accel, Integrator, Pose, Shadows};
 use crate::scene::diagnostic::{Diagnostic, Place, Severity};
 
 pub(super) fn window(columns: u16, rows: u16) -> Window {
-    Window { columns, rows, cell_aspect: 2.0 }
+    Window { columns, rows, cell_aspect: 2.0, cell_pixels: (8, 16) }
 }
 
 /// A state that has not sent anything yet.
@@ -39,7 +40,16 @@ pub(super) fn state_with(
     overrides: Overrides,
 ) -> State {
     let scene = PathBuf::from("scenes/cornell.toml");
-    let setup = Setup { scene, overrides, window: window(columns, rows), preview, depth };
+    let setup = Setup {
+        scene,
+        overrides,
+        window: window(columns, rows),
+        preview,
+        depth,
+        is_light: false,
+        ansi: XTERM,
+        ask: Ask::default(),
+    };
     State::new(setup, Instant::now())
 }
 

@@ -12,12 +12,24 @@ pub use crate::pipeline::watch::{Changed, News};
 choice! {
     /// How the preview is drawn.
     pub enum PreviewChoice {
-        /// Half blocks where there is colour, characters elsewhere.
+        /// The finest blocks that the terminal is known to have where there is colour, characters elsewhere.
         Auto = "auto",
         /// Two pixels a cell.
         HalfBlock = "halfblock",
+        /// Two colours a cell, in quarters.
+        Quadrant = "quadrant",
+        /// The same in sixths: what Unicode 13 has.
+        Sextant = "sextant",
+        /// The same in eighths: what Unicode 16 has.
+        Octant = "octant",
         /// Characters by brightness.
         Ascii = "ascii",
+        /// In pixels, by kitty's protocol.
+        Kitty = "kitty",
+        /// In pixels, by DEC's sixels.
+        Sixel = "sixel",
+        /// In pixels, by iTerm2's inline images.
+        Iterm2 = "iterm2",
         /// None; the stages get the room.
         None = "none",
     }

@@ -10,11 +10,13 @@ use std::time::{Duration, Instant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::color::{self, ColorDepth};
+use super::color::{self, ColorChoice, ColorDepth};
 use super::display::{Display, Way};
 use super::editor::{self, FilePlace};
 use super::event::{Effect, Event, Source};
+use super::graphics::Images;
 use super::input;
+use super::known::Ask;
 use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
 use super::paint::{Advice, Fidelity, Moment, advise, can_repeat};
 use super::signals::{self, Listener};
@@ -44,21 +46,38 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
     let (sender, events) = mpsc::channel();
     let listener = Listener::start(&sender).map_err(failed("hear signals for"))?;
     let screen = Screen::open()?;
+    let variable = |name: &str| std::env::var(name).ok();
+    let way = Way { ask: ask(options.preview, options.color, depth, variable), ..way(variable) };
     let setup = Setup {
         scene: options.scene,
         overrides: options.overrides,
         window: terminal::window(options.cell_aspect),
-        preview: preview_kind(options.preview, depth),
+        preview: PreviewKind::of(options.preview, depth),
         depth,
+        is_light: color::has_light_background(variable),
+        ansi: *color::ansi(&variable("TERM").unwrap_or_default()),
+        ask: way.ask,
     };
     forward("worker-events", options.events, &sender, Event::Worker, Source::Worker)?;
     forward("news", options.news, &sender, Event::of_watcher, Source::Watcher)?;
     input::start(&sender).map_err(failed("read keys from"))?;
     writer::start(&sender).map_err(failed("write to"))?;
 
+    let images = match setup.preview {
+        PreviewKind::Pixels(protocol) => {
+            terminal::will_have_images();
+            Some(Images::new(protocol, !variable("TMUX").unwrap_or_default().is_empty()))
+        }
+        PreviewKind::HalfBlock
+        | PreviewKind::Quadrant
+        | PreviewKind::Sextant
+        | PreviewKind::Octant
+        | PreviewKind::Ascii
+        | PreviewKind::None => None,
+    };
     let ui = Ui {
         screen,
-        display: Display::new(depth, way(|name| std::env::var(name).ok()), Instant::now()),
+        display: Display::new(depth, way, images, Instant::now()),
         drawn: Drawn::default(),
         events,
         postponed: VecDeque::new(),
@@ -75,16 +94,6 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
 
 fn failed(action: &'static str) -> impl Fn(io::Error) -> TuiError {
     move |source| TuiError::Terminal { action, source }
-}
-
-fn preview_kind(choice: PreviewChoice, depth: ColorDepth) -> PreviewKind {
-    match choice {
-        PreviewChoice::None => PreviewKind::None,
-        // Without colours half blocks are a uniform wall.
-        PreviewChoice::Ascii => PreviewKind::Ascii,
-        _ if depth == ColorDepth::None => PreviewKind::Ascii,
-        PreviewChoice::Auto | PreviewChoice::HalfBlock => PreviewKind::HalfBlock,
-    }
 }
 
 /// Passes one channel on into the loop's, and says when it ends.
@@ -119,6 +128,30 @@ fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
             || term.starts_with("screen"),
         is_remote: ["SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"].into_iter().any(is_set),
         can_repeat: can_repeat(variable),
+        ask: Ask::default(),
+    }
+}
+
+/// What to ask the terminal of itself. Multiplexers answer for themselves or not at all, the Linux console and Apple's terminal
+/// may print what they do not know.
+fn ask(
+    preview: PreviewChoice,
+    color: ColorChoice,
+    depth: ColorDepth,
+    variable: impl Fn(&str) -> Option<String>,
+) -> Ask {
+    let get = |name: &str| variable(name).unwrap_or_default();
+    let term = get("TERM");
+    let is_outermost = !way(&variable).is_multiplexed;
+    let is_plain = ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
+        || get("TERM_PROGRAM") == "Apple_Terminal";
+    let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
+    let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
+    Ask {
+        blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
+        true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
+        background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
+        palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
     }
 }
 
@@ -227,7 +260,10 @@ impl Ui {
     fn handle(&mut self, event: Event) -> Option<End> {
         match event {
             Event::Worker(protocol::Event::Preview { generation }) => return self.preview(generation),
-            Event::Answer(answer) => self.display.answered(answer, Instant::now()),
+            Event::Answer(answer) => {
+                self.display.answered(answer, Instant::now());
+                return self.apply(event);
+            }
             Event::Written { bytes } => self.display.written(bytes),
             Event::Unwritable(kind) => return Some(unwritable(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
@@ -266,7 +302,7 @@ impl Ui {
         let picture = self.drawn.picture.as_ref();
         advise(&Moment {
             bytes_per_second: self.display.bytes_per_second(),
-            cells: picture.map_or(0, |picture| picture.width * picture.height / 2),
+            cells: picture.map_or(0, |picture| self.cells(picture)),
             samples: self.samples(),
             aimed_samples: picture.map(|_| self.drawn.samples),
             since_aim: self.drawn.at.map_or(Duration::MAX, |at| now.saturating_duration_since(at)),
@@ -276,6 +312,16 @@ impl Ui {
                 .and_then(|progress| progress.eta_seconds)
                 .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
         })
+    }
+
+    /// Cells that a picture takes, or that would take as many bytes.
+    fn cells(&self, picture: &Picture) -> u32 {
+        if self.display.draws_pixels() {
+            return picture.width * picture.height / 4;
+        }
+        let across = self.state.pixels_across();
+        let pixels = (across * across) as f32 * self.state.window.cell_aspect;
+        (f64::from(picture.width) * f64::from(picture.height) / f64::from(pixels)) as u32
     }
 
     /// Samples that a pixel has by now, in the mean.
@@ -377,7 +423,9 @@ impl Ui {
         let is_new = self.note_picture();
         // It is all there, and no better one has come since.
         self.drawn.is_first &= is_new || !self.display.is_complete();
-        self.display.aim(&buffer, Layout::of(&self.state).preview, self.fidelity(), is_new);
+        let area = Layout::of(&self.state).preview;
+        self.display.place(view::preview::placement(&self.state, area), self.is_still());
+        self.display.aim(&buffer, area, self.fidelity(), is_new);
         None
     }
 
@@ -474,11 +522,32 @@ mod tests {
     }
 
     #[test]
+    fn a_terminal_is_asked_what_is_not_known_of_it() {
+        let ask = |preview, color, depth, pairs: &[(&str, &str)]| {
+            ask(preview, color, depth, |name| {
+                pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+            })
+        };
+        let (auto, xterm) = (PreviewChoice::Auto, ("TERM", "xterm-256color"));
+        let none = Ask::default();
+        let found = ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm]);
+        assert_eq!(found, Ask { blocks: true, true_color: true, ..none });
+        let found = ask(auto, ColorChoice::Ansi16, ColorDepth::Ansi16, &[xterm]);
+        assert_eq!(found, Ask { blocks: true, palette: true, ..none });
+        let tmux = ("TMUX", "/tmp/tmux-0/default,1,0");
+        assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm, tmux]), none);
+        assert_eq!(ask(PreviewChoice::HalfBlock, ColorChoice::Auto, ColorDepth::TrueColor, &[xterm]), none);
+        let found = ask(auto, ColorChoice::None, ColorDepth::None, &[xterm]);
+        assert_eq!(found, Ask { background: true, ..none });
+        assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Ansi16, &[("TERM", "linux")]), none);
+    }
+
+    #[test]
     fn without_colours_the_preview_is_a_ramp() {
-        assert_eq!(preview_kind(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
-        assert_eq!(preview_kind(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
-        assert_eq!(preview_kind(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);
-        assert_eq!(preview_kind(PreviewChoice::None, ColorDepth::TrueColor), PreviewKind::None);
+        assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
+        assert_eq!(PreviewKind::of(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
+        assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);
+        assert_eq!(PreviewKind::of(PreviewChoice::None, ColorDepth::TrueColor), PreviewKind::None);
     }
 
     #[test]

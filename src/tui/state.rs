@@ -4,10 +4,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::color::ColorDepth;
+use super::color::{Ansi, ColorDepth, Shades};
 use super::editor::FilePlace;
 use super::event::{Window, Written};
+use super::graphics::Protocol;
 use super::history::History;
+use super::known::Ask;
+use super::mosaic::Grid;
+use super::options::PreviewChoice;
 use crate::film::Picture;
 use crate::pipeline::protocol::{
     AssetProgress, PreviewSize, RenderProgress, Report, Spot, Stage, StageReport, Viewpoint,
@@ -20,8 +24,43 @@ use crate::scene::diagnostic::Diagnostic;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PreviewKind {
     HalfBlock,
+    Quadrant,
+    Sextant,
+    Octant,
     Ascii,
+    /// In pixels; in half blocks where words lie over it.
+    Pixels(Protocol),
     None,
+}
+
+impl PreviewKind {
+    /// How a picture is drawn where it was asked for like this.
+    pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
+        match choice {
+            PreviewChoice::None => Self::None,
+            // Without colours half blocks are a uniform wall.
+            PreviewChoice::Ascii => Self::Ascii,
+            PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
+            PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
+            PreviewChoice::Iterm2 => Self::Pixels(Protocol::Iterm),
+            _ if depth == ColorDepth::None => Self::Ascii,
+            PreviewChoice::Auto | PreviewChoice::HalfBlock => Self::HalfBlock,
+            PreviewChoice::Quadrant => Self::Quadrant,
+            PreviewChoice::Sextant => Self::Sextant,
+            PreviewChoice::Octant => Self::Octant,
+        }
+    }
+
+    /// The parts of a cell; none: cells have none, or there are no cells.
+    pub(super) fn grid(self) -> Option<Grid> {
+        match self {
+            Self::HalfBlock => Some(Grid::Halves),
+            Self::Quadrant => Some(Grid::Quadrants),
+            Self::Sextant => Some(Grid::Sextants),
+            Self::Octant => Some(Grid::Octants),
+            Self::Ascii | Self::Pixels(_) | Self::None => None,
+        }
+    }
 }
 
 /// What the keys changed on top of the command line.
@@ -142,6 +181,12 @@ pub(super) struct Setup {
     pub window: Window,
     pub preview: PreviewKind,
     pub depth: ColorDepth,
+    /// Whether the environment says that the terminal's background is light.
+    pub is_light: bool,
+    /// What the 16 colours are likely to be.
+    pub ansi: Ansi,
+    /// What the terminal is asked.
+    pub ask: Ask,
 }
 
 /// Everything.
@@ -153,6 +198,13 @@ pub(super) struct State {
     pub window: Window,
     pub preview: PreviewKind,
     pub depth: ColorDepth,
+    pub shades: Shades,
+    /// The terminal's 16 colours.
+    pub ansi: Ansi,
+    /// What the terminal was asked of itself.
+    pub ask: Ask,
+    /// Whether the terminal's background is a light one.
+    pub is_light: bool,
 
     /// Of the newest request.
     pub generation: u64,
@@ -231,6 +283,10 @@ impl State {
             window: setup.window,
             preview: setup.preview,
             depth: setup.depth,
+            shades: Shades::new(setup.depth, &setup.ansi),
+            ansi: setup.ansi,
+            ask: setup.ask,
+            is_light: setup.is_light,
             generation: 0,
             requested: None,
             activity: Activity::Running { since: now },
@@ -339,6 +395,16 @@ impl State {
     pub(super) fn integrator(&self) -> Integrator {
         let of_scene = self.effective.as_ref().map_or(Integrator::Whitted, |effective| effective.integrator);
         self.overrides().integrator.unwrap_or(of_scene)
+    }
+
+    /// Pixels of the preview in the width of a cell.
+    pub(super) fn pixels_across(&self) -> u32 {
+        /// More are not worth their bytes.
+        const MOST: u16 = 10;
+        match self.preview {
+            PreviewKind::Pixels(_) => u32::from(self.window.cell_pixels.0.clamp(1, MOST)),
+            kind => kind.grid().map_or(1, Grid::columns),
+        }
     }
 
     pub(super) fn is_running(&self) -> bool {

@@ -21,6 +21,7 @@ use crossterm::{execute, terminal};
 use nix::sys::termios::{FlushArg, tcflush};
 
 use super::event::Window;
+use super::graphics;
 use super::options::TuiError;
 use super::writer;
 
@@ -30,6 +31,8 @@ static TAKEN: AtomicBool = AtomicBool::new(false);
 static MOUSE: AtomicBool = AtomicBool::new(true);
 /// Whether keys come raw.
 static RAW: AtomicBool = AtomicBool::new(false);
+/// Whether the terminal keeps images that have to be deleted.
+static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
 /// The thread whose panic gives the terminal back; those of other threads are kept in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
 /// What the last panic of another thread said.
@@ -41,6 +44,8 @@ const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 
 /// Half blocks are about square at this height over width of a cell.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
+/// A cell of many fonts.
+const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
 /// How long a terminal that takes nothing is waited for, at each step of giving it back.
 const STUCK: Duration = Duration::from_millis(60);
 
@@ -149,6 +154,11 @@ pub(super) fn rescue() {
     }
 }
 
+/// From now on the terminal may keep kitty's images, or have been cut in the middle of a string.
+pub(super) fn will_have_images() {
+    HAS_IMAGES.store(true, Ordering::Release);
+}
+
 /// The bytes that take the screen.
 fn enter(out: &mut impl Write) -> io::Result<()> {
     let mouse = if MOUSE.load(Ordering::Acquire) { MOUSE_ON } else { MOUSE_OFF };
@@ -157,6 +167,11 @@ fn enter(out: &mut impl Write) -> io::Result<()> {
 
 /// The bytes that give it back, from any state that a frame can be cut in.
 fn leave(out: &mut impl Write) -> io::Result<()> {
+    if HAS_IMAGES.load(Ordering::Acquire) {
+        // A string that was cut would take what follows for its own.
+        out.write_all(b"\x1b\\")?;
+        out.write_all(&graphics::delete_all())?;
+    }
     execute!(
         out,
         EndSynchronizedUpdate,
@@ -215,10 +230,16 @@ pub(super) fn window(cell_aspect: Option<f32>) -> Window {
             rows: size.rows,
             cell_aspect: cell_aspect
                 .unwrap_or_else(|| aspect((size.columns, size.rows), (size.width, size.height))),
+            cell_pixels: cell_pixels((size.columns, size.rows), (size.width, size.height)),
         },
         Err(_) => {
             let (columns, rows) = terminal::size().unwrap_or((80, 24));
-            Window { columns, rows, cell_aspect: cell_aspect.unwrap_or(DEFAULT_CELL_ASPECT) }
+            Window {
+                columns,
+                rows,
+                cell_aspect: cell_aspect.unwrap_or(DEFAULT_CELL_ASPECT),
+                cell_pixels: DEFAULT_CELL_PIXELS,
+            }
         }
     }
 }
@@ -231,6 +252,12 @@ fn aspect(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     let aspect = height / width;
     let sane = width >= 2.0 && (1.2..=3.5).contains(&aspect);
     if sane && (aspect - DEFAULT_CELL_ASPECT).abs() > 0.06 { aspect } else { DEFAULT_CELL_ASPECT }
+}
+
+/// Width and height of a cell in pixels, where the sizes make sense.
+fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
+    let side = |pixels: u16, cells: u16| pixels.checked_div(cells).filter(|side| (2..=100).contains(side));
+    side(pixels.0, cells.0).zip(side(pixels.1, cells.1)).unwrap_or(DEFAULT_CELL_PIXELS)
 }
 
 #[cfg(test)]
@@ -275,6 +302,13 @@ mod tests {
         assert_eq!(aspect((0, 0), (640, 480)), 2.0);
         assert_eq!(aspect((80, 24), (80, 24)), 2.0);
         assert_eq!(aspect((100, 50), (1000, 1010)), 2.0);
+    }
+
+    #[test]
+    fn pixels_of_a_cell_are_believed_when_they_make_sense() {
+        assert_eq!(cell_pixels((80, 24), (80 * 9, 24 * 18 + 3)), (9, 18));
+        assert_eq!(cell_pixels((80, 24), (0, 0)), DEFAULT_CELL_PIXELS);
+        assert_eq!(cell_pixels((0, 0), (640, 480)), DEFAULT_CELL_PIXELS);
     }
 
     #[test]

@@ -154,7 +154,7 @@ mod tests {
             let passing = || {
                 let mut passing = canvas("b");
                 passing.is_passing = true;
-                passing.done[0] = u32::from(is_whole);
+                passing.done[0] = [u32::from(is_whole); 2];
                 Ok::<_, ()>(passing)
             };
             films.put(passing).expect("a film");

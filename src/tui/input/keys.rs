@@ -3,6 +3,7 @@
 use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
 
+use super::reports::{self, Report};
 use super::{Answer, Input};
 use crate::tui::event::{KeyPress, Mouse, MouseKind};
 
@@ -16,6 +17,7 @@ pub(super) struct Meaning {
     /// Whether text began to be pasted.
     pub is_paste: bool,
     next: Next,
+    report: Report,
 }
 
 /// What the next character is.
@@ -162,14 +164,24 @@ impl Perform for Meaning {
         }
     }
 
-    fn osc_dispatch(&mut self, _params: &[&[u8]], _bell_terminated: bool) {
+    fn osc_dispatch(&mut self, params: &[&[u8]], _bell_terminated: bool) {
         self.has_ended = true;
-        self.answer(Answer::Other);
+        self.answer(reports::command(params));
+    }
+
+    fn hook(&mut self, params: &Params, intermediates: &[u8], _ignore: bool, action: char) {
+        let first = params.iter().next().and_then(|it| it.first().copied()).unwrap_or(0);
+        self.report = Report::begin(intermediates, first, action);
+    }
+
+    fn put(&mut self, byte: u8) {
+        self.report.put(byte);
     }
 
     fn unhook(&mut self) {
         self.has_ended = true;
-        self.answer(Answer::Other);
+        let answer = std::mem::take(&mut self.report).answer();
+        self.answer(answer);
     }
 }
 

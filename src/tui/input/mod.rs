@@ -6,6 +6,7 @@
 mod decoder;
 mod keys;
 mod paste;
+mod reports;
 
 use std::io;
 use std::os::fd::AsFd;
@@ -19,6 +20,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use self::decoder::Decoder;
 use super::event::{Event, KeyPress, Mouse, Source};
+use super::known::Blocks;
 
 /// One thing that the terminal sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +41,14 @@ pub(super) enum Answer {
     Attributes,
     /// Whether mode 2026 is known, by which large changes appear at once.
     Synchronized { is_known: bool },
+    /// Its name (XTVERSION), as far as it says which blocks it draws.
+    Blocks(Blocks),
+    /// It has 24 bits of colour (XTGETTCAP).
+    TrueColor,
+    /// Its background, in sRGB (OSC 11).
+    Background([u8; 3]),
+    /// One of its palette, in sRGB (OSC 4).
+    Ink { index: u8, rgb: [u8; 3] },
     /// Any other report: the cursor's position, modes, colours, names, focus.
     Other,
 }

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::tui::event::{Mouse, MouseKind};
 use crate::tui::input::Answer;
+use crate::tui::known::Blocks;
 
 /// A decoder and its clock.
 struct Bench {
@@ -101,8 +102,13 @@ fn answers_are_told_from_keys() {
         (b"\x1b[?2026;2$y", Answer::Synchronized { is_known: true }),
         (b"\x1b[?2026;0$y", Answer::Synchronized { is_known: false }),
         (b"\x1b[?7;1$y", Answer::Other),
-        (b"\x1b]11;rgb:ffff/ffff/ffff\x07", Answer::Other),
-        (b"\x1bP1+r524742=38\x1b\\", Answer::Other),
+        (b"\x1b]11;rgb:ffff/ffff/ffff\x07", Answer::Background([255; 3])),
+        (b"\x1b]11;?\x07", Answer::Other),
+        (b"\x1b]4;12;rgb:5c5c/5c5c/ffff\x1b\\", Answer::Ink { index: 12, rgb: [92, 92, 255] }),
+        (b"\x1bP1+r524742=38\x1b\\", Answer::TrueColor),
+        (b"\x1bP0+r524742\x1b\\", Answer::Other),
+        (b"\x1bP>|foot(1.20.2)\x1b\\", Answer::Blocks(Blocks::Octants)),
+        (b"\x1bP>|tmux 3.4\x1b\\", Answer::Blocks(Blocks::Unknown)),
         (b"\x1b[I", Answer::Other),
         (b"\x1b[<2;10;20M", Answer::Other),
         (b"\x1b[<35;10;20M", Answer::Other),

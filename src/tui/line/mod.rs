@@ -153,7 +153,8 @@ impl Line {
         let passed: Vec<Slice> = self.flight.drain(..=place).collect();
         for slice in passed {
             self.in_flight -= slice.bytes;
-            if slice.question == question {
+            // One larger than any window was a picture, and waited for itself.
+            if slice.question == question && slice.bytes <= MOST {
                 let round_trip = now.saturating_duration_since(slice.sent);
                 self.round_trips.add(round_trip, now);
                 self.fit(&slice, round_trip, now);

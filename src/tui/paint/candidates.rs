@@ -1,5 +1,6 @@
 //! Colours that are worth being set at a cell.
 
+use super::look::Mosaic;
 use super::shade::{Shade, digits};
 use super::taste::Taste;
 use crate::tui::color::nearest_256;
@@ -12,22 +13,22 @@ const LONGEST: usize = 8;
 /// Themes of 22 colours put their own in the place of the first ones of the cube.
 const FIRST_UNTOUCHED: u8 = 22;
 
-/// Colours for the halves of one cell.
+/// Colours for the parts of one cell.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Candidates {
-    pub(super) upper: Vec<Shade>,
-    pub(super) lower: Vec<Shade>,
-    /// For both halves at once.
+    pub(super) first: Vec<Shade>,
+    pub(super) second: Vec<Shade>,
+    /// For both parts at once.
     pub(super) both: Vec<Shade>,
 }
 
 /// For the first of these cells. Each candidate serves as many of the cells after it as it can.
-pub(super) fn candidates(cells: &[Option<[Shade; 2]>], taste: Taste) -> Candidates {
-    let column = |half: usize| cells.iter().map_while(move |cell| cell.map(|halves| halves[half]));
-    let both = cells.iter().map_while(|cell| *cell).flatten();
+pub(super) fn candidates(cells: &[Option<Mosaic>], taste: Taste) -> Candidates {
+    let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
+    let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
     Candidates {
-        upper: shades(&column(0), taste),
-        lower: shades(&column(1), taste),
+        first: shades(&column(0), taste),
+        second: shades(&column(1), taste),
         both: shades(&both, taste),
     }
 }
@@ -107,27 +108,28 @@ impl Common {
 mod tests {
     use super::*;
 
-    fn row(values: &[u8]) -> Vec<Option<[Shade; 2]>> {
-        values.iter().map(|value| Some([Shade::Rgb([*value, 50, 100]), Shade::Rgb([0, 0, 0])])).collect()
+    fn row(values: &[u8]) -> Vec<Option<Mosaic>> {
+        let halves = |value: &u8| Mosaic::halves([Shade::Rgb([*value, 50, 100]), Shade::Rgb([0, 0, 0])]);
+        values.iter().map(|value| Some(halves(value))).collect()
     }
 
     #[test]
     fn a_colour_serves_as_many_neighbours_as_it_can() {
         // 20 to 22 have 21 in common; 24 does not.
         let found = candidates(&row(&[20, 21, 22, 24]), Taste::EXACT);
-        assert_eq!(found.upper, [Shade::Rgb([21, 50, 99])]);
-        assert_eq!(found.lower, [Shade::Rgb([0, 0, 0])], "16 may be another colour");
+        assert_eq!(found.first, [Shade::Rgb([21, 50, 99])]);
+        assert_eq!(found.second, [Shade::Rgb([0, 0, 0])], "16 may be another colour");
         assert_eq!(found.both.len(), 1, "the halves have nothing in common");
-        let greys = [Some([Shade::Rgb([8, 8, 8]); 2])];
-        assert_eq!(candidates(&greys, Taste::EXACT).upper, [Shade::Rgb([8, 8, 8]), Shade::Palette(232)]);
+        let greys = [Some(Mosaic::plain(Shade::Rgb([8, 8, 8])))];
+        assert_eq!(candidates(&greys, Taste::EXACT).first, [Shade::Rgb([8, 8, 8]), Shade::Palette(232)]);
     }
 
     #[test]
     fn what_is_no_colour_of_three_numbers_is_taken_as_it_is() {
-        let cells = [Some([Shade::Ground, Shade::Palette(3)]), None];
+        let cells = [Some(Mosaic::halves([Shade::Ground, Shade::Palette(3)])), None];
         let found = candidates(&cells, Taste::MOVING);
-        assert_eq!((found.upper, found.lower), (vec![Shade::Ground], vec![Shade::Palette(3)]));
+        assert_eq!((found.first, found.second), (vec![Shade::Ground], vec![Shade::Palette(3)]));
         let found = candidates(&[None], Taste::MOVING);
-        assert!(found.upper.is_empty() && found.both.is_empty());
+        assert!(found.first.is_empty() && found.both.is_empty());
     }
 }

@@ -7,18 +7,64 @@ use unicode_width::UnicodeWidthStr;
 use super::pen::{Pen, Wish};
 use super::shade::{Layer, Shade};
 use crate::tui::color::ColorDepth;
+use crate::tui::mosaic::{PLACES, Tile, of_symbol};
 
 /// One cell of the screen.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Look {
     /// Nobody knows.
     Unknown,
-    /// The colours of its upper and its lower half: a blank is two halves of one colour.
-    Halves([Shade; 2]),
+    /// Two colours, and which part of it has which: a blank is two halves of one colour.
+    Mosaic(Mosaic),
     /// A character.
     Text(Text),
     /// The right part of a character that is two columns wide.
     Covered,
+}
+
+/// A cell of two colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Mosaic {
+    pub(super) tile: Tile,
+    /// Of the first and of the second part.
+    pub(super) pair: [Shade; 2],
+}
+
+impl Mosaic {
+    /// Whatever looks the same is the same.
+    pub(super) fn new(tile: Tile, pair: [Shade; 2]) -> Self {
+        Self { tile: if pair[0] == pair[1] { Tile::HALVES } else { tile }, pair }
+    }
+
+    pub(super) fn halves(pair: [Shade; 2]) -> Self {
+        Self { tile: Tile::HALVES, pair }
+    }
+
+    /// One colour.
+    pub(super) fn plain(shade: Shade) -> Self {
+        Self::halves([shade; 2])
+    }
+
+    /// What a character shows; none: it is no such character.
+    fn of(symbol: &str, fg: Shade, bg: Shade) -> Option<Self> {
+        match symbol {
+            " " => return Some(Self::plain(bg)),
+            "█" => return Some(Self::plain(fg)),
+            _ => {}
+        }
+        let (tile, is_second) = of_symbol(symbol.chars().next()?)?;
+        Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
+    }
+
+    /// The pairs of colours that lie on each other in this cell and in that one, with the part of the cell, of 2, where they do.
+    pub(super) fn against(self, other: Self) -> impl Iterator<Item = (Shade, Shade, f32)> {
+        let shared = self.tile.shared(other.tile);
+        let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
+        pairs.filter(move |(own, its)| shared[*own][*its] > 0).map(move |(own, its)| {
+            let part = 2.0 * shared[own][its] as f32 / PLACES as f32;
+            (self.pair[own], other.pair[its], part)
+        })
+    }
 }
 
 /// A character, which may be made of several code points, and its style.
@@ -37,12 +83,12 @@ impl Text {
     }
 }
 
-/// The four ways to fill the halves of a cell by the two colours of the pen.
+/// The four ways to fill the two parts of a cell by the two colours of the pen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Glyph {
     Blank,
-    Upper,
-    Lower,
+    First,
+    Second,
     Full,
 }
 
@@ -54,31 +100,32 @@ const ON_BLANKS: Modifier = Modifier::REVERSED
     .union(Modifier::CROSSED_OUT);
 
 impl Glyph {
-    pub(super) const ALL: [Self; 4] = [Self::Blank, Self::Upper, Self::Lower, Self::Full];
+    pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
-    pub(super) fn symbol(self) -> &'static str {
+    /// The character by which it fills this tile.
+    pub(super) fn symbol(self, tile: Tile) -> char {
         match self {
-            Self::Blank => " ",
-            Self::Upper => "▀",
-            Self::Lower => "▄",
-            Self::Full => "█",
+            Self::Blank => ' ',
+            Self::First => tile.symbols()[0],
+            Self::Second => tile.symbols()[1],
+            Self::Full => '█',
         }
     }
 
-    /// Which layer fills the upper and the lower half.
+    /// Which layer fills the first and the second part.
     pub(super) fn layers(self) -> [Layer; 2] {
         match self {
             Self::Blank => [Layer::Background; 2],
-            Self::Upper => [Layer::Foreground, Layer::Background],
-            Self::Lower => [Layer::Background, Layer::Foreground],
+            Self::First => [Layer::Foreground, Layer::Background],
+            Self::Second => [Layer::Background, Layer::Foreground],
             Self::Full => [Layer::Foreground; 2],
         }
     }
 
     /// What it asks of the pen; nothing of a colour that it does not show.
-    pub(super) fn wish(self, halves: [Shade; 2]) -> Wish {
+    pub(super) fn wish(self, pair: [Shade; 2]) -> Wish {
         let color =
-            |layer| self.layers().iter().zip(halves).find(|(l, _)| **l == layer).map(|(_, half)| half);
+            |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
         let matters = if self == Self::Blank { ON_BLANKS } else { Modifier::all() };
         Wish {
             fg: color(Layer::Foreground),
@@ -89,15 +136,15 @@ impl Glyph {
     }
 
     /// Whether it can show these colours.
-    pub(super) fn shows(self, halves: [Shade; 2]) -> bool {
-        let [upper, lower] = self.layers();
-        halves[0].fits(upper) && halves[1].fits(lower) && (upper != lower || halves[0] == halves[1])
+    pub(super) fn shows(self, pair: [Shade; 2]) -> bool {
+        let [first, second] = self.layers();
+        pair[0].fits(first) && pair[1].fits(second) && (first != second || pair[0] == pair[1])
     }
 }
 
 impl Look {
     /// A blank of the terminal's own background.
-    pub(super) const BLANK: Self = Self::Halves([Shade::Ground; 2]);
+    pub(super) const BLANK: Self = Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [Shade::Ground; 2] });
 
     /// What a cell is to look like on a terminal of this depth.
     pub(super) fn of(cell: &Cell, depth: ColorDepth) -> Self {
@@ -107,14 +154,9 @@ impl Look {
         };
         let (fg, bg) = (shade(cell.fg, Layer::Foreground), shade(cell.bg, Layer::Background));
         let (symbol, columns) = printable(cell.symbol());
-        let halves = match symbol {
-            " " if !cell.modifier.intersects(ON_BLANKS) => Some([bg, bg]),
-            "▀" if cell.modifier.is_empty() => Some([fg, bg]),
-            "▄" if cell.modifier.is_empty() => Some([bg, fg]),
-            "█" if cell.modifier.is_empty() => Some([fg, fg]),
-            _ => None,
-        };
-        halves.map_or_else(
+        let harmless = if symbol == " " { Modifier::all() - ON_BLANKS } else { Modifier::empty() };
+        let mosaic = harmless.contains(cell.modifier).then(|| Mosaic::of(symbol, fg, bg)).flatten();
+        mosaic.map_or_else(
             || {
                 Self::Text(Text {
                     symbol: symbol.into(),
@@ -122,7 +164,7 @@ impl Look {
                     pen: Pen { fg, bg, modifier: cell.modifier },
                 })
             },
-            Self::Halves,
+            Self::Mosaic,
         )
     }
 
@@ -130,7 +172,7 @@ impl Look {
     pub(super) fn columns(&self) -> u16 {
         match self {
             Self::Text(text) => text.columns,
-            Self::Unknown | Self::Halves(_) | Self::Covered => 1,
+            Self::Unknown | Self::Mosaic(_) | Self::Covered => 1,
         }
     }
 }
@@ -164,6 +206,9 @@ mod tests {
         let (a, b) = (Color::Rgb(1, 2, 3), Color::Rgb(4, 5, 6));
         assert_eq!(look("▀", a, b, none), look("▄", b, a, none));
         assert_eq!(look("█", a, b, none), look(" ", b, a, none));
+        assert_eq!(look("▚", a, b, none), look("▞", b, a, none));
+        assert_eq!(look("▚", a, a, none), look(" ", b, a, none));
+        assert_ne!(look("▚", a, b, none), look("▀", a, b, none));
         assert_eq!(look(" ", a, b, Modifier::BOLD), look(" ", b, b, none));
         assert_ne!(look(" ", a, b, Modifier::UNDERLINED), look(" ", a, b, none));
         assert_ne!(look("▀", a, b, Modifier::DIM), look("▀", a, b, none));

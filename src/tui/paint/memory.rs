@@ -7,7 +7,7 @@
 use ratatui::layout::Rect;
 
 use super::Fidelity;
-use super::look::Look;
+use super::look::{Look, Mosaic};
 use super::moves::Place;
 use super::screen::Screen;
 use super::shade::Shade;
@@ -24,9 +24,9 @@ pub(super) struct Memory {
     columns: usize,
     picture: Rect,
     /// None: nothing is known.
-    firsts: Vec<Option<[Shade; 2]>>,
+    firsts: Vec<Option<Mosaic>>,
     /// The first picture of the request under way; empty: it had none.
-    newest: Vec<Option<[Shade; 2]>>,
+    newest: Vec<Option<Mosaic>>,
     /// Whether the cell is alike in the first pictures of the request under way and of the one that it shows.
     steady: Vec<bool>,
     /// How far what is wanted may be off what is shown where it is steady.
@@ -61,7 +61,7 @@ impl Memory {
     /// A request shows its first picture.
     fn begin(&mut self, wanted: &Wanted) {
         let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
-        self.newest = places.map(|(x, y)| wanted.halves(x, y)).collect();
+        self.newest = places.map(|(x, y)| wanted.mosaic(x, y)).collect();
         self.noise = u8::MAX;
         for (steady, (first, newest)) in self.steady.iter_mut().zip(self.firsts.iter().zip(&self.newest)) {
             *steady = first.zip(*newest).is_some_and(|(a, b)| apart(a, b) <= ALIKE);
@@ -73,8 +73,8 @@ impl Memory {
         let mut counts = [0_u32; 256];
         for y in wanted.picture.top()..wanted.picture.bottom() {
             for x in wanted.picture.left()..wanted.picture.right() {
-                if let (true, Look::Halves(shown), Some(wanted)) =
-                    (self.is_steady(Place { x, y }), screen.look(Place { x, y }), wanted.halves(x, y))
+                if let (true, Look::Mosaic(shown), Some(wanted)) =
+                    (self.is_steady(Place { x, y }), screen.look(Place { x, y }), wanted.mosaic(x, y))
                 {
                     counts[usize::from(apart(*shown, wanted))] += 1;
                 }
@@ -90,7 +90,7 @@ impl Memory {
     }
 
     /// What a cell is to show: what it shows already where nothing but noise speaks against it.
-    pub(super) fn halves(&self, at: Place, wanted: [Shade; 2], shown: Option<[Shade; 2]>) -> [Shade; 2] {
+    pub(super) fn mosaic(&self, at: Place, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
         shown
             .filter(|shown| {
                 self.is_steady(at) && (self.noise == u8::MAX || apart(*shown, wanted) <= self.noise)
@@ -137,11 +137,11 @@ impl Memory {
 }
 
 /// The largest difference of a channel; 255 where there is no telling.
-fn apart(a: [Shade; 2], b: [Shade; 2]) -> u8 {
+fn apart(a: Mosaic, b: Mosaic) -> u8 {
     let one = |a: Shade, b: Shade| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),
         _ => u8::MAX,
     };
-    one(a[0], b[0]).max(one(a[1], b[1]))
+    a.against(b).map(|(a, b, _)| one(a, b)).max().unwrap_or(0)
 }

@@ -2,8 +2,8 @@
 //!
 //! A [`Painter`] knows what is on the screen, because it sent it. It is aimed at a buffer of cells and gives the bytes
 //! that lead there, slice by slice; a newer aim takes the place of the rest of the older one. A cell counts as the
-//! two colours of its halves, however they are drawn: `▀ ▄ █` and the blank show the same pairs in several ways,
-//! and the one that costs least after what was drawn before is taken.
+//! two colours of its parts, however they are drawn: `▀ ▄ █` and the blank show the same halves in several ways, as
+//! other characters do other parts, and the one that costs least after what was drawn before is taken.
 //!
 //! Words are exact. A picture that will be followed by better ones is drawn as far as an error is worth its bytes,
 //! and where an edit changed nothing the screen is left alone. A picture that stays is exact to 1/255.
@@ -173,7 +173,7 @@ impl Painter {
                 if !screen.draw(stroke, &mut slice) {
                     return slice.bytes;
                 }
-                if let (Some(Part::Picture(_)), Stroke::Halves { at, count, .. }) = (self.part, stroke) {
+                if let (Some(Part::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke) {
                     self.memory.drawn(*at, *count);
                 }
                 self.strokes.next();
@@ -204,6 +204,14 @@ impl Painter {
             self.memory.finish();
         }
         slice.bytes
+    }
+
+    /// The content of these cells is unknown from now on.
+    pub fn damage(&mut self, cells: Rect) {
+        if let Some(screen) = &mut self.screen {
+            screen.damage(cells);
+            self.start_over();
+        }
     }
 
     /// The content of the screen is unknown from now on: it is cleared before anything else is drawn.

@@ -73,10 +73,10 @@ pub(super) fn plan(
         Fidelity::Moving => row(&targets, start, Taste::MOVING),
         Fidelity::First => budget.spend(&targets, start),
     };
-    let stroke = |dab: Dab| Stroke::Halves {
+    let stroke = |dab: Dab| Stroke::Mosaic {
         at: Place { x: columns.start + dab.column as u16, y },
         glyph: dab.glyph,
-        halves: dab.halves,
+        mosaic: dab.mosaic,
         count: 1,
     };
     let strokes: Vec<Stroke> = row.dabs.into_iter().map(stroke).collect();
@@ -85,9 +85,9 @@ pub(super) fn plan(
 
 fn target(screen: &Screen, wanted: &Wanted, memory: &Memory, at: Place) -> Target {
     let shown = match screen.look(at) {
-        Look::Halves(halves) => Some(*halves),
+        Look::Mosaic(mosaic) => Some(*mosaic),
         Look::Unknown | Look::Text(_) | Look::Covered => None,
     };
-    let wanted = wanted.halves(at.x, at.y).map(|wanted| memory.halves(at, wanted, shown));
+    let wanted = wanted.mosaic(at.x, at.y).map(|wanted| memory.mosaic(at, wanted, shown));
     Target { wanted, shown }
 }

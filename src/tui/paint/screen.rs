@@ -1,6 +1,8 @@
 //! What is on the terminal's screen, as far as it follows from the bytes that were sent.
 
-use super::look::{Glyph, Look, Text};
+use ratatui::layout::Rect;
+
+use super::look::{Glyph, Look, Mosaic, Text};
 use super::moves::{self, Place};
 use super::pen::Pen;
 use super::shade::Shade;
@@ -18,8 +20,8 @@ pub(super) struct Slice {
 pub(super) enum Stroke {
     /// A character.
     Text { at: Place, text: Text },
-    /// Two halves, by a glyph that can show them, in this many cells. More than one: by REP.
-    Halves { at: Place, glyph: Glyph, halves: [Shade; 2], count: u16 },
+    /// Two colours, by a glyph that can show them, in this many cells. More than one: by REP.
+    Mosaic { at: Place, glyph: Glyph, mosaic: Mosaic, count: u16 },
     /// Blanks of the terminal's own background, this many or, if none, up to the end of the row.
     Erase { at: Place, count: Option<u16> },
 }
@@ -28,7 +30,7 @@ impl Stroke {
     /// Where it begins.
     pub(super) fn at(&self) -> Place {
         match self {
-            Self::Text { at, .. } | Self::Halves { at, .. } | Self::Erase { at, .. } => *at,
+            Self::Text { at, .. } | Self::Mosaic { at, .. } | Self::Erase { at, .. } => *at,
         }
     }
 
@@ -38,10 +40,10 @@ impl Stroke {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::goes_on) {
             let count = run.len() as u16;
-            if let [Self::Halves { at, glyph: Glyph::Blank, halves, .. }, _, ..] = run
+            if let [Self::Mosaic { at, glyph: Glyph::Blank, mosaic, .. }, _, ..] = run
                 && run.len() > 1 + moves::control(count - 1, b'b').len()
             {
-                shorter.push(Self::Halves { at: *at, glyph: Glyph::Blank, halves: *halves, count });
+                shorter.push(Self::Mosaic { at: *at, glyph: Glyph::Blank, mosaic: *mosaic, count });
             } else {
                 shorter.extend_from_slice(run);
             }
@@ -52,11 +54,11 @@ impl Stroke {
     /// Whether the next stroke is the same in the next cell.
     fn goes_on(&self, next: &Self) -> bool {
         if let (
-            Self::Halves { at, glyph, halves, .. },
-            Self::Halves { at: next_at, glyph: next_glyph, halves: next_halves, .. },
+            Self::Mosaic { at, glyph, mosaic, .. },
+            Self::Mosaic { at: next_at, glyph: next_glyph, mosaic: next_mosaic, .. },
         ) = (self, next)
         {
-            (at.x + 1, at.y, glyph, halves) == (next_at.x, next_at.y, next_glyph, next_halves)
+            (at.x + 1, at.y, glyph, mosaic) == (next_at.x, next_at.y, next_glyph, next_mosaic)
         } else {
             false
         }
@@ -101,6 +103,17 @@ impl Screen {
         self.looks[start..start + usize::from(self.columns)].contains(&Look::Unknown)
     }
 
+    /// Nobody knows what these cells show.
+    pub(super) fn damage(&mut self, cells: Rect) {
+        let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
+        for y in cells.top()..cells.bottom() {
+            for x in cells.left()..cells.right() {
+                let index = self.index(Place { x, y });
+                self.looks[index] = Look::Unknown;
+            }
+        }
+    }
+
     fn index(&self, at: Place) -> usize {
         usize::from(at.y) * usize::from(self.columns) + usize::from(at.x)
     }
@@ -121,15 +134,16 @@ impl Screen {
     fn write(&mut self, stroke: &Stroke, bytes: &mut Vec<u8>) {
         let (at, wish) = match stroke {
             Stroke::Text { at, text } => (at, text.pen.exactly()),
-            Stroke::Halves { at, glyph, halves, .. } => (at, glyph.wish(*halves)),
+            Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.wish(mosaic.pair)),
             Stroke::Erase { at, .. } => (at, Glyph::Blank.wish([Shade::Ground; 2])),
         };
         moves::go(self.cursor, *at, bytes);
         self.pen.turn(&wish, bytes);
         match stroke {
             Stroke::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),
-            Stroke::Halves { glyph, count, .. } => {
-                bytes.extend_from_slice(glyph.symbol().as_bytes());
+            Stroke::Mosaic { glyph, mosaic, count, .. } => {
+                let symbol = glyph.symbol(mosaic.tile);
+                bytes.extend_from_slice(symbol.encode_utf8(&mut [0; 4]).as_bytes());
                 if *count > 1 {
                     bytes.extend(moves::control(*count - 1, b'b'));
                 }
@@ -147,9 +161,9 @@ impl Screen {
                 // Terminals differ in how wide they think that others are.
                 self.cursor = if text.is_plain() { self.after(*at, 1) } else { None };
             }
-            Stroke::Halves { at, halves, count, .. } => {
+            Stroke::Mosaic { at, mosaic, count, .. } => {
                 for x in at.x..at.x + count {
-                    self.put(Place { x, ..*at }, Look::Halves(*halves), 1);
+                    self.put(Place { x, ..*at }, Look::Mosaic(*mosaic), 1);
                 }
                 self.cursor = self.after(*at, *count);
             }

@@ -2,7 +2,7 @@
 
 use ratatui::style::Color;
 
-use crate::tui::color::CUBE_LEVELS;
+use crate::tui::color::fixed;
 
 /// A colour as the terminal knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,11 +23,6 @@ pub(super) enum Layer {
     Foreground,
     Background,
 }
-
-/// First of the colours of the palette that are the same everywhere.
-const FIRST_FIXED: u8 = 16;
-/// First grey of the palette.
-const FIRST_GREY: u8 = 232;
 
 impl Shade {
     /// What a cell's colour is in this layer.
@@ -81,12 +76,8 @@ impl Shade {
     pub(super) fn rgb(self) -> Option<[u8; 3]> {
         match self {
             Self::Rgb(rgb) => Some(rgb),
-            Self::Palette(index @ FIRST_GREY..) => Some([8 + 10 * (index - FIRST_GREY); 3]),
-            Self::Palette(index @ FIRST_FIXED..) => {
-                let i = usize::from(index - FIRST_FIXED);
-                Some([i / 36, i / 6 % 6, i % 6].map(|step| CUBE_LEVELS[step]))
-            }
-            Self::Palette(_) | Self::Ground | Self::Ink => None,
+            Self::Palette(index) => fixed(index),
+            Self::Ground | Self::Ink => None,
         }
     }
 

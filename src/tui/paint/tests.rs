@@ -56,10 +56,10 @@ impl Desk {
             let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
             match (look, shown(cell)) {
-                (Look::Halves(a), Look::Halves(b)) => {
-                    for (a, b) in a.iter().zip(b) {
+                (Look::Mosaic(a), Look::Mosaic(b)) => {
+                    for (a, b, _) in a.against(b) {
                         largest =
-                            largest.max(distance(*a, b).unwrap_or_else(|| panic!("{x},{y}: {a:?} {b:?}")));
+                            largest.max(distance(a, b).unwrap_or_else(|| panic!("{x},{y}: {a:?} {b:?}")));
                     }
                 }
                 (a, b) => assert_eq!(a, &b, "{x},{y}"),
@@ -132,7 +132,7 @@ fn ink() -> impl Strategy<Value = Ink> {
     let symbol = prop_oneof![
         4 => Just("▀"),
         2 => Just(" "),
-        1 => proptest::sample::select(vec!["▄", "█", "a", "B", "…", "━", "日", "한", "e\u{301}", "", "\t"]),
+        1 => proptest::sample::select(vec!["▄", "█", "▚", "🬟", "░", "▒", "▓", "a", "B", "…", "━", "日", "한", "e\u{301}", "", "\t"]),
     ];
     let modifier = prop_oneof![
         5 => Just(Modifier::empty()),

@@ -5,9 +5,10 @@
 //! to a cell is kept for each of a few pens (a beam search of Viterbi's trellis), and the cheapest end is traced back.
 
 use super::candidates::{Candidates, candidates};
-use super::look::Glyph;
+use super::look::{Glyph, Mosaic};
 use super::shade::{Layer, Shade, digits};
 use super::taste::Taste;
+use crate::tui::mosaic::{PLACES, Tile};
 
 /// Ways that are kept from cell to cell.
 const BEAM: usize = 5;
@@ -18,9 +19,9 @@ const MOST_BYTES: f32 = 46.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Target {
     /// None: the cell is not of the picture.
-    pub(super) wanted: Option<[Shade; 2]>,
+    pub(super) wanted: Option<Mosaic>,
     /// None: nothing that could stay.
-    pub(super) shown: Option<[Shade; 2]>,
+    pub(super) shown: Option<Mosaic>,
 }
 
 /// Where a row begins.
@@ -38,7 +39,7 @@ pub(super) struct Dab {
     /// Counted from the first target.
     pub(super) column: usize,
     pub(super) glyph: Glyph,
-    pub(super) halves: [Shade; 2],
+    pub(super) mosaic: Mosaic,
 }
 
 /// A way through the row up to a cell.
@@ -107,15 +108,17 @@ pub(super) fn row(targets: &[Target], start: Start, taste: Taste) -> Row {
         let last = &ways[column];
         ways.push(step(last, *target, &wanted[column..], taste));
     }
-    trace(&ways)
+    trace(&ways, &wanted)
 }
 
 /// The ways on to the next cell.
-fn step(last: &[Way], target: Target, wanted: &[Option<[Shade; 2]>], taste: Taste) -> Vec<Way> {
+fn step(last: &[Way], target: Target, wanted: &[Option<Mosaic>], taste: Taste) -> Vec<Way> {
     let mut beam = Beam { ways: Vec::with_capacity(BEAM), limit: MOST_BYTES * taste.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
-        (Some(wanted), Some(shown)) => taste.error(shown[0], wanted[0]) + taste.error(shown[1], wanted[1]),
+        (Some(wanted), Some(shown)) => {
+            shown.against(wanted).map(|(shown, wanted, part)| part * taste.error(shown, wanted)).sum()
+        }
         (Some(_), None) => f32::INFINITY,
     };
     if leave.is_finite() {
@@ -123,10 +126,10 @@ fn step(last: &[Way], target: Target, wanted: &[Option<[Shade; 2]>], taste: Tast
             beam.add(Way { gap: way.gap.wider(), cost: way.cost + leave, parent, glyph: None, ..*way });
         }
     }
-    let Some(halves) = target.wanted else { return beam.ways };
+    let Some(mosaic) = target.wanted else { return beam.ways };
     // What is near enough is not worth a new colour, but may be drawn again instead of jumped over.
     let changes = if leave <= taste.byte { Candidates::default() } else { candidates(wanted, taste) };
-    let changes = Changes::new(&changes, halves, taste);
+    let changes = Changes::new(&changes, mosaic, taste);
     for (parent, way) in last.iter().enumerate() {
         changes.turn_one(parent, way, &mut beam);
     }
@@ -178,49 +181,57 @@ struct Change {
     shade: Shade,
     /// Of the parameters of SGR.
     bytes: u32,
-    /// In the upper and the lower half.
+    /// In the first and the second part.
     errors: [f32; 2],
 }
 
 /// What may be drawn at a cell.
 struct Changes {
-    halves: [Shade; 2],
+    mosaic: Mosaic,
     taste: Taste,
     all: Vec<Change>,
-    /// So many of them are for the upper half, and up to here for the lower one.
-    upper: usize,
-    lower: usize,
+    /// So many of them are for the first part, and up to here for the second one.
+    first: usize,
+    second: usize,
 }
 
 impl Changes {
-    fn new(candidates: &Candidates, halves: [Shade; 2], taste: Taste) -> Self {
-        let change = |shade: &Shade| Change {
-            shade: *shade,
-            bytes: shade.length(),
-            errors: halves.map(|half| taste.error(*shade, half)),
-        };
-        let Candidates { upper, lower, both } = candidates;
-        let all = upper.iter().chain(lower).chain(both).map(change).collect();
-        Self { halves, taste, all, upper: upper.len(), lower: upper.len() + lower.len() }
+    fn new(candidates: &Candidates, mosaic: Mosaic, taste: Taste) -> Self {
+        let Candidates { first, second, both } = candidates;
+        let mut changes =
+            Self { mosaic, taste, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
+        let change =
+            |shade: &Shade| Change { shade: *shade, bytes: shade.length(), errors: changes.errors(*shade) };
+        changes.all = first.iter().chain(second).chain(both).map(change).collect();
+        changes
+    }
+
+    /// The errors of a colour in both parts, each as large as it is.
+    fn errors(&self, shade: Shade) -> [f32; 2] {
+        let sizes = self.mosaic.tile.sizes();
+        std::array::from_fn(|part| {
+            let share = 2.0 * sizes[part] as f32 / PLACES as f32;
+            share * self.taste.error(shade, self.mosaic.pair[part])
+        })
     }
 
     /// The ways to draw the cell at the end of a way to it, with the pen as it is or with one other colour. A colour for
-    /// one half is shown in that one.
+    /// one part is shown in that one.
     fn turn_one(&self, parent: usize, way: &Way, beam: &mut Beam) {
         let mut ends = End::new(self, parent, way, beam);
         if !ends.is_near() {
             return;
         }
-        let errors = |shade| self.halves.map(|half| self.taste.error(shade, half));
-        let pen = Ends { fg: way.fg, fg_errors: errors(way.fg), bg: way.bg, bg_errors: errors(way.bg) };
+        let (fg_errors, bg_errors) = (self.errors(way.fg), self.errors(way.bg));
+        let pen = Ends { fg: way.fg, fg_errors, bg: way.bg, bg_errors };
         for glyph in Glyph::ALL {
             ends.add(pen, 0, glyph);
         }
         for (index, change) in self.all.iter().enumerate() {
             let bytes = change.bytes + 3;
             let (as_fg, as_bg) = match index {
-                _ if index < self.upper => (Glyph::Upper, Glyph::Lower),
-                _ if index < self.lower => (Glyph::Lower, Glyph::Upper),
+                _ if index < self.first => (Glyph::First, Glyph::Second),
+                _ if index < self.second => (Glyph::Second, Glyph::First),
                 _ => (Glyph::Full, Glyph::Blank),
             };
             if change.shade.fits(Layer::Foreground) {
@@ -235,10 +246,10 @@ impl Changes {
     /// The same with both colours.
     fn turn_both(&self, parent: usize, way: &Way, beam: &mut Beam) {
         let mut ends = End::new(self, parent, way, beam);
-        for upper in &self.all[..self.upper] {
-            for lower in &self.all[self.upper..self.lower] {
-                let bytes = upper.bytes + lower.bytes + 4;
-                for (fg, bg, glyph) in [(upper, lower, Glyph::Upper), (lower, upper, Glyph::Lower)] {
+        for first in &self.all[..self.first] {
+            for second in &self.all[self.first..self.second] {
+                let bytes = first.bytes + second.bytes + 4;
+                for (fg, bg, glyph) in [(first, second, Glyph::First), (second, first, Glyph::Second)] {
                     if fg.shade.fits(Layer::Foreground) && bg.shade.fits(Layer::Background) {
                         ends.add(Ends::of(fg, bg), bytes, glyph);
                     }
@@ -257,6 +268,7 @@ struct End<'a> {
     error: f32,
     /// The price of a byte.
     byte: f32,
+    tile: Tile,
     beam: &'a mut Beam,
     /// Of the beam.
     bound: f32,
@@ -267,7 +279,8 @@ impl<'a> End<'a> {
         let byte = changes.taste.byte;
         let error = way.cost - way.bytes as f32 * byte;
         let bound = beam.bound();
-        Self { parent, bytes: way.bytes + way.gap.bytes(), error, byte, beam, bound }
+        let tile = changes.mosaic.tile;
+        Self { parent, bytes: way.bytes + way.gap.bytes(), error, byte, tile, beam, bound }
     }
 
     /// Whether anything that is drawn here can be worth a look.
@@ -276,7 +289,11 @@ impl<'a> End<'a> {
     }
 
     fn add(&mut self, ends: Ends, sgr: u32, glyph: Glyph) {
-        let bytes = self.bytes + sgr + glyph.symbol().len() as u32;
+        // Turned round, half of each is another pattern by the same character.
+        if glyph == Glyph::Second && self.tile == Tile::MEDIUM {
+            return;
+        }
+        let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
         let cost = bytes as f32 * self.byte + self.error + ends.error(glyph);
         if cost < self.bound {
             let Ends { fg, bg, .. } = ends;
@@ -288,7 +305,7 @@ impl<'a> End<'a> {
     }
 }
 
-/// A pen, and the errors of its colours in the halves of a cell.
+/// A pen, and the errors of its colours in the parts of a cell.
 #[derive(Clone, Copy)]
 struct Ends {
     fg: Shade,
@@ -311,28 +328,28 @@ impl Ends {
     }
 
     fn error(&self, glyph: Glyph) -> f32 {
-        let of = |half: usize| match glyph.layers()[half] {
-            Layer::Foreground => self.fg_errors[half],
-            Layer::Background => self.bg_errors[half],
+        let of = |part: usize| match glyph.layers()[part] {
+            Layer::Foreground => self.fg_errors[part],
+            Layer::Background => self.bg_errors[part],
         };
         of(0) + of(1)
     }
 }
 
 /// The cheapest way back from the last cell.
-fn trace(ways: &[Vec<Way>]) -> Row {
+fn trace(ways: &[Vec<Way>], wanted: &[Option<Mosaic>]) -> Row {
     let last = ways.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (mut index, bytes) = best.map_or((0, 0), |(index, way)| (index, way.bytes));
     let mut dabs = Vec::new();
     for (column, ways) in ways.iter().enumerate().skip(1).rev() {
         let Some(way) = ways.get(index) else { break };
-        if let Some(glyph) = way.glyph {
-            let halves = glyph.layers().map(|layer| match layer {
+        if let (Some(glyph), Some(mosaic)) = (way.glyph, wanted[column - 1]) {
+            let pair = glyph.layers().map(|layer| match layer {
                 Layer::Foreground => way.fg,
                 Layer::Background => way.bg,
             });
-            dabs.push(Dab { column: column - 1, glyph, halves });
+            dabs.push(Dab { column: column - 1, glyph, mosaic: Mosaic::new(mosaic.tile, pair) });
         }
         index = way.parent;
     }
@@ -345,6 +362,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::tui::mosaic::of_symbol;
 
     const BLACK: Shade = Shade::Rgb([0, 0, 0]);
     const RED: Shade = Shade::Rgb([200, 0, 0]);
@@ -352,7 +370,10 @@ mod tests {
     fn wanted(halves: &[[Shade; 2]]) -> Vec<Target> {
         halves
             .iter()
-            .map(|halves| Target { wanted: Some(*halves), shown: Some([Shade::Ground; 2]) })
+            .map(|halves| Target {
+                wanted: Some(Mosaic::halves(*halves)),
+                shown: Some(Mosaic::plain(Shade::Ground)),
+            })
             .collect()
     }
 
@@ -365,7 +386,7 @@ mod tests {
         let found =
             row(&wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]), start(BLACK, Shade::Ground), Taste::EXACT);
         let glyphs: Vec<Glyph> = found.dabs.iter().map(|dab| dab.glyph).collect();
-        assert_eq!(glyphs, [Glyph::Blank, Glyph::Blank, Glyph::Upper]);
+        assert_eq!(glyphs, [Glyph::Blank, Glyph::Blank, Glyph::First]);
         // ESC [ 48;2;200;0;0 m and the glyphs.
         assert_eq!(found.bytes, 3 + 12 + 1 + 1 + 3);
     }
@@ -374,7 +395,7 @@ mod tests {
     fn what_is_shown_is_left_and_jumped_over() {
         let mut targets = wanted(&[[RED, BLACK]; 9]);
         for target in &mut targets[1..8] {
-            target.shown = Some([RED, Shade::Rgb([1, 1, 1])]);
+            target.shown = Some(Mosaic::halves([RED, Shade::Rgb([1, 1, 1])]));
         }
         let found = row(&targets, start(RED, BLACK), Taste::EXACT);
         let columns: Vec<usize> = found.dabs.iter().map(|dab| dab.column).collect();
@@ -389,9 +410,9 @@ mod tests {
         for halves in
             [[RED, Shade::Ground], [Shade::Ground, RED], [Shade::Ink, Shade::Ground], [Shade::Ink; 2]]
         {
-            let targets = [Target { wanted: Some(halves), shown: None }];
+            let targets = [Target { wanted: Some(Mosaic::halves(halves)), shown: None }];
             let found = row(&targets, start(BLACK, BLACK), Taste::MOVING);
-            assert_eq!(found.dabs.first().map(|dab| dab.halves), Some(halves));
+            assert_eq!(found.dabs.first().map(|dab| dab.mosaic.pair), Some(halves));
         }
     }
 
@@ -404,11 +425,24 @@ mod tests {
         ]
     }
 
+    fn mosaic() -> impl Strategy<Value = Mosaic> {
+        let tile = prop_oneof![
+            3 => Just(Tile::HALVES),
+            1 => proptest::sample::select(vec!['▌', '▚', '░', '▒', '🬟', '\u{1CD10}'])
+                .prop_map(|symbol| of_symbol(symbol).expect("a tile").0),
+        ];
+        (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
+            // As it is read from a character: its first part is in the foreground.
+            let is_cell = tile != Tile::MEDIUM || pair[0] != Shade::Ground;
+            Mosaic::new(if is_cell { tile } else { Tile::HALVES }, pair)
+        })
+    }
+
     proptest! {
         #[test]
         fn every_cell_comes_near_enough(
             cells in proptest::collection::vec(
-                (proptest::option::weighted(0.9, [shade(), shade()]), proptest::option::of([shade(), shade()])),
+                (proptest::option::weighted(0.9, mosaic()), proptest::option::of(mosaic())),
                 1..40,
             ),
             is_exact in any::<bool>(),
@@ -416,19 +450,19 @@ mod tests {
             let targets: Vec<Target> = cells.iter().map(|(wanted, shown)| Target { wanted: *wanted, shown: *shown }).collect();
             let taste = if is_exact { Taste::EXACT } else { Taste::MOVING };
             let found = row(&targets, start(Shade::Ink, Shade::Ground), taste);
-            let mut screen: Vec<Option<[Shade; 2]>> = targets.iter().map(|target| target.shown).collect();
+            let mut screen: Vec<Option<Mosaic>> = targets.iter().map(|target| target.shown).collect();
             for dab in &found.dabs {
                 prop_assert!(targets[dab.column].wanted.is_some(), "a cell of another's");
-                prop_assert!(dab.glyph.shows(dab.halves));
-                screen[dab.column] = Some(dab.halves);
+                prop_assert!(dab.glyph.shows(dab.mosaic.pair));
+                screen[dab.column] = Some(dab.mosaic);
             }
             for (shown, target) in screen.iter().zip(&targets) {
                 let Some(wanted) = target.wanted else { continue };
                 let shown = shown.expect("a cell that was unknown is drawn");
-                for (shown, wanted) in shown.iter().zip(wanted) {
+                for (shown, wanted, part) in shown.against(wanted) {
                     // More than that in one channel is worth any bytes.
                     let most = if is_exact { 3.0 } else { Taste::MOVING.byte * 120.0 };
-                    prop_assert!(taste.error(*shown, wanted) <= most);
+                    prop_assert!(part * taste.error(shown, wanted) <= most);
                 }
             }
         }

@@ -4,8 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::Fidelity;
-use super::look::Look;
-use super::shade::Shade;
+use super::look::{Look, Mosaic};
 use crate::tui::color::ColorDepth;
 
 /// A screen that is wanted.
@@ -51,19 +50,19 @@ impl Wanted {
     }
 
     /// The colours of a cell of the picture; none of words, which may lie over it.
-    pub(super) fn halves(&self, x: u16, y: u16) -> Option<[Shade; 2]> {
+    pub(super) fn mosaic(&self, x: u16, y: u16) -> Option<Mosaic> {
         match self.row(y)[usize::from(x)] {
-            Look::Halves(halves) if self.picture.contains((x, y).into()) => Some(halves),
-            Look::Halves(_) | Look::Text(_) | Look::Covered | Look::Unknown => None,
+            Look::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
+            Look::Mosaic(_) | Look::Text(_) | Look::Covered | Look::Unknown => None,
         }
     }
 
-    /// Whether a cell belongs to the picture, be it of halves or, without colours, of characters.
+    /// Whether a cell belongs to the picture, be it of two colours or, without colours, a character.
     pub(super) fn is_picture(&self, x: u16, y: u16) -> bool {
         let is_tone = |symbol: &str| matches!(symbol.as_bytes(), [byte] if byte.is_ascii_punctuation());
         self.picture.contains((x, y).into())
             && match &self.row(y)[usize::from(x)] {
-                Look::Halves(_) => true,
+                Look::Mosaic(_) => true,
                 Look::Text(text) => self.depth == ColorDepth::None && is_tone(&text.symbol),
                 Look::Covered | Look::Unknown => false,
             }

@@ -30,9 +30,9 @@ pub(super) fn plan(screen: &Screen, wanted: &Wanted, y: u16, of_picture: bool) -
 fn stroke(at: Place, look: &Look) -> Option<Stroke> {
     match look {
         Look::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
-        Look::Halves(halves) => {
-            let glyph = Glyph::ALL.into_iter().find(|glyph| glyph.shows(*halves))?;
-            Some(Stroke::Halves { at, glyph, halves: *halves, count: 1 })
+        Look::Mosaic(mosaic) => {
+            let glyph = Glyph::ALL.into_iter().find(|glyph| glyph.shows(mosaic.pair))?;
+            Some(Stroke::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
         }
         Look::Unknown | Look::Covered => None,
     }
@@ -51,11 +51,11 @@ fn bridge(screen: &Screen, strokes: &mut Vec<Stroke>, to: Place) {
                 bytes += other.symbol.len();
                 between.push(Stroke::Text { at, text: other.clone() });
             }
-            Look::Halves(halves) if *halves == [text.pen.bg; 2] && text.pen.modifier.is_empty() => {
+            Look::Mosaic(mosaic) if mosaic.pair == [text.pen.bg; 2] && text.pen.modifier.is_empty() => {
                 bytes += 1;
-                between.push(Stroke::Halves { at, glyph: Glyph::Blank, halves: *halves, count: 1 });
+                between.push(Stroke::Mosaic { at, glyph: Glyph::Blank, mosaic: *mosaic, count: 1 });
             }
-            Look::Text(_) | Look::Halves(_) | Look::Unknown | Look::Covered => return,
+            Look::Text(_) | Look::Mosaic(_) | Look::Unknown | Look::Covered => return,
         }
         if bytes > jump {
             return;
@@ -85,5 +85,5 @@ fn erased(wanted: &Wanted, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
 }
 
 fn is_blank(stroke: &Stroke) -> bool {
-    matches!(stroke, Stroke::Halves { halves, count: 1, .. } if Look::Halves(*halves) == Look::BLANK)
+    matches!(stroke, Stroke::Mosaic { mosaic, count: 1, .. } if Look::Mosaic(*mosaic) == Look::BLANK)
 }

@@ -341,13 +341,20 @@ proptest! {
         columns in 1_u16..250,
         rows in 1_u16..80,
         aspect in 1.2_f32..3.5,
-        kind in 0..3_usize,
+        kind in 0..6_usize,
         depth in 0..4_usize,
         picture in (1_u32..90, 1_u32..90),
         script in prop::collection::vec(0..9_u8, 0..14),
         keys in prop::collection::vec(0..KEYMAP.len(), 0..14),
     ) {
-        let kind = [PreviewKind::HalfBlock, PreviewKind::Ascii, PreviewKind::None][kind];
+        let kind = [
+            PreviewKind::HalfBlock,
+            PreviewKind::Quadrant,
+            PreviewKind::Sextant,
+            PreviewKind::Octant,
+            PreviewKind::Ascii,
+            PreviewKind::None,
+        ][kind];
         let depth = [ColorDepth::TrueColor, ColorDepth::Indexed256, ColorDepth::Ansi16, ColorDepth::None][depth];
         let mut desk = Desk::with(state_with(columns, rows, kind, depth, Overrides::default()));
         desk.state.window.cell_aspect = aspect;

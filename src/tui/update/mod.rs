@@ -1,5 +1,6 @@
 //! State and event in, effects out. Nothing here touches the world.
 
+mod answers;
 mod camera;
 mod history;
 mod keys;
@@ -44,7 +45,8 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Key(key) => keys::update(state, key),
         Event::Mouse(mouse) => pointer::update(state, mouse),
         // There is nothing to type text into; the loop tells the line what that has to know.
-        Event::Paste | Event::Answer(_) | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
+        Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
+        Event::Answer(answer) => answers::learn(state, answer),
         Event::Frame(report) => {
             state.dirty |= state.frame != Some(report);
             state.frame = Some(report);

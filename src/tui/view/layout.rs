@@ -33,14 +33,16 @@ impl Layout {
         Self::new(state.window.columns, state.window.rows, state.preview)
     }
 
-    /// The preview that the window has room for: a box of square pixels, each as wide as a cell.
+    /// The preview that the window has room for: a box of square pixels, as many in the width of a cell as are drawn.
     pub(in crate::tui) fn preview_size(state: &State) -> Option<PreviewSize> {
         if state.preview == PreviewKind::None {
             return None;
         }
         let area = Self::of(state).preview;
-        let height = (f32::from(area.height) * state.window.cell_aspect).round() as u32;
-        (area.width > 0 && height > 0).then_some(PreviewSize { width: u32::from(area.width), height })
+        let across = state.pixels_across();
+        let height = (f32::from(area.height) * state.window.cell_aspect * across as f32).round() as u32;
+        (area.width > 0 && height > 0)
+            .then_some(PreviewSize { width: u32::from(area.width) * across, height })
     }
 
     fn new(columns: u16, rows: u16, preview: PreviewKind) -> Self {

@@ -4,6 +4,7 @@ pub(super) mod diagnostics;
 mod help;
 pub(super) mod layout;
 pub(super) mod preview;
+pub(super) mod ramp;
 mod stages;
 mod status;
 mod text;

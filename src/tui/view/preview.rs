@@ -1,31 +1,33 @@
-//! The picture in half blocks or characters: the one place where pixels become cells.
+//! The picture in blocks or characters: the one place where pixels become cells.
 
 use std::borrow::Cow;
 
-use ratatui::buffer::Buffer;
+use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 
 use super::layout::Layout;
+use super::ramp::Ramp;
 use super::text::{Tone, put};
 use crate::film::Picture;
 use crate::math::Vec3;
-use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb8_to_linear};
+use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 use crate::pipeline::protocol::Spot;
-use crate::tui::color::{self, ColorDepth};
+use crate::tui::color::{ColorDepth, Shades, XTERM};
+use crate::tui::graphics::Placement;
+use crate::tui::mosaic::{Grid, fit};
+use crate::tui::options::PreviewChoice;
 use crate::tui::state::{PreviewKind, State};
-
-/// From dark to bright.
-const RAMP: &[u8; 10] = b" .:-=+*#%@";
 
 /// The picture of the state, or a word in its place.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     match &state.picture {
+        Some(_) if is_in_pixels(state) => {}
         Some(shown) => {
-            let kind = state.preview;
+            let kind = in_cells(state.preview);
             let placed = Placed::fit(&shown.picture, area, kind, state.window.cell_aspect);
-            placed.draw(&shown.picture, kind, state.depth, buffer);
+            placed.draw(&shown.picture, kind, Inks::of(state), buffer);
         }
         None if state.problems.is_none() && area.height > 0 => {
             let text = "no picture yet";
@@ -42,10 +44,57 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
     let picture = &state.picture.as_ref()?.picture;
     let area = Layout::of(state).preview;
-    let cells = Placed::fit(picture, area, state.preview, state.window.cell_aspect).cells;
+    let cells = Placed::fit(picture, area, in_cells(state.preview), state.window.cell_aspect).cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
     cells.contains((column, row).into()).then(spot)
+}
+
+/// What is drawn where the picture has to be in cells.
+fn in_cells(kind: PreviewKind) -> PreviewKind {
+    if matches!(kind, PreviewKind::Pixels(_)) { PreviewKind::HalfBlock } else { kind }
+}
+
+/// Whether the picture is drawn in pixels: where nothing may lie over it.
+fn is_in_pixels(state: &State) -> bool {
+    matches!(state.preview, PreviewKind::Pixels(_)) && !state.help && !state.pane.open
+}
+
+/// Where the picture is drawn in pixels; none: it is drawn in cells.
+pub(in crate::tui) fn placement(state: &State, area: Rect) -> Option<Placement> {
+    let shown = state.picture.as_ref().filter(|_| is_in_pixels(state))?;
+    let placed = Placed::fit(&shown.picture, area, state.preview, state.window.cell_aspect);
+    let (picture, cells) = (shown.picture.clone(), placed.cells);
+    (!cells.is_empty()).then_some(Placement { picture, cells, cell: state.window.cell_pixels })
+}
+
+/// What colours are shown by.
+#[derive(Clone, Copy)]
+struct Inks<'a> {
+    depth: ColorDepth,
+    shades: &'a Shades,
+    is_light: bool,
+}
+
+impl<'a> Inks<'a> {
+    fn of(state: &'a State) -> Self {
+        Self { depth: state.depth, shades: &state.shades, is_light: state.is_light }
+    }
+}
+
+/// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colours of xterm.
+pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
+    let mut buffer = Buffer::empty(area);
+    let kind = in_cells(PreviewKind::of(choice, depth));
+    let shades = Shades::new(depth, &XTERM);
+    let inks = Inks { depth, shades: &shades, is_light: false };
+    Placed::fit(picture, area, kind, 2.0).draw(picture, kind, inks, &mut buffer);
+    buffer
+}
+
+/// The picture at another size.
+pub(in crate::tui) fn resized(picture: &Picture, width: u32, height: u32) -> Picture {
+    Picture { width, height, pixels: rescaled(picture, width, height).into_owned() }
 }
 
 /// Where a picture lies: its cells, and how many pixels it has there.
@@ -60,58 +109,88 @@ impl Placed {
     /// The largest place in the middle of the area with the picture's aspect ratio. `cell_aspect` is the height
     /// of a cell over its width.
     fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32) -> Self {
-        let rows_per_cell: u16 = if kind == PreviewKind::HalfBlock { 2 } else { 1 };
-        let pixel_aspect = cell_aspect / f32::from(rows_per_cell);
-        let room = (f32::from(area.width), f32::from(area.height) * f32::from(rows_per_cell));
+        let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
+        let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
+        let room = (f32::from(area.width * across), f32::from(area.height * down));
         let size = (picture.width.max(1) as f32, picture.height.max(1) as f32 / pixel_aspect);
         let scale = (room.0 / size.0).min(room.1 / size.1);
         let whole = |length: f32, room: f32| (length * scale).round().clamp(room.min(1.0), room) as u16;
         let (width, height) = (whole(size.0, room.0), whole(size.1, room.1));
-        let rows = height.div_ceil(rows_per_cell);
+        let (columns, rows) = (width.div_ceil(across), height.div_ceil(down));
+        // Of several pixels in a cell, the last cells are whole.
+        let (width, height) = if across > 1 { (columns * across, rows * down) } else { (width, height) };
         let cells = Rect {
-            x: area.x + (area.width - width.min(area.width)) / 2,
+            x: area.x + (area.width - columns.min(area.width)) / 2,
             y: area.y + (area.height - rows.min(area.height)) / 2,
-            width,
+            width: columns,
             height: rows,
         };
         Self { cells, width: u32::from(width), height: u32::from(height) }
     }
 
-    fn draw(self, picture: &Picture, kind: PreviewKind, depth: ColorDepth, buffer: &mut Buffer) {
+    fn draw(self, picture: &Picture, kind: PreviewKind, inks: Inks<'_>, buffer: &mut Buffer) {
         let pixels = rescaled(picture, self.width, self.height);
-        let pixel =
-            |x: u32, y: u32| (y < self.height).then(|| pixels.get((y * self.width + x) as usize)).flatten();
-        for row in 0..self.cells.height {
-            for column in 0..self.cells.width {
-                let Some(cell) = buffer.cell_mut((self.cells.x + column, self.cells.y + row)) else {
-                    continue;
-                };
-                let (x, y) = (u32::from(column), u32::from(row));
-                match kind {
-                    PreviewKind::HalfBlock => {
-                        let shade = |y: u32| {
-                            pixel(x, y)
-                                .map_or(Color::Reset, |rgb| color::pixel(*rgb, depth, x as usize, y as usize))
-                        };
-                        let style = Style::new().fg(shade(2 * y)).bg(shade(2 * y + 1));
-                        cell.set_symbol("▀").set_style(style);
+        let scaled = Scaled { width: self.width, height: self.height, pixels: &pixels };
+        let mut each = |draw: &dyn Fn(usize, usize, &mut Cell)| {
+            for row in 0..self.cells.height {
+                for column in 0..self.cells.width {
+                    if let Some(cell) = buffer.cell_mut((self.cells.x + column, self.cells.y + row)) {
+                        draw(usize::from(column), usize::from(row), cell);
                     }
-                    PreviewKind::Ascii => {
-                        cell.set_char(pixel(x, y).map_or(' ', |rgb| glyph(*rgb)));
-                    }
-                    PreviewKind::None => {}
                 }
+            }
+        };
+        match kind.grid() {
+            Some(grid) => each(&|x, y, cell| mosaic(&scaled, grid, inks.shades, (x, y), cell)),
+            None if kind == PreviewKind::None => {}
+            None => {
+                let ramp = Ramp::of(picture, inks.is_light);
+                each(&|x, y, cell| character(&scaled, ramp, inks, (x, y), cell));
             }
         }
     }
 }
 
-/// The character as bright as a colour: the steps of the ramp are even in the sRGB coding of luminance, which is
-/// about even to the eye.
-fn glyph(rgb: [u8; 3]) -> char {
-    let brightness = linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0));
-    let step = (brightness * (RAMP.len() - 1) as f32).round() as usize;
-    char::from(RAMP[step.min(RAMP.len() - 1)])
+/// A picture of the size at which it is drawn.
+struct Scaled<'a> {
+    width: u32,
+    height: u32,
+    pixels: &'a [[u8; 3]],
+}
+
+impl Scaled<'_> {
+    fn pixel(&self, x: u32, y: u32) -> Option<[u8; 3]> {
+        let index = (y < self.height).then(|| y as usize * self.width as usize + x as usize)?;
+        self.pixels.get(index).copied()
+    }
+}
+
+/// A cell in two colours.
+fn mosaic(scaled: &Scaled<'_>, grid: Grid, shades: &Shades, (x, y): (usize, usize), cell: &mut Cell) {
+    let (left, top) = (x as u32 * grid.columns(), y as u32 * grid.rows());
+    let part = |i: u32| scaled.pixel(left + i % grid.columns(), top + i / grid.columns());
+    let parts: Vec<Option<[u8; 3]>> = (0..grid.columns() * grid.rows()).map(part).collect();
+    let colors: Vec<[u8; 3]> = parts.iter().copied().flatten().collect();
+    if colors.len() < parts.len() {
+        // The last row of cells has no picture below.
+        let color = parts[0].map_or(Color::Reset, |rgb| shades.color(rgb, x, 2 * y));
+        cell.set_symbol("▀").set_style(Style::new().fg(color).bg(Color::Reset));
+        return;
+    }
+    let shown = shades.cell(fit(grid, &colors), x, y);
+    let [first, second] = shown.pair;
+    cell.set_char(shown.tile.symbols()[0]).set_style(Style::new().fg(first).bg(second));
+}
+
+/// A cell as a character.
+fn character(scaled: &Scaled<'_>, ramp: Ramp, inks: Inks<'_>, (x, y): (usize, usize), cell: &mut Cell) {
+    let Some(rgb) = scaled.pixel(x as u32, y as u32) else { return };
+    if inks.depth == ColorDepth::None {
+        cell.set_char(ramp.glyph(rgb));
+    } else {
+        let (symbol, ink) = ramp.tinted(rgb);
+        cell.set_char(symbol).set_style(Style::new().fg(inks.shades.color(ink, x, y)));
+    }
 }
 
 /// The picture at another size: means over the pixels covered, in linear light, weighted by how much of each is
@@ -169,6 +248,7 @@ fn mean(picture: &Picture, columns: &[(u32, f32)], rows: &[(u32, f32)]) -> [u8; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tui::fixtures::state;
 
     fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Picture {
         let pixels =
@@ -194,14 +274,24 @@ mod tests {
     fn the_aspect_is_kept_in_every_area() {
         for (columns, rows) in [(80_u16, 24_u16), (51, 20), (150, 55), (200, 20), (30, 60)] {
             for (width, height) in [(640, 480), (100, 300), (1920, 1080), (64, 64)] {
-                for (kind, per_cell) in [(PreviewKind::HalfBlock, 2.0), (PreviewKind::Ascii, 1.0)] {
+                for (kind, across, per_cell) in [
+                    (PreviewKind::HalfBlock, 1.0, 2.0),
+                    (PreviewKind::Ascii, 1.0, 1.0),
+                    (PreviewKind::Quadrant, 2.0, 2.0),
+                    (PreviewKind::Sextant, 2.0, 6.0),
+                    (PreviewKind::Octant, 2.0, 4.0),
+                ] {
                     for aspect in [1.8_f32, 2.0, 2.3] {
                         let placed = fit(width, height, (columns, rows), kind, aspect);
                         let shown_height = placed.height as f32 * aspect / per_cell;
-                        // Half a pixel of rounding on each side.
+                        let shown_width = placed.width as f32 / across;
+                        // Half a pixel of rounding on each side; where a cell has several, up to a cell.
+                        let is_fine = across > 1.0;
+                        let (off_x, off_y) =
+                            if is_fine { (1.0, aspect) } else { (0.5, 0.5 * aspect / per_cell) };
                         let wanted = width as f32 / height as f32;
-                        let low = (placed.width as f32 - 0.5) / (shown_height + 0.5 * aspect / per_cell);
-                        let high = (placed.width as f32 + 0.5) / (shown_height - 0.5 * aspect / per_cell);
+                        let low = (shown_width - off_x) / (shown_height + off_y);
+                        let high = (shown_width + off_x) / (shown_height - off_y);
                         assert!(low <= wanted && wanted <= high, "{placed:?} for {width}×{height}");
                         assert!(
                             placed.cells.width == columns || placed.cells.height == rows,
@@ -230,27 +320,32 @@ mod tests {
     }
 
     #[test]
-    fn the_ramp_goes_from_space_to_at() {
-        assert_eq!(glyph([0; 3]), ' ');
-        assert_eq!(glyph([255; 3]), '@');
-        assert_eq!(glyph([128; 3]), '+');
-        assert!(
-            RAMP.iter().position(|c| char::from(*c) == glyph([0, 255, 0]))
-                > RAMP.iter().position(|c| char::from(*c) == glyph([0, 0, 255]))
-        );
-    }
-
-    #[test]
     fn an_odd_last_row_leaves_the_lower_half_to_the_background() {
         let one = picture(2, 1, |_, _| [9, 8, 7]);
+        let state = state(2, 3);
         let mut buffer = Buffer::empty(Rect::new(0, 0, 2, 3));
         Placed::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0).draw(
             &one,
             PreviewKind::HalfBlock,
-            ColorDepth::TrueColor,
+            Inks::of(&state),
             &mut buffer,
         );
         let cell = &buffer[(0, 1)];
         assert_eq!((cell.symbol(), cell.fg, cell.bg), ("▀", Color::Rgb(9, 8, 7), Color::Reset));
+    }
+
+    #[test]
+    fn an_edge_between_the_columns_of_a_cell_is_shown_by_quadrants() {
+        let sharp = picture(8, 8, |x, _| if x < 3 { [200, 20, 20] } else { [20, 20, 200] });
+        let state = state(4, 2);
+        for (kind, symbol) in
+            [(PreviewKind::Quadrant, "▌"), (PreviewKind::Sextant, "▌"), (PreviewKind::Octant, "▌")]
+        {
+            let mut buffer = Buffer::empty(Rect::new(0, 0, 4, 2));
+            Placed::fit(&sharp, buffer.area, kind, 2.0).draw(&sharp, kind, Inks::of(&state), &mut buffer);
+            let cell = &buffer[(1, 1)];
+            let colors = (cell.symbol(), cell.fg, cell.bg);
+            assert_eq!(colors, (symbol, Color::Rgb(200, 20, 20), Color::Rgb(20, 20, 200)), "{kind:?}");
+        }
     }
 }

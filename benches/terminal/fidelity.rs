@@ -1,0 +1,313 @@
+//! How near what a terminal shows comes to the picture.
+//!
+//! Cells become pixels, and these are compared with the picture in Oklab: as they are, and blurred as an eye blurs
+//! them that does not look at single cells. Beside it chafa, with the same characters and its best dithering.
+
+use std::error::Error;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use glimt::film::Picture;
+use glimt::math::Vec3;
+use glimt::math::color::srgb8_to_linear;
+use glimt::tui::{ColorDepth, PreviewChoice, filled, shown};
+use ratatui::buffer::{Buffer, Cell};
+use ratatui::layout::Rect;
+use ratatui::style::Color;
+
+/// Pixels of a cell: a multiple of all its parts.
+const CELL: (usize, usize) = (12, 24);
+/// The blur, in pixels: a quarter of a cell's height.
+const BLUR: f32 = 6.0;
+const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 30 };
+/// A terminal's own colours, and how much of a cell the ink of its brightest character covers.
+const INK: [u8; 3] = [229; 3];
+const GROUND: [u8; 3] = [0; 3];
+
+/// A way to show a picture, by glimt and by chafa.
+struct Mode {
+    name: &'static str,
+    preview: PreviewChoice,
+    depth: ColorDepth,
+    symbols: &'static str,
+    colors: &'static str,
+}
+
+const MODES: [Mode; 8] = [
+    mode(
+        "half blocks, 24 bits",
+        PreviewChoice::HalfBlock,
+        ColorDepth::TrueColor,
+        "vhalf+solid+space",
+        "full",
+    ),
+    mode(
+        "quadrants, 24 bits",
+        PreviewChoice::Quadrant,
+        ColorDepth::TrueColor,
+        "quad+half+solid+space",
+        "full",
+    ),
+    mode(
+        "sextants, 24 bits",
+        PreviewChoice::Sextant,
+        ColorDepth::TrueColor,
+        "sextant+quad+half+solid+space",
+        "full",
+    ),
+    mode("octants, 24 bits", PreviewChoice::Octant, ColorDepth::TrueColor, "", "full"),
+    mode("half blocks, 256", PreviewChoice::HalfBlock, ColorDepth::Indexed256, "vhalf+solid+space", "256"),
+    mode("octants, 256", PreviewChoice::Octant, ColorDepth::Indexed256, "", "256"),
+    mode("half blocks, 16", PreviewChoice::HalfBlock, ColorDepth::Ansi16, "vhalf+stipple+solid+space", "16"),
+    mode("quadrants, 16", PreviewChoice::Quadrant, ColorDepth::Ansi16, "quad+half+stipple+solid+space", "16"),
+];
+
+const fn mode(
+    name: &'static str,
+    preview: PreviewChoice,
+    depth: ColorDepth,
+    symbols: &'static str,
+    colors: &'static str,
+) -> Mode {
+    Mode { name, preview, depth, symbols, colors }
+}
+
+/// Prints a table over the pictures of the bundled scenes.
+pub(crate) fn print() -> Result<(), Box<dyn Error>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/pictures");
+    println!(
+        "\nerror of what is shown in {}×{} cells, sharp and blurred; chafa in brackets",
+        WINDOW.width, WINDOW.height
+    );
+    println!("{:<22} {:>26} {:>26} {:>26}", "", "cornell_glass", "textures", "shapes");
+    for mode in MODES {
+        print!("{:<22}", mode.name);
+        for name in ["cornell_glass", "textures", "shapes"] {
+            let file = folder.join(name).with_extension("png");
+            let own = errors(&file, |picture, _| Ok(Some(shown(picture, mode.preview, mode.depth, WINDOW))))?;
+            let mut best: Option<[f32; 2]> = None;
+            for dither in ["none", "ordered", "diffusion"] {
+                let found = errors(&file, |_, area| chafa(&file, area, &mode, dither))?;
+                let is_better = |found: &[f32; 2]| best.is_none_or(|best| found[1] < best[1]);
+                best = found.filter(is_better).or(best);
+            }
+            let [sharp, blurred] = own.unwrap_or_default();
+            let others = best.map_or("–".to_owned(), |[sharp, blurred]| format!("{sharp:.1} {blurred:.2}"));
+            print!(" {:>26}", format!("{sharp:.1} {blurred:.2} ({others})"));
+        }
+        println!();
+    }
+    Ok(())
+}
+
+/// The errors of a picture in the cells that `draw` makes of it, which are those of a picture without a border.
+fn errors(
+    file: &Path,
+    draw: impl Fn(&Picture, Rect) -> Result<Option<Buffer>, Box<dyn Error>>,
+) -> Result<Option<[f32; 2]>, Box<dyn Error>> {
+    let image = image::open(file)?.to_rgb8();
+    let pixels = image.pixels().map(|pixel| pixel.0).collect();
+    let picture = Picture { width: image.width(), height: image.height(), pixels };
+    let place = place(&shown(&picture, PreviewChoice::HalfBlock, ColorDepth::TrueColor, WINDOW));
+    let Some(buffer) = draw(&picture, place)? else { return Ok(None) };
+    let area = if buffer.area == WINDOW { place } else { buffer.area };
+    let seen = Plane::of_cells(&buffer, area);
+    let truth = Plane::of_picture(&picture, seen.width, seen.height);
+    Ok(Some([seen.error(&truth), seen.blurred().error(&truth.blurred())]))
+}
+
+/// Where the picture is.
+fn place(buffer: &Buffer) -> Rect {
+    let is_picture = |x: u16, y: u16| buffer[(x, y)].symbol() != " ";
+    let columns: Vec<u16> =
+        (0..buffer.area.width).filter(|x| (0..buffer.area.height).any(|y| is_picture(*x, y))).collect();
+    let rows: Vec<u16> =
+        (0..buffer.area.height).filter(|y| (0..buffer.area.width).any(|x| is_picture(x, *y))).collect();
+    let (Some(left), Some(top)) = (columns.first(), rows.first()) else { return buffer.area };
+    Rect::new(*left, *top, columns.len() as u16, rows.len() as u16)
+}
+
+/// The picture by chafa in these cells; none where there is no chafa, or where it has no such characters.
+fn chafa(file: &Path, area: Rect, mode: &Mode, dither: &str) -> Result<Option<Buffer>, Box<dyn Error>> {
+    if mode.symbols.is_empty() {
+        return Ok(None);
+    }
+    let size = format!("{}x{}", area.width, area.height);
+    let output = Command::new("chafa")
+        .args(["--format", "symbols", "--symbols", mode.symbols, "--colors", mode.colors, "--dither", dither])
+        .args(["--work", "9", "--stretch", "--size", &size])
+        .arg(file)
+        .stderr(Stdio::null())
+        .output();
+    let Some(output) = output.ok().filter(|output| output.status.success()) else { return Ok(None) };
+    let side = |length: u16| std::num::NonZero::new(length).ok_or("an empty window");
+    let mut terminal = vt100::Parser::new(side(area.height + 1)?, side(area.width)?, 0);
+    let bytes: Vec<u8> = output
+        .stdout
+        .iter()
+        .flat_map(|byte| match byte {
+            b'\n' => vec![b'\r', b'\n'],
+            byte => vec![*byte],
+        })
+        .collect();
+    terminal.process(&bytes);
+    let mut buffer = Buffer::empty(Rect::new(0, 0, area.width, area.height));
+    for y in 0..area.height {
+        for x in 0..area.width {
+            if let Some(cell) = terminal.screen().cell(y, x) {
+                copy(cell, &mut buffer[(x, y)]);
+            }
+        }
+    }
+    Ok(Some(buffer))
+}
+
+fn copy(from: &vt100::Cell, to: &mut Cell) {
+    let color = |color| match color {
+        vt100::Color::Default => Color::Reset,
+        vt100::Color::Idx(index) => Color::Indexed(index),
+        vt100::Color::Rgb(r, g, b) => Color::Rgb(r, g, b),
+    };
+    let (mut fg, mut bg) = (color(from.fgcolor()), color(from.bgcolor()));
+    if from.inverse() {
+        let own = |color, own: [u8; 3]| {
+            if color == Color::Reset { Color::Rgb(own[0], own[1], own[2]) } else { color }
+        };
+        (fg, bg) = (own(bg, GROUND), own(fg, INK));
+    }
+    to.set_symbol(if from.has_contents() { from.contents() } else { " " }).set_fg(fg).set_bg(bg);
+}
+
+/// Linear light.
+struct Plane {
+    width: usize,
+    height: usize,
+    pixels: Vec<Vec3>,
+}
+
+impl Plane {
+    fn of_cells(buffer: &Buffer, area: Rect) -> Self {
+        let (width, height) = (usize::from(area.width) * CELL.0, usize::from(area.height) * CELL.1);
+        let pixel = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            let cell = &buffer[(area.x + (x / CELL.0) as u16, area.y + (y / CELL.1) as u16)];
+            let place = y % CELL.1 / (CELL.1 / 12) * 2 + x % CELL.0 / (CELL.0 / 2);
+            let symbol = cell.symbol().chars().next().unwrap_or(' ');
+            let is_ink = filled(symbol).is_some_and(|filled| filled[place]);
+            srgb8_to_linear(if is_ink { rgb(cell.fg, INK) } else { rgb(cell.bg, GROUND) })
+        };
+        Self { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+
+    fn of_picture(picture: &Picture, width: usize, height: usize) -> Self {
+        let linear = picture.pixels.iter().map(|pixel| srgb8_to_linear(*pixel)).collect();
+        let image =
+            glimt::film::RadianceImage { width: picture.width, height: picture.height, pixels: linear };
+        let pixels = image.resized(width as u32, height as u32).pixels;
+        Self { width, height, pixels }
+    }
+
+    /// By a Gaussian, along the rows and then along the columns.
+    fn blurred(&self) -> Self {
+        let reach = (3.0 * BLUR) as isize;
+        let weights: Vec<f32> = (-reach..=reach).map(|i| (-(i as f32 / BLUR).powi(2) / 2.0).exp()).collect();
+        let all: f32 = weights.iter().sum();
+        let along = |pixels: &[Vec3], step: [isize; 2]| -> Vec<Vec3> {
+            let at = |x: isize, y: isize| {
+                let x = x.clamp(0, self.width as isize - 1) as usize;
+                let y = y.clamp(0, self.height as isize - 1) as usize;
+                pixels[y * self.width + x]
+            };
+            let mean = |i: usize| {
+                let (x, y) = ((i % self.width) as isize, (i / self.width) as isize);
+                let offsets = (-reach..=reach).zip(&weights);
+                offsets.map(|(i, weight)| at(x + i * step[0], y + i * step[1]) * *weight).sum::<Vec3>() / all
+            };
+            (0..pixels.len()).map(mean).collect()
+        };
+        let pixels = along(&along(&self.pixels, [1, 0]), [0, 1]);
+        Self { pixels, ..*self }
+    }
+
+    /// The root of the mean squared distance in Oklab, in percent of that from black to white.
+    fn error(&self, other: &Self) -> f32 {
+        let squares = self
+            .pixels
+            .iter()
+            .zip(&other.pixels)
+            .map(|(a, b)| f64::from(oklab(*a).distance_squared(oklab(*b))));
+        100.0 * (squares.sum::<f64>() / self.pixels.len() as f64).sqrt() as f32
+    }
+}
+
+fn oklab(linear: Vec3) -> Vec3 {
+    let rows = |rows: [[f32; 3]; 3], v: Vec3| Vec3::from_array(rows.map(|row| Vec3::from_array(row).dot(v)));
+    let cones = rows(
+        [
+            [0.412_221_46, 0.536_332_55, 0.051_445_995],
+            [0.211_903_5, 0.680_699_5, 0.107_396_96],
+            [0.088_302_46, 0.281_718_85, 0.629_978_7],
+        ],
+        linear.max(Vec3::ZERO),
+    );
+    rows(
+        [
+            [0.210_454_26, 0.793_617_8, -0.004_072_047],
+            [1.977_998_5, -2.428_592_2, 0.450_593_7],
+            [0.025_904_037, 0.782_771_77, -0.808_675_77],
+        ],
+        Vec3::from_array(cones.to_array().map(f32::cbrt)),
+    )
+}
+
+/// As xterm shows it.
+fn rgb(color: Color, own: [u8; 3]) -> [u8; 3] {
+    let named = |index: usize| {
+        const XTERM: [[u8; 3]; 16] = [
+            [0, 0, 0],
+            [205, 0, 0],
+            [0, 205, 0],
+            [205, 205, 0],
+            [0, 0, 238],
+            [205, 0, 205],
+            [0, 205, 205],
+            [229, 229, 229],
+            [127, 127, 127],
+            [255, 0, 0],
+            [0, 255, 0],
+            [255, 255, 0],
+            [92, 92, 255],
+            [255, 0, 255],
+            [0, 255, 255],
+            [255, 255, 255],
+        ];
+        XTERM[index]
+    };
+    match color {
+        Color::Reset => own,
+        Color::Rgb(r, g, b) => [r, g, b],
+        Color::Indexed(index @ 0..16) => named(usize::from(index)),
+        Color::Indexed(index @ 16..232) => {
+            let level = |step: usize| [0, 95, 135, 175, 215, 255][step % 6];
+            let i = usize::from(index) - 16;
+            [level(i / 36), level(i / 6), level(i)]
+        }
+        Color::Indexed(index) => [8 + 10 * (index - 232); 3],
+        Color::Black => named(0),
+        Color::Red => named(1),
+        Color::Green => named(2),
+        Color::Yellow => named(3),
+        Color::Blue => named(4),
+        Color::Magenta => named(5),
+        Color::Cyan => named(6),
+        Color::Gray => named(7),
+        Color::DarkGray => named(8),
+        Color::LightRed => named(9),
+        Color::LightGreen => named(10),
+        Color::LightYellow => named(11),
+        Color::LightBlue => named(12),
+        Color::LightMagenta => named(13),
+        Color::LightCyan => named(14),
+        Color::White => named(15),
+    }
+}

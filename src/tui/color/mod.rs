@@ -1,0 +1,154 @@
+//! How many colours the terminal has, and how others are shown by them.
+
+mod mix;
+mod oklab;
+mod palette;
+mod pattern;
+mod shades;
+
+use ratatui::style::Color;
+
+pub(super) use self::oklab::oklab;
+pub(super) use self::palette::{Ansi, XTERM, ansi, fixed, nearest_256};
+pub(super) use self::pattern::coarse;
+pub(super) use self::shades::Shades;
+use crate::choice;
+
+choice! {
+    /// Which colours are used.
+    pub enum ColorChoice {
+        /// What the terminal can show.
+        Auto = "auto",
+        /// 24 bits.
+        TrueColor = "truecolor",
+        /// The palette of 256: the 6×6×6 cube and the greys of xterm.
+        Indexed256 = "256",
+        /// The palette of 16 of xterm.
+        Ansi16 = "16",
+        /// None.
+        None = "none",
+    }
+}
+
+/// What the terminal gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColorDepth {
+    /// 24 bits.
+    TrueColor,
+    /// The 6×6×6 cube and the greys of xterm.
+    Indexed256,
+    /// The 16 colours of xterm.
+    Ansi16,
+    /// None at all.
+    None,
+}
+
+/// The depth for a choice, in an environment.
+pub(super) fn depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
+    match choice {
+        ColorChoice::TrueColor => ColorDepth::TrueColor,
+        ColorChoice::Indexed256 => ColorDepth::Indexed256,
+        ColorChoice::Ansi16 => ColorDepth::Ansi16,
+        ColorChoice::None => ColorDepth::None,
+        ColorChoice::Auto => detected(variable),
+    }
+}
+
+/// `NO_COLOR` first (no-color.org), then `COLORTERM`, then the names in `TERM` and `TERM_PROGRAM`: SSH often
+/// forwards `TERM` only.
+fn detected(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
+    let get = |name: &str| variable(name).unwrap_or_default();
+    let term = get("TERM");
+    if !get("NO_COLOR").is_empty() || has_no_colors(&term) {
+        return ColorDepth::None;
+    }
+    // GNU screen passes COLORTERM of the terminal around it on and does not know 24 bits itself.
+    let in_screen = term.starts_with("screen") && get("TMUX").is_empty();
+    let says_true = matches!(get("COLORTERM").as_str(), "truecolor" | "24bit");
+    if in_screen {
+        ColorDepth::Indexed256
+    } else if says_true || is_true_color(&term, &get("TERM_PROGRAM")) {
+        ColorDepth::TrueColor
+    } else if ["256color", "tmux", "screen", "xterm", "rxvt"].iter().any(|name| term.contains(name)) {
+        ColorDepth::Indexed256
+    } else {
+        ColorDepth::Ansi16
+    }
+}
+
+fn has_no_colors(term: &str) -> bool {
+    term == "dumb" || term.starts_with("vt1") || term.starts_with("vt2") || term.ends_with("-mono")
+}
+
+fn is_true_color(term: &str, program: &str) -> bool {
+    const TERMS: [&str; 8] = ["kitty", "alacritty", "foot", "wezterm", "ghostty", "contour", "iterm2", "rio"];
+    const PROGRAMS: [&str; 4] = ["iTerm.app", "WezTerm", "ghostty", "vscode"];
+    // Inside tmux TERM_PROGRAM is `tmux`, so that what the outer terminal can do does not leak in.
+    term.ends_with("-direct") || TERMS.iter().any(|name| term.contains(name)) || PROGRAMS.contains(&program)
+}
+
+/// Whether the environment says that the terminal's background is light: rxvt's `COLORFGBG`, which some others set as well.
+pub(super) fn has_light_background(variable: impl Fn(&str) -> Option<String>) -> bool {
+    let last = variable("COLORFGBG").and_then(|colors| colors.rsplit(';').next()?.parse::<u8>().ok());
+    last.is_some_and(|index| index == 7 || (9..16).contains(&index))
+}
+
+/// The names of the 16 colours.
+const NAMES: [Color; 16] = [
+    Color::Black,
+    Color::Red,
+    Color::Green,
+    Color::Yellow,
+    Color::Blue,
+    Color::Magenta,
+    Color::Cyan,
+    Color::Gray,
+    Color::DarkGray,
+    Color::LightRed,
+    Color::LightGreen,
+    Color::LightYellow,
+    Color::LightBlue,
+    Color::LightMagenta,
+    Color::LightCyan,
+    Color::White,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn auto(pairs: &[(&str, &str)]) -> ColorDepth {
+        depth(ColorChoice::Auto, |name| {
+            pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+        })
+    }
+
+    #[test]
+    fn the_environment_decides() {
+        assert_eq!(auto(&[("TERM", "xterm-256color")]), ColorDepth::Indexed256);
+        assert_eq!(auto(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor")]), ColorDepth::TrueColor);
+        assert_eq!(auto(&[("TERM", "xterm-kitty")]), ColorDepth::TrueColor);
+        assert_eq!(auto(&[("TERM", "xterm-direct")]), ColorDepth::TrueColor);
+        assert_eq!(auto(&[("TERM", "dumb"), ("COLORTERM", "truecolor")]), ColorDepth::None);
+        assert_eq!(auto(&[("TERM", "linux")]), ColorDepth::Ansi16);
+        assert_eq!(auto(&[]), ColorDepth::Ansi16);
+        assert_eq!(auto(&[("TERM", "screen-256color"), ("COLORTERM", "truecolor")]), ColorDepth::Indexed256);
+        let tmux = [("TERM", "screen-256color"), ("COLORTERM", "truecolor"), ("TMUX", "/tmp/tmux")];
+        assert_eq!(auto(&tmux), ColorDepth::TrueColor);
+        assert_eq!(auto(&[("TERM", "tmux-256color")]), ColorDepth::Indexed256);
+    }
+
+    #[test]
+    fn backgrounds_are_dark_unless_said_otherwise() {
+        let light = |colors: Option<&str>| has_light_background(|_| colors.map(str::to_owned));
+        assert!(light(Some("0;15")) && light(Some("0;default;7")));
+        assert!(!light(Some("15;0")) && !light(Some("15;8")) && !light(Some("15;default")) && !light(None));
+    }
+
+    #[test]
+    fn no_color_counts_unless_empty_and_the_option_beats_it() {
+        assert_eq!(auto(&[("NO_COLOR", "1"), ("COLORTERM", "truecolor")]), ColorDepth::None);
+        assert_eq!(auto(&[("NO_COLOR", ""), ("COLORTERM", "truecolor")]), ColorDepth::TrueColor);
+        assert_eq!(depth(ColorChoice::Ansi16, |_| Some("1".to_owned())), ColorDepth::Ansi16);
+    }
+}

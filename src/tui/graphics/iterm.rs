@@ -1,0 +1,19 @@
+//! iTerm2's inline images (iterm2.com/documentation-images.html): PNG in base64.
+
+use ratatui::layout::Rect;
+
+use super::base64::encoded;
+use super::png;
+use crate::film::Picture;
+
+/// The command that shows a picture at the cursor over these cells.
+pub(super) fn encode(picture: &Picture, cells: Rect) -> Vec<u8> {
+    let png = png(picture);
+    let keys = format!(
+        "\x1b]1337;File=inline=1;size={};width={};height={};preserveAspectRatio=0;doNotMoveCursor=1:",
+        png.len(),
+        cells.width,
+        cells.height
+    );
+    [keys.as_bytes(), &encoded(&png), b"\x07"].concat()
+}

@@ -1,0 +1,108 @@
+use super::*;
+
+fn noise(level: u8, i: u32) -> [u8; 3] {
+    let hash = (i + 1).wrapping_mul(0x9E37_79B1) ^ (i * i).wrapping_mul(0x85EB_CA77);
+    [level, (hash >> 13) as u8, (hash >> 22) as u8]
+}
+
+fn placement(level: u8, x: u16) -> Placement {
+    let pixels = (0..64 * 48).map(|i| noise(level, i)).collect();
+    let picture = Arc::new(Picture { width: 64, height: 48, pixels });
+    Placement { picture, cells: Rect::new(x, 1, 8, 3), cell: (8, 16) }
+}
+
+fn all(images: &mut Images) -> String {
+    let slices = std::iter::from_fn(|| images.slice(5000, None)).flatten().collect();
+    String::from_utf8(slices).expect("ASCII")
+}
+
+#[test]
+fn a_picture_is_sent_once_and_the_newest_after_it() {
+    let mut images = Images::new(Protocol::Kitty, false);
+    assert!(images.is_complete() && images.slice(5000, None).is_none());
+    let (first, second, third) = (placement(1, 2), placement(2, 2), placement(3, 2));
+    images.aim(Some(first), false);
+    let begin = String::from_utf8(images.slice(100, None).expect("a piece")).expect("ASCII");
+    assert!(begin.starts_with("\x1b_Ga=T,f=100,i=6777961,p=1,c=8,r=3,C=1,q=2,m=1;"), "{begin}");
+    // While it is on its way the next ones come; the last of them follows it.
+    images.aim(Some(second), false);
+    images.aim(Some(third.clone()), true);
+    let rest = all(&mut images);
+    assert_eq!(rest.matches("a=T").count(), 1);
+    assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "each is shown at its place by its last chunk");
+    assert!(images.is_complete());
+    images.aim(Some(third), true);
+    assert_eq!(all(&mut images), "");
+}
+
+#[test]
+fn chunks_of_kitty_are_short_and_the_other_image_is_deleted() {
+    let mut images = Images::new(Protocol::Kitty, false);
+    images.aim(Some(placement(1, 2)), true);
+    let first = all(&mut images);
+    for command in first.split("\x1b\\").filter(|command| command.contains(';') && command.contains("_G")) {
+        let data = command.rsplit(';').next().expect("data");
+        assert!(data.len() <= 4096);
+    }
+    assert!(first.contains("a=d,d=I,i=7173121,q=2"));
+    images.aim(Some(placement(2, 2)), true);
+    let second = all(&mut images);
+    assert!(second.contains("a=T,f=100,i=7173121") && second.contains("a=d,d=I,i=6777961,q=2"));
+}
+
+#[test]
+fn a_picture_that_moves_or_goes_uncovers_its_cells() {
+    for protocol in [Protocol::Kitty, Protocol::Sixel, Protocol::Iterm] {
+        let mut images = Images::new(protocol, false);
+        assert_eq!(images.aim(Some(placement(1, 2)), true), None);
+        all(&mut images);
+        assert_eq!(images.aim(Some(placement(2, 2)), true), None, "another one in its place");
+        all(&mut images);
+        assert_eq!(images.aim(Some(placement(2, 3)), true), Some(Rect::new(2, 1, 8, 3)));
+        all(&mut images);
+        assert_eq!(images.aim(None, true), Some(Rect::new(3, 1, 8, 3)));
+        assert_eq!(all(&mut images).contains("a=d"), protocol == Protocol::Kitty);
+        assert!(images.is_complete());
+    }
+}
+
+#[test]
+fn slow_lines_get_coarser_pictures_until_one_stays() {
+    let mut images = Images::new(Protocol::Iterm, false);
+    let picture = placement(1, 2);
+    images.aim(Some(picture.clone()), false);
+    let coarse = images.slice(5000, Some(1000.0)).expect("a picture").len();
+    assert!(images.is_complete());
+    images.aim(Some(picture), true);
+    assert!(!images.is_complete(), "it stays, and may take longer");
+    let fine = images.slice(5000, Some(10_000.0)).expect("a picture").len();
+    assert!(coarse * 4 < fine, "{coarse} {fine}");
+    assert!(images.is_complete());
+}
+
+#[test]
+fn tmux_passes_on_what_is_wrapped() {
+    assert_eq!(wrapped(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
+    let mut images = Images::new(Protocol::Iterm, true);
+    images.aim(Some(placement(1, 2)), true);
+    let bytes = all(&mut images);
+    assert!(
+        bytes.starts_with("\x1b7\x1b[2;3H\x1b[0m \x1bPtmux;\x1b\x1b[D\x1b\x1b]1337;File=inline=1;size="),
+        "{bytes}"
+    );
+    assert!(bytes.ends_with("\x07\x1b\\\x1b8"));
+}
+
+#[test]
+fn sixels_have_the_size_of_their_cells_and_their_colours() {
+    let mut placed = placement(0, 0);
+    let pixels = (0..64 * 48).map(|i| if i % 64 < 32 { [255, 0, 0] } else { [0, 0, 255] }).collect();
+    placed.picture = Arc::new(Picture { width: 64, height: 48, pixels });
+    let mut images = Images::new(Protocol::Sixel, true);
+    images.aim(Some(placed), true);
+    let bytes = all(&mut images);
+    assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#21;2;0;0;100#196;2;100;0;0"), "{bytes}");
+    assert!(bytes.contains("#21!32?!32~$#196!32~$-"), "{bytes}");
+    assert!(bytes.ends_with("-\x1b\\\x1b8"));
+    assert_eq!(bytes.matches('-').count(), 8, "48 rows are 8 bands");
+}

@@ -1,0 +1,104 @@
+//! What terminals are known to have, by the names that they tell, and what they are asked.
+
+/// The finest blocks that a terminal draws itself, whatever its font.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Blocks {
+    /// Nothing is known.
+    Unknown,
+    /// Unicode 13.
+    Sextants,
+    /// Unicode 16.
+    Octants,
+}
+
+/// Names as XTVERSION has them, with the first version that draws octants; all of them draw sextants since long.
+const KNOWN: [(&str, Option<[u32; 2]>); 6] = [
+    ("kitty", Some([0, 40])),
+    ("foot", Some([1, 20])),
+    ("ghostty", Some([1, 2])),
+    ("VTE", Some([7800, 0])),
+    ("WezTerm", None),
+    ("contour", None),
+];
+
+impl Blocks {
+    /// By name and version: `foot(1.20.2)`, `ghostty 1.2.0`.
+    pub(super) fn of(report: &str) -> Self {
+        let (name, version) = report.split_at(report.find(['(', ' ']).unwrap_or(report.len()));
+        let Some((_, octants)) = KNOWN.iter().find(|(known, _)| name.eq_ignore_ascii_case(known)) else {
+            return Self::Unknown;
+        };
+        let mut numbers = version[version.len().min(1)..].split(|c: char| !c.is_ascii_digit());
+        let mut number = || numbers.next().and_then(|digits| digits.parse().ok()).unwrap_or(0_u32);
+        let version = [number(), number()];
+        if octants.is_some_and(|least| version >= least) { Self::Octants } else { Self::Sextants }
+    }
+}
+
+/// What the terminal is asked of itself: what is of use, and where it is the terminal that answers. An answer to what was not
+/// asked is not believed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Ask {
+    /// Which blocks it draws, by its name.
+    pub(super) blocks: bool,
+    /// Whether it has 24 bits of colour.
+    pub(super) true_color: bool,
+    /// Its background.
+    pub(super) background: bool,
+    /// Its 16 colours.
+    pub(super) palette: bool,
+}
+
+impl Ask {
+    /// The bytes of the questions.
+    pub(super) fn questions(self) -> Vec<u8> {
+        let mut questions = Vec::new();
+        let mut ask = |is_asked: bool, bytes: &[u8]| {
+            if is_asked {
+                questions.extend_from_slice(bytes);
+            }
+        };
+        ask(self.blocks, b"\x1b[>q");
+        // `RGB` and `Tc`, in hexadecimal digits.
+        ask(self.true_color, b"\x1bP+q524742\x1b\\\x1bP+q5463\x1b\\");
+        ask(self.background, b"\x1b]11;?\x1b\\");
+        for index in 0..16 {
+            ask(self.palette, format!("\x1b]4;{index};?\x1b\\").as_bytes());
+        }
+        questions
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_of_use_is_asked() {
+        assert!(Ask::default().questions().is_empty());
+        assert_eq!(Ask { blocks: true, ..Ask::default() }.questions(), b"\x1b[>q");
+        let palette = Ask { palette: true, ..Ask::default() }.questions();
+        assert!(palette.ends_with(b"\x1b]4;15;?\x1b\\"));
+    }
+
+    #[test]
+    fn octants_came_with_a_version() {
+        for (report, blocks) in [
+            ("kitty(0.40.1)", Blocks::Octants),
+            ("kitty(0.35.2)", Blocks::Sextants),
+            ("foot(1.20.2)", Blocks::Octants),
+            ("foot(1.9.0)", Blocks::Sextants),
+            ("ghostty 1.2.0", Blocks::Octants),
+            ("ghostty 1.1.3-arch2", Blocks::Sextants),
+            ("VTE(7802)", Blocks::Octants),
+            ("WezTerm 20240203-110809-5046fc22", Blocks::Sextants),
+            ("contour 0.6.0", Blocks::Sextants),
+            ("kitty", Blocks::Sextants),
+            ("tmux 3.4", Blocks::Unknown),
+            ("XTerm(390)", Blocks::Unknown),
+            ("", Blocks::Unknown),
+        ] {
+            assert_eq!(Blocks::of(report), blocks, "{report}");
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! What the terminal says of itself.
+
+use super::resized_preview;
+use crate::tui::color::{ColorDepth, Shades};
+use crate::tui::event::Effect;
+use crate::tui::input::Answer;
+use crate::tui::known::Blocks;
+use crate::tui::state::{PreviewKind, State};
+use crate::tui::view::ramp;
+
+/// Shows things as the terminal can from now on, where it was asked.
+pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
+    match answer {
+        Answer::Blocks(blocks) if state.ask.blocks => return draw_in(state, blocks),
+        Answer::TrueColor if state.ask.true_color => show(state, ColorDepth::TrueColor),
+        Answer::Ink { index, rgb } if state.ask.palette => {
+            if let Some(ink) = state.ansi.get_mut(usize::from(index)).filter(|ink| **ink != rgb) {
+                *ink = rgb;
+                show(state, state.depth);
+            }
+        }
+        Answer::Background(rgb) if state.ask.background => {
+            let is_light = ramp::is_light(rgb);
+            state.dirty |= std::mem::replace(&mut state.is_light, is_light) != is_light;
+        }
+        Answer::Blocks(_)
+        | Answer::TrueColor
+        | Answer::Ink { .. }
+        | Answer::Background(_)
+        | Answer::Ready
+        | Answer::Attributes
+        | Answer::Synchronized { .. }
+        | Answer::Other => {}
+    }
+    Vec::new()
+}
+
+fn show(state: &mut State, depth: ColorDepth) {
+    state.depth = depth;
+    state.shades = Shades::new(depth, &state.ansi);
+    state.dirty = true;
+}
+
+fn draw_in(state: &mut State, blocks: Blocks) -> Vec<Effect> {
+    let kind = match blocks {
+        Blocks::Unknown => return Vec::new(),
+        Blocks::Sextants => PreviewKind::Sextant,
+        Blocks::Octants => PreviewKind::Octant,
+    };
+    if state.preview == PreviewKind::HalfBlock {
+        state.preview = kind;
+        state.dirty = true;
+    }
+    resized_preview(state)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::protocol::Command;
+    use crate::tui::color::XTERM;
+    use crate::tui::fixtures::{state, state_with};
+    use crate::tui::known::Ask;
+    use crate::tui::update::start;
+
+    #[test]
+    fn a_terminal_that_draws_octants_gets_a_finer_picture() {
+        let mut state = state(80, 24);
+        start(&mut state);
+        let before = state.requested.expect("a size");
+        assert!(learn(&mut state, Answer::Blocks(Blocks::Octants)).is_empty(), "nobody asked");
+        state.ask = Ask { blocks: true, ..Ask::default() };
+        let effects = learn(&mut state, Answer::Blocks(Blocks::Octants));
+        let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!((size.width, size.height), (2 * before.width, 2 * before.height));
+        assert_eq!(state.preview, PreviewKind::Octant);
+    }
+
+    #[test]
+    fn colours_and_background_are_believed_when_they_were_asked() {
+        let mut state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::Ansi16, Default::default());
+        let answers = [
+            Answer::Ink { index: 1, rgb: [180, 30, 30] },
+            Answer::Ink { index: 200, rgb: [180, 30, 30] },
+            Answer::Background([255; 3]),
+            Answer::TrueColor,
+        ];
+        for answer in answers {
+            learn(&mut state, answer);
+        }
+        assert_eq!((state.ansi, state.is_light, state.depth), (XTERM, false, ColorDepth::Ansi16));
+        state.ask = Ask { true_color: true, background: true, palette: true, ..Ask::default() };
+        for answer in answers {
+            learn(&mut state, answer);
+        }
+        assert_eq!(state.ansi[1], [180, 30, 30]);
+        assert_eq!((state.is_light, state.depth), (true, ColorDepth::TrueColor));
+    }
+}

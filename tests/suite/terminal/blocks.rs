@@ -1,0 +1,59 @@
+//! What the picture is made of, as the terminal says what it is.
+
+use super::pty::{Folder, SCENE};
+
+/// A board seen from the side: its edges are oblique.
+fn oblique() -> String {
+    SCENE.replace("[camera]", "[camera]\nup = [0.3, 1, 0]")
+}
+
+fn has_finer_blocks(screen: &vt100::Screen) -> bool {
+    screen
+        .contents()
+        .chars()
+        .any(|symbol| matches!(symbol, '▖'..='▟' | '▌' | '▐' | '\u{1CD00}'..='\u{1CEAB}'))
+}
+
+#[test]
+fn a_terminal_that_tells_its_name_gets_its_finest_blocks() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &oblique());
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.wait_for_color("red");
+    assert!(!terminal.settled(has_finer_blocks), "nothing is known yet");
+    terminal.press("\x1bP>|kitty(0.40.1)\x1b\\");
+    terminal.wait("finer blocks", has_finer_blocks);
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
+
+#[test]
+fn the_option_decides_whatever_the_terminal_says() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &oblique());
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "--preview", "halfblock"], &[]);
+    terminal.wait_for_render(1);
+    terminal.press("\x1bP>|kitty(0.40.1)\x1b\\");
+    assert!(!terminal.settled(has_finer_blocks));
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
+
+#[test]
+fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
+    for protocol in ["kitty", "sixel", "iterm2"] {
+        let folder = Folder::new();
+        let call = [folder.program(), "scene.toml", "--preview", protocol];
+        let mut terminal = folder.terminal_with(&call, &[]);
+        terminal.wait_for_render(1);
+        let has_blocks = |screen: &vt100::Screen| screen.contents().contains('▀');
+        assert!(!terminal.settled(has_blocks), "{protocol}: the picture is in pixels");
+        terminal.press("?");
+        terminal.wait("half blocks beside the help", has_blocks);
+        terminal.press("?");
+        terminal.wait("pixels again", |screen| !has_blocks(screen));
+        terminal.press("q");
+        assert_eq!(terminal.end(), 0);
+    }
+}
