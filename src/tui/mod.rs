@@ -13,6 +13,7 @@ mod keymap;
 mod line;
 mod options;
 pub mod paint;
+mod parting;
 mod run;
 mod signals;
 mod state;

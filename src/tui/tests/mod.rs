@@ -2,6 +2,8 @@
 
 mod flow;
 mod keys;
+mod layout;
+mod overlay;
 mod screen;
 
 use ratatui::style::Color;

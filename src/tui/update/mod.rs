@@ -1,6 +1,7 @@
 //! State and event in, effects out. Nothing here touches the world.
 
 mod keys;
+mod overlay;
 mod worker;
 
 use std::time::{Duration, Instant};
@@ -50,6 +51,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Changed(Changed { noticed }) => {
             state.message = None;
             state.is_settled = false;
+            state.edits += 1;
             let effects = render(state, false);
             state.change = Some(PendingChange { generation: state.generation, noticed });
             effects
@@ -132,6 +134,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     let (now, bars) = (state.now, state.assets.len());
     state.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
     state.dirty |= state.assets.len() != bars;
+    state.dirty |= state.views.take_if(|end| now >= *end).is_some();
     if state.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
     }
