@@ -78,7 +78,11 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         let _ = tap.join();
     }
     if let Ok(ended) = &outcome {
-        writes.said(ended.is_write_unanswered, has_ended).iter().for_each(|line| console.say(line));
+        let mut said = writes.said(ended.is_write_unanswered, has_ended);
+        if said.is_empty() && ended.status == ExitStatus::QUIT {
+            said.push(ended.summary.clone());
+        }
+        said.iter().for_each(|line| console.say(line));
     }
     outcome.map(|ended| Exit(ended.status.0)).map_err(|error| {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };

@@ -5,26 +5,26 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use super::action::Action;
 use super::event::KeyPress;
 
-/// One line of the table.
-pub(super) struct Binding {
+/// One line of a table.
+pub(super) struct Binding<A = Action> {
     /// The keys that do it.
     pub keys: &'static [KeyPress],
     /// How they are written in the help; empty: the line before says it.
     pub label: &'static str,
-    pub action: Action,
+    pub action: A,
     /// What it does, for the help; empty: the line before says it.
     pub help: &'static str,
-    /// One word for the bottom line; empty: not there. Those of the pane of errors are there while it is open.
+    /// One word for the line of keys; empty: not there.
     pub hint: &'static str,
 }
 
-const fn binding(
+const fn binding<A: Copy>(
     keys: &'static [KeyPress],
     label: &'static str,
-    action: Action,
+    action: A,
     help: &'static str,
     hint: &'static str,
-) -> Binding {
+) -> Binding<A> {
     Binding { keys, label, action, help, hint }
 }
 
@@ -37,17 +37,18 @@ const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
 pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, "show or hide this help", "help"),
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
-    binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", "shadows"),
-    binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", "dof"),
+    binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", ""),
+    binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", ""),
     binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on, off", ""),
-    binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", "path"),
+    binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", ""),
     binding(
         &[KeyPress::plain('v')],
         "v",
         Action::NextView,
-        "next view: normals, depth, …; V: previous view",
-        "view",
+        "next view, and a list of them: 1-9 choose; V: previous view",
+        "",
     ),
+    binding(&[KeyPress::special(KeyCode::Tab)], "tab", Action::PictureAlone, "the picture alone", "picture"),
     binding(&[KeyPress::plain('V')], "", Action::PreviousView, "", ""),
     binding(
         &[LEFT, KeyPress::plain('h')],
@@ -102,25 +103,46 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the image as it is now", "write"),
     binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "back to the scene's own settings", "reset"),
     binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", ""),
-    binding(
-        &[KeyPress::special(KeyCode::PageUp)],
-        "PgUp PgDn",
-        Action::ScrollUp,
-        "scroll the errors, as up and down do",
-        "scroll",
-    ),
-    binding(&[KeyPress::special(KeyCode::PageDown)], "", Action::ScrollDown, "", ""),
-    binding(
-        &[KeyPress::special(KeyCode::Esc)],
-        "Esc",
-        Action::Close,
-        "close the help or the errors",
-        "close",
-    ),
     binding(&[KeyPress::ctrl('l')], "ctrl-l", Action::Redraw, "draw the screen anew", ""),
     binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "stop and go back to the shell", ""),
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];
+
+/// What a key can mean while the help, the errors or the list of views are open, before what it means else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Overlay {
+    LineUp,
+    LineDown,
+    PageUp,
+    PageDown,
+    Close,
+}
+
+/// The keys of what lies over the picture.
+pub(super) const OVERLAY: &[Binding<Overlay>] = &[
+    binding(
+        &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
+        "j k",
+        Overlay::LineDown,
+        "or down, up: scroll the help or the errors",
+        "scroll",
+    ),
+    binding(&[KeyPress::plain('k'), KeyPress::special(KeyCode::Up)], "", Overlay::LineUp, "", ""),
+    binding(
+        &[KeyPress::special(KeyCode::PageDown)],
+        "PgDn PgUp",
+        Overlay::PageDown,
+        "scroll them by a page",
+        "page",
+    ),
+    binding(&[KeyPress::special(KeyCode::PageUp)], "", Overlay::PageUp, "", ""),
+    binding(&[KeyPress::special(KeyCode::Esc)], "esc", Overlay::Close, "close what is open", "close"),
+];
+
+/// What a key means to what lies over the picture, if anything.
+pub(super) fn overlay(key: KeyPress) -> Option<Overlay> {
+    OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
+}
 
 /// What a key means, if anything. Terminals differ in whether they report shift beside a capital or `?`, so
 /// shift does not count for characters.
@@ -145,8 +167,11 @@ mod tests {
     #[test]
     fn no_key_means_two_things() {
         let keys: Vec<_> = KEYMAP.iter().flat_map(|binding| binding.keys).collect();
-        for (i, key) in keys.iter().enumerate() {
-            assert!(!keys[..i].contains(key), "{key:?} is bound twice");
+        let overlay: Vec<_> = OVERLAY.iter().flat_map(|binding| binding.keys).collect();
+        for keys in [keys, overlay] {
+            for (i, key) in keys.iter().enumerate() {
+                assert!(!keys[..i].contains(key), "{key:?} is bound twice");
+            }
         }
     }
 

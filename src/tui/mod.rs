@@ -19,6 +19,7 @@ mod line;
 mod mosaic;
 mod options;
 pub mod paint;
+mod parting;
 mod run;
 mod signals;
 mod state;

@@ -75,12 +75,14 @@ impl ExitStatus {
 }
 
 /// How the front end ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ended {
     /// How the program is to end.
     pub status: ExitStatus,
     /// Whether a picture was asked for and the person does not know yet what came of it.
     pub is_write_unanswered: bool,
+    /// What was written, its samples and its seconds, in one line.
+    pub summary: String,
 }
 
 /// Why the front end could not go on.

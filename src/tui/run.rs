@@ -19,6 +19,7 @@ use super::input;
 use super::known::Ask;
 use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
 use super::paint::{Advice, Fidelity, Moment, advise, can_repeat};
+use super::parting;
 use super::signals::{self, Listener};
 use super::state::{PreviewKind, Setup, State};
 use super::terminal::{self, Screen};
@@ -216,7 +217,8 @@ impl Ui {
             }
             None => ExitStatus::QUIT,
         };
-        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write })
+        let summary = parting::words(&self.state);
+        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write, summary })
     }
 
     /// Gives the screen back and waits a little for the answers that the terminal owes: a shell would take them for

@@ -115,7 +115,7 @@ pub(super) struct PendingChange {
     pub noticed: Instant,
 }
 
-/// The pane of errors and warnings.
+/// Text over the picture that can be scrolled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Pane {
     pub open: bool,
@@ -235,12 +235,18 @@ pub(super) struct State {
     /// The request of the last edit.
     pub edit: Option<u64>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
+    /// What each stage took when it was last at work before this request.
+    pub before: [Option<f64>; Stage::ALL.len()],
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
+    /// Of the last request that rendered something and finished.
+    pub rendered: Option<Box<Report>>,
     pub unchanged: bool,
     /// Requests that were rendered and finished.
     pub renders: u64,
+    /// Changes of the files that the scene is made of.
+    pub edits: u64,
     /// Whether the next picture that is written is one that was asked for.
     pub asked_to_write: bool,
     pub written: Vec<Written>,
@@ -256,7 +262,11 @@ pub(super) struct State {
     /// Whether they are those of the newest request.
     pub are_warnings_known: bool,
     pub pane: Pane,
-    pub help: bool,
+    pub help: Pane,
+    /// How long the list of views is shown.
+    pub views: Option<Instant>,
+    /// Whether the picture has the screen for itself.
+    pub is_alone: bool,
     pub message: Option<String>,
 
     pub change: Option<PendingChange>,
@@ -305,11 +315,14 @@ impl State {
             history: History::default(),
             edit: None,
             stages: Default::default(),
+            before: Default::default(),
             assets: Vec::new(),
             progress: None,
             report: None,
+            rendered: None,
             unchanged: false,
             renders: 0,
+            edits: 0,
             asked_to_write: false,
             written: Vec::new(),
             picture: None,
@@ -319,7 +332,9 @@ impl State {
             warnings: Vec::new(),
             are_warnings_known: false,
             pane: Pane::default(),
-            help: false,
+            help: Pane::default(),
+            views: None,
+            is_alone: false,
             message: None,
             change: None,
             first_change: None,
@@ -407,6 +422,22 @@ impl State {
         }
     }
 
+    /// Width over height of the picture, as far as it is known.
+    pub(super) fn aspect(&self) -> f32 {
+        const USUAL: f32 = 4.0 / 3.0;
+        self.effective
+            .as_ref()
+            .map_or(USUAL, |it| it.width as f32 / it.height.max(1) as f32)
+            .clamp(0.02, 50.0)
+    }
+
+    /// Shows the list of views for a moment.
+    pub(super) fn list_views(&mut self) {
+        const MOMENT: Duration = Duration::from_secs(4);
+        self.views = Some(self.now + MOMENT);
+        self.dirty = true;
+    }
+
     pub(super) fn is_running(&self) -> bool {
         matches!(self.activity, Activity::Running { .. })
     }
@@ -438,6 +469,6 @@ impl State {
         const CLOCK: Duration = Duration::from_millis(250);
         let clock = (self.is_running() && !self.paused).then(|| self.now + CLOCK);
         let bars = self.assets.iter().filter_map(AssetBar::end).min();
-        [clock, self.resize_due, bars].into_iter().flatten().min()
+        [clock, self.resize_due, bars, self.views].into_iter().flatten().min()
     }
 }

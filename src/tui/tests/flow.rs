@@ -15,7 +15,7 @@ fn the_first_request_has_room_for_the_preview() {
     let mut state = state(80, 24);
     let effects = crate::tui::update::start(&mut state);
     let request = request(&effects).expect("a request");
-    assert_eq!(request.preview, Some(PreviewSize { width: 51, height: 40 }));
+    assert_eq!(request.preview, Some(PreviewSize { width: 56, height: 42 }));
     assert_eq!((request.generation, request.write, request.force), (1, Writing::Try, false));
 }
 
@@ -48,10 +48,11 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
     desk.event(Event::Picture { generation: 2, picture: plain_picture(50, 38, BLUE), range: None });
     desk.now += Duration::from_millis(20);
     desk.event(Event::Shown { generation: 2 });
-    assert!(desk.text().contains("first change after 23 ms"), "{}", desk.text());
+    desk.worker(done(2, Vec::new(), false));
+    assert!(desk.text().contains("saved → seen 23 ms"), "{}", desk.text());
     desk.now += Duration::from_millis(20);
     desk.event(Event::Shown { generation: 2 });
-    assert!(!desk.state.dirty && desk.text().contains("after 23 ms"), "measured once");
+    assert!(!desk.state.dirty && desk.text().contains("seen 23 ms"), "measured once");
 }
 
 #[test]
@@ -101,14 +102,14 @@ fn another_window_asks_for_another_preview_once_it_is_quiet() {
     let mut desk = Desk::new();
     desk.finish(RED);
     assert!(desk.event(Event::Resize(window(120, 40))).is_empty());
-    assert!(cells_of(&mut desk, RED) > 51 * 20, "the picture at hand is scaled meanwhile");
+    assert!(cells_of(&mut desk, RED) > 56 * 21, "the picture at hand is scaled meanwhile");
     desk.now += Duration::from_millis(50);
     desk.event(Event::Resize(window(200, 60)));
     assert!(desk.wait(50).is_empty());
     let effects = desk.wait(50);
     assert!(matches!(
         effects[..],
-        [Effect::Send(Command::Preview(Some(PreviewSize { width: 153, height: 112 })))]
+        [Effect::Send(Command::Preview(Some(PreviewSize { width: 152, height: 114 })))]
     ));
     desk.event(Event::Picture { generation: 1, picture: plain_picture(149, 112, BLUE), range: None });
     assert!(cells_of(&mut desk, BLUE) > 0, "the same request shows its picture again");
@@ -212,7 +213,7 @@ fn a_file_that_is_half_there_is_no_error_until_it_stays_so() {
     desk.fail(wrong("half"));
     let text = desk.text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
-    assert!(text.contains("waiting for the file"), "{text}");
+    assert!(text.contains("… waiting") && text.contains("for the file to be whole"), "{text}");
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     desk.fail(wrong("three quarters"));
     assert!(!desk.text().contains("three quarters") && !desk.text().contains("broken"));

@@ -11,7 +11,7 @@ use crate::tui::action::Action;
 use crate::tui::color::ColorDepth;
 use crate::tui::event::{Effect, Event, KeyPress};
 use crate::tui::fixtures::*;
-use crate::tui::keymap::{Binding, KEYMAP};
+use crate::tui::keymap::KEYMAP;
 use crate::tui::state::PreviewKind;
 use crate::tui::{Changed, ExitStatus};
 
@@ -71,7 +71,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             let wanted = if action == Action::NextView { View::Normal } else { View::Error };
             let request = request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
-            assert!(desk.text().contains(&format!("view {}", wanted.name())));
+            assert!(desk.text().contains(&format!("view {}:", wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
             let moved = moved(&desk.key(key)).position - DVec3::Y;
@@ -156,23 +156,24 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             assert_eq!(overrides(&desk.key(key)), Some(Overrides::default()));
             assert!(desk.key(key).is_empty(), "there is nothing left to undo");
         }
-        Action::ToggleDiagnostics | Action::Close => {
+        Action::ToggleDiagnostics => {
             desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
             assert!(desk.key(key).is_empty());
             assert!(!desk.text().contains("error: wrong"));
         }
-        Action::ScrollUp | Action::ScrollDown => {
-            desk.fail((0..9).map(|_| diagnostic(Severity::Error, "wrong")).collect());
-            desk.state.pane.scroll = 9;
+        Action::PictureAlone => {
+            let cells = cells_of(desk, RED);
+            let effects = desk.key(key);
+            assert!(matches!(effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
+            assert!(cells_of(desk, RED) > cells && desk.text().contains("tab back"), "{}", desk.text());
             desk.key(key);
-            assert_eq!(desk.state.pane.scroll < 9, action == Action::ScrollUp);
-            assert_eq!(desk.state.pane.scroll > 9, action == Action::ScrollDown);
+            assert_eq!(cells_of(desk, RED), cells);
         }
         Action::ToggleHelp => {
             desk.key(key);
-            assert!(desk.text().contains("quit") && desk.text().contains(" keys "));
+            assert!(desk.text().contains("show or hide this help"));
             desk.key(key);
-            assert!(!desk.text().contains(" keys "));
+            assert!(!desk.text().contains("show or hide this help"));
         }
         Action::Redraw => assert!(matches!(desk.key(key)[..], [Effect::Redraw])),
         Action::Suspend => assert!(matches!(desk.key(key)[..], [Effect::StopJob])),
@@ -181,42 +182,83 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
     }
 }
 
-#[test]
-fn the_help_shows_every_line_of_the_table() {
-    let mut desk = Desk::with(state(80, 40));
-    desk.press('?');
-    let text = desk.text();
-    for binding in KEYMAP {
-        let line = text.lines().find(|line| line.contains(binding.help));
-        let line = line.unwrap_or_else(|| panic!("{:?} is not in\n{text}", binding.help));
-        assert!(line.contains(binding.label), "{line:?}");
-    }
-    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-    assert!(!desk.text().contains(" keys "));
+/// The line of keys.
+fn bottom(desk: &mut Desk) -> String {
+    desk.text().lines().last().map(str::to_owned).unwrap_or_default()
 }
 
 #[test]
-fn the_bottom_line_is_made_from_the_table_until_there_is_a_message() {
+fn toggles_stand_in_the_line_of_keys_with_their_values() {
     let mut desk = Desk::new();
-    let bottom = |desk: &mut Desk| desk.text().lines().last().map(str::to_owned).unwrap_or_default();
-    let hints = bottom(&mut desk);
-    let of_pane = |it: &&Binding| matches!(it.action, Action::Close | Action::ScrollUp);
-    let hint = |it: &Binding| format!("{} {}", it.label, it.hint);
-    let hinted = || KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::ToggleHelp);
-    for binding in hinted() {
-        assert_eq!(hints.contains(&hint(binding)), !of_pane(&binding), "{hints:?}");
-    }
-    desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
-    for binding in hinted().filter(of_pane) {
-        assert!(bottom(&mut desk).contains(&hint(binding)), "{}", bottom(&mut desk));
-    }
-    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-    assert_eq!(bottom(&mut desk), hints);
+    desk.finish(RED);
+    assert!(
+        bottom(&mut desk).starts_with("s soft  p off  d on  v beauty  i whitted  "),
+        "{}",
+        bottom(&mut desk)
+    );
+    assert!(bottom(&mut desk).ends_with("q quit  ? help"));
+    let is_bold = |desk: &mut Desk| desk.screen()[(2, 23)].modifier.contains(ratatui::style::Modifier::BOLD);
+    assert!(!is_bold(&mut desk));
+    desk.press('s');
+    assert!(bottom(&mut desk).starts_with("s hard"), "{}", bottom(&mut desk));
+    assert!(is_bold(&mut desk), "changed by a key");
+    desk.press('i');
+    assert!(bottom(&mut desk).starts_with("s –  p off  d on  v beauty  i path"), "{}", bottom(&mut desk));
+    desk.event(Event::Resize(window(140, 40)));
     desk.press('0');
-    assert!(bottom(&mut desk).contains("the keys have changed nothing"));
+    let long = "s shadows soft  p photons off  d dof on  v view beauty  i whitted  ";
+    assert!(bottom(&mut desk).starts_with(long), "{}", bottom(&mut desk));
+    desk.event(Event::Resize(window(40, 12)));
+    desk.press('y');
+    desk.finish(RED);
+    desk.press('0');
     desk.press('?');
     desk.press('?');
+    assert!(bottom(&mut desk).starts_with("s soft  p off") && bottom(&mut desk).ends_with("? help"));
+}
+
+#[test]
+fn what_is_of_use_now_stands_beside_the_toggles() {
+    let mut desk = Desk::new();
+    assert!(bottom(&mut desk).contains("space pause"), "{}", bottom(&mut desk));
+    desk.press(' ');
+    assert!(bottom(&mut desk).contains("space go on"), "{}", bottom(&mut desk));
+    desk.finish(RED);
+    assert!(bottom(&mut desk).contains("tab picture") && !bottom(&mut desk).contains("space"));
+    desk.event(Event::Resize(window(200, 60)));
+    for binding in KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::TogglePause) {
+        let hint = format!("{} {}", binding.label, binding.hint);
+        assert!(bottom(&mut desk).contains(&hint), "{hint:?} is not in {}", bottom(&mut desk));
+    }
+    desk.worker(done(1, vec![diagnostic(Severity::Warning, "unused")], false));
+    assert!(bottom(&mut desk).contains("e 1 warning"));
+    desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
+    assert!(bottom(&mut desk).contains("esc close"), "{}", bottom(&mut desk));
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    assert!(bottom(&mut desk).contains("e 1 error"), "{}", bottom(&mut desk));
+}
+
+#[test]
+fn a_message_stands_under_the_picture_until_the_next_key_and_the_keys_stay() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let hints = bottom(&mut desk);
+    desk.press('0');
+    let text = desk.text();
+    assert!(
+        text.lines().nth(22).is_some_and(|line| line.starts_with("the keys have changed nothing")),
+        "{text}"
+    );
     assert_eq!(bottom(&mut desk), hints);
+    desk.press('?');
+    desk.press('?');
+    assert!(!desk.text().contains("the keys have changed nothing"));
+    // Where there is no line for it, it takes the place of the keys, and of the name where there are none either.
+    for rows in [12, 5] {
+        desk.event(Event::Resize(window(60, rows)));
+        desk.press('0');
+        assert!(desk.text().contains("the keys have changed nothing"), "{}", desk.text());
+    }
 }
 
 #[test]
@@ -224,7 +266,7 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
     let base = Overrides { shadows: Some(Shadows::Off), view: Some(View::Depth), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone());
     let mut desk = Desk::with(state);
-    assert!(desk.text().contains("shadows off") && desk.text().contains("view depth"));
+    assert!(bottom(&mut desk).starts_with("s off  p off") && bottom(&mut desk).contains("v depth"));
     let effects = desk.press('s');
     let soft = request(&effects).expect("a request");
     assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), Writing::Try));
@@ -286,12 +328,12 @@ fn the_clock_stands_still_while_a_render_is_held() {
     desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
     desk.wait(3000);
     desk.press(' ');
-    assert!(desk.text().contains("3.0 s · paused"), "{}", desk.text());
+    assert!(desk.text().contains("32/64 samples · 3.0 s"), "{}", desk.text());
     desk.wait(5000);
-    assert!(desk.text().contains("3.0 s · paused"), "{}", desk.text());
+    assert!(desk.text().contains("32/64 samples · 3.0 s"), "{}", desk.text());
     desk.press(' ');
     desk.wait(1000);
-    assert!(desk.text().contains("4.0 s · ETA"), "{}", desk.text());
+    assert!(desk.text().contains("32/64 samples · 4.0 s"), "{}", desk.text());
 }
 
 #[test]

@@ -3,6 +3,8 @@
 mod camera;
 mod flow;
 mod keys;
+mod layout;
+mod overlay;
 mod pointer;
 mod screen;
 

@@ -1,6 +1,6 @@
 //! What a key does to the state.
 
-use super::{camera, history, places, pointer, render, say};
+use super::{camera, history, overlay, places, pointer, render, resized_preview, say};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
@@ -9,10 +9,12 @@ use crate::tui::ExitStatus;
 use crate::tui::action::Action;
 use crate::tui::event::{Effect, KeyPress};
 use crate::tui::keymap;
-use crate::tui::state::{State, Toggles};
-use crate::tui::view::diagnostics;
+use crate::tui::state::{Pane, PreviewKind, State, Toggles};
 
 pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
+    if let Some(effects) = overlay::update(state, key) {
+        return effects;
+    }
     let Some(action) = keymap::action(key) else { return Vec::new() };
     state.dirty |= state.message.take().is_some();
     state.is_focusing &= action == Action::Focus;
@@ -32,9 +34,7 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::WriteNow => write_now(state),
         Action::OrbitLeft => camera::orbit(state, -1.0, 0.0),
         Action::OrbitRight => camera::orbit(state, 1.0, 0.0),
-        Action::OrbitUp if state.pane.open => act(state, Action::ScrollUp),
         Action::OrbitUp => camera::orbit(state, 0.0, 1.0),
-        Action::OrbitDown if state.pane.open => act(state, Action::ScrollDown),
         Action::OrbitDown => camera::orbit(state, 0.0, -1.0),
         Action::DollyIn => camera::dolly(state, 1.0),
         Action::DollyOut => camera::dolly(state, -1.0),
@@ -52,12 +52,10 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::NewerPicture => history::browse(state, -1),
         Action::SceneSettings => scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
-        Action::ScrollUp => scroll(state, |line, page| line.saturating_sub(page)),
-        Action::ScrollDown => scroll(state, |line, page| line.saturating_add(page)),
-        Action::ToggleHelp => change(state, |state| state.help = !state.help),
-        Action::Close => {
-            change(state, |state| if state.help { state.help = false } else { state.pane.open = false })
+        Action::ToggleHelp => {
+            change(state, |state| state.help = Pane { open: !state.help.open, ..Pane::default() })
         }
+        Action::PictureAlone => picture_alone(state),
         Action::Redraw => vec![Effect::Redraw],
         Action::Suspend => vec![Effect::StopJob],
         Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],
@@ -127,13 +125,33 @@ fn toggle_photons(state: &mut State) -> Vec<Effect> {
 
 fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
     let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
-    let next = View::ALL[(current + steps) % View::ALL.len()];
-    state.toggles.view = (next != state.base_view()).then_some(next);
+    choose_view(state, View::ALL[(current + steps) % View::ALL.len()])
+}
+
+/// This view, in the list of them.
+pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
+    state.list_views();
+    state.toggles.view = (view != state.base_view()).then_some(view);
     let effects = render(state, false);
     if state.toggles.view.is_some() {
-        say(state, format!("view {}: shown, not written; w writes it", next.name()));
+        say(state, format!("view {}: shown, not written; w writes it", view.name()));
     }
     effects
+}
+
+fn picture_alone(state: &mut State) -> Vec<Effect> {
+    match state.preview {
+        PreviewKind::None => return told(state, "no picture is shown: see --preview"),
+        PreviewKind::HalfBlock
+        | PreviewKind::Quadrant
+        | PreviewKind::Sextant
+        | PreviewKind::Octant
+        | PreviewKind::Ascii
+        | PreviewKind::Pixels(_) => {}
+    }
+    state.is_alone = !state.is_alone;
+    state.dirty = true;
+    resized_preview(state)
 }
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
@@ -173,15 +191,4 @@ fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
         state.pane.open = !state.pane.open;
         state.pane.scroll = 0;
     })
-}
-
-fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> Vec<Effect> {
-    if !state.pane.open {
-        return Vec::new();
-    }
-    let (page, last) = diagnostics::extent(state);
-    let line = step(state.pane.scroll.min(last), page).min(last);
-    state.dirty |= line != state.pane.scroll;
-    state.pane.scroll = line;
-    Vec::new()
 }

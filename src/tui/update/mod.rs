@@ -4,6 +4,7 @@ mod answers;
 mod camera;
 mod history;
 mod keys;
+mod overlay;
 mod places;
 mod pointer;
 mod worker;
@@ -60,6 +61,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             state.is_settled = false;
             history::record(state);
             state.history.edited();
+            state.edits += 1;
             let effects = render(state, false);
             state.edit = Some(state.generation);
             state.change = Some(PendingChange { generation: state.generation, noticed });
@@ -156,6 +158,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     let (now, bars) = (state.now, state.assets.len());
     state.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
     state.dirty |= state.assets.len() != bars;
+    state.dirty |= state.views.take_if(|end| now >= *end).is_some();
     if state.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
     }

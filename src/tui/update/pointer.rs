@@ -1,13 +1,13 @@
 //! The mouse on the picture, and what is asked of a place there.
 
-use super::keys::{self, told};
-use super::{camera, say};
+use super::keys::told;
+use super::{camera, overlay, say};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
 use crate::scene::sanitize::visible;
-use crate::tui::action::Action;
 use crate::tui::editor::FilePlace;
 use crate::tui::event::{Effect, Mouse, MouseKind};
+use crate::tui::keymap::Overlay;
 use crate::tui::state::{Press, Purpose, State};
 use crate::tui::view::layout::Layout;
 use crate::tui::view::preview::spot_at;
@@ -29,17 +29,19 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
             Some(press) if !press.has_moved => click(state, mouse),
             Some(_) | None => Vec::new(),
         },
-        MouseKind::WheelUp | MouseKind::WheelDown if is_on_pane(state, mouse) => keys::act(
-            state,
-            if mouse.kind == MouseKind::WheelUp { Action::ScrollUp } else { Action::ScrollDown },
-        ),
+        MouseKind::WheelUp | MouseKind::WheelDown if is_on_pane(state, mouse) => {
+            let line = if mouse.kind == MouseKind::WheelUp { Overlay::LineUp } else { Overlay::LineDown };
+            overlay::act(state, line);
+            Vec::new()
+        }
         MouseKind::WheelUp => camera::dolly(state, 1.0),
         MouseKind::WheelDown => camera::dolly(state, -1.0),
     }
 }
 
 fn is_on_pane(state: &State, mouse: Mouse) -> bool {
-    state.pane.open && Layout::of(state).pane.contains((mouse.column, mouse.row).into())
+    let is_on_errors = || Layout::of(state).pane.contains((mouse.column, mouse.row).into());
+    state.help.open || state.pane.open && is_on_errors()
 }
 
 /// The scene turns with the hand.

@@ -1,7 +1,7 @@
 //! What the worker's events do to the state. Those of older generations do nothing.
 
-use super::{camera, history, pointer, say};
-use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport};
+use super::{camera, history, pointer, resized_preview, say};
+use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport, Status};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Written};
@@ -32,6 +32,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             if pinhole {
                 say(state, "no depth of field: the scene's camera has no `aperture`");
             }
+            // A picture of another shape has another place.
+            return resized_preview(state);
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => state.progress = Some(progress),
@@ -79,6 +81,10 @@ fn generation(event: &Event) -> u64 {
 }
 
 fn started(state: &mut State) {
+    for (before, stage) in state.before.iter_mut().zip(&state.stages) {
+        let done = stage.as_ref().filter(|stage| stage.status == Status::Done);
+        *before = done.map(|stage| stage.seconds).or(*before);
+    }
     state.stages = Default::default();
     state.assets.clear();
     state.progress = None;
@@ -138,6 +144,9 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.activity = Activity::Done;
     state.set_paused(false);
     state.assets.retain(|asset| asset.finished.is_some());
+    if !unchanged {
+        state.rendered = Some(report.clone());
+    }
     state.report = Some(report);
     state.unchanged = unchanged;
     state.renders += u64::from(!unchanged);

@@ -1,11 +1,12 @@
-//! The pane of errors and warnings over the lower part of the picture.
+//! The pane of errors and warnings: beside the picture, else over its lower part.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::widgets::{Block, Clear, Widget};
+use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
-use super::text::{Tone, put, row};
+use super::stages::Line;
+use super::text::{Tone, counted, put, put_right, row};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::{self, Role};
 use crate::scene::sanitize::visible;
@@ -15,31 +16,43 @@ use crate::tui::state::State;
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     let text = text(state, area);
-    let area = fitting(area, text.len());
+    let area = fitting(area, text.len(), area == Layout::of(state).panel);
     let (page, last) = span(&text, area);
     let first = state.pane.scroll.min(last);
     Clear.render(area, buffer);
-    let has_error = state.warnings.iter().any(|one| one.severity == Severity::Error);
-    let tone = if state.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
-    let mut title = title(state);
-    if last > 0 {
-        title = format!("{title}· lines {}-{} of {} ", first + 1, first + page, text.len());
-    }
-    let block = Block::bordered().border_style(tone.style(state.depth)).title(title);
-    let inner = if bordered(area) { block.inner(area) } else { area };
-    if bordered(area) {
-        block.render(area, buffer);
-    }
-    for (index, line) in (0..).zip(text.iter().skip(first).take(page)) {
+    title(state, row(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
+    for (index, line) in (1..area.height).zip(text.iter().skip(first)) {
         let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
-        put(buffer, row(inner, index), &pieces, state.depth);
+        put(buffer, row(area, index), &pieces, state.depth);
     }
 }
 
-/// The lower part of an area that this many lines and a border need.
-fn fitting(area: Rect, lines: usize) -> Rect {
-    let height = u16::try_from(lines + 2).unwrap_or(u16::MAX).clamp(area.height.min(4), area.height);
+/// The lower part of an area that these lines and their title need; all of a panel.
+fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
+    if is_panel {
+        return area;
+    }
+    let height = u16::try_from(lines + 1).unwrap_or(u16::MAX).clamp(area.height.min(4), area.height);
     Rect { y: area.bottom() - height, height, ..area }
+}
+
+/// A rule with the number of errors, and which lines are in sight where these are not all.
+fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
+    let has_error = state.warnings.iter().any(|one| one.severity == Severity::Error);
+    let tone = if state.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
+    let rule = "─".repeat(usize::from(area.width));
+    put(buffer, area, &[(&rule, tone)], state.depth);
+    let words = match &state.problems {
+        Some(_) => super::header::errors(state),
+        None => report::summary(&state.warnings),
+    };
+    let mut room = area;
+    if let Some((first, page, all)) = shown {
+        let lines = format!(" lines {}-{} of {all} ", first + 1, first + page);
+        room.width -= put_right(buffer, area, &lines, tone, state.depth);
+    }
+    let room = super::text::rest(room, 1);
+    put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.depth);
 }
 
 /// Lines on a page of the pane, and the furthest line that it can be scrolled to.
@@ -50,28 +63,48 @@ pub(in crate::tui) fn extent(state: &State) -> (usize, usize) {
 }
 
 fn span(text: &[Line], area: Rect) -> (usize, usize) {
-    let page = usize::from(if bordered(area) { area.height - 2 } else { area.height });
-    (page.max(1), text.len().saturating_sub(page.max(1)))
+    let page = usize::from(area.height.saturating_sub(1)).max(1);
+    (page, text.len().saturating_sub(page))
 }
-
-fn bordered(area: Rect) -> bool {
-    area.height >= 4 && area.width >= 10
-}
-
-/// Pieces of text with their tones.
-type Line = Vec<(String, Tone)>;
 
 fn text(state: &State, area: Rect) -> Vec<Line> {
-    let width = usize::from(if bordered(area) { area.width - 2 } else { area.width });
+    let width = usize::from(area.width);
     let Some(problems) = &state.problems else { return reported(&state.warnings, width) };
-    let mut text = reported(&problems.diagnostics, width);
+    let mut text = Vec::new();
     if let Some(work) = &problems.work {
-        text.extend(wrapped(&format!("error: {}", visible(work)), width));
+        text.extend(wrapped(&format!("error: {}", visible(work)), width, Tone::Error));
     }
+    text.extend(reported(&problems.diagnostics, width));
     text
 }
 
+/// Errors first; a fault that is in several places is told once, with all of them.
 fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
+    let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
+    for one in diagnostics {
+        match faults.iter_mut().find(|fault| is_same(fault[0], one)) {
+            Some(fault) => fault.push(one),
+            None => faults.push(vec![one]),
+        }
+    }
+    let start = |one: &Diagnostic| one.place.as_ref().map(|place| place.span.start);
+    for fault in &mut faults {
+        fault.sort_by_key(|one| start(one));
+    }
+    faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
+    let mut lines: Vec<Line> = faults.iter().flat_map(|fault| one_fault(fault, width)).collect();
+    lines.pop();
+    lines
+}
+
+fn is_same(one: &Diagnostic, other: &Diagnostic) -> bool {
+    let label = |one: &Diagnostic| one.place.as_ref().map(|place| place.label.clone());
+    (one.severity, &one.message, &one.path, &one.help, label(one))
+        == (other.severity, &other.message, &other.path, &other.help, label(other))
+}
+
+/// The first place in full, the others by line and column; an empty line.
+fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<Line> {
     let tone = |role| match role {
         Role::Text => Tone::Plain,
         Role::Error => Tone::Error,
@@ -80,26 +113,45 @@ fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
         Role::Message => Tone::Strong,
     };
     let line = |line: report::Line| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
-    let mut lines = report::lines(diagnostics, width);
+    let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
     // The report ends with an empty line and a count, which stands in the title.
     lines.truncate(lines.len().saturating_sub(2));
-    lines.into_iter().map(line).collect()
+    let mut lines: Vec<Line> = lines.into_iter().map(line).collect();
+    let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();
+    if !places.is_empty() {
+        let text = format!("  = also in {}: {}", counted(places.len(), "place"), places.join(", "));
+        lines.extend(wrapped(&text, width, Tone::Plain));
+    }
+    lines.push(Line::new());
+    lines
 }
 
-fn wrapped(line: &str, width: usize) -> Vec<Line> {
-    let characters: Vec<char> = line.chars().collect();
-    let part = |part: &[char]| vec![(part.iter().collect(), Tone::Error)];
-    characters.chunks(width.max(1)).map(part).collect()
+/// `line:column`.
+fn place(one: &Diagnostic) -> Option<String> {
+    let place = one.place.as_ref()?;
+    let (line, column) = report::line_and_column(&place.source, place.span.start);
+    Some(format!("{line}:{column}"))
 }
 
-fn title(state: &State) -> String {
-    let Some(problems) = &state.problems else { return format!(" {} ", report::summary(&state.warnings)) };
-    let errors = problems.diagnostics.iter().filter(|it| it.severity == Severity::Error).count()
-        + usize::from(problems.work.is_some());
-    let errors = counted(errors, "error");
-    if state.picture.is_some() { format!("{errors}· the last good picture stays ") } else { errors }
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!(" {count} {what}{} ", if count == 1 { "" } else { "s" })
+/// Broken between words where that is possible.
+fn wrapped(text: &str, width: usize, tone: Tone) -> Vec<Line> {
+    let width = width.max(1);
+    let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
+    for word in text.split_inclusive(' ') {
+        let of_word = word.trim_end().chars().count();
+        if length > 0 && length + of_word > width {
+            lines.push(std::mem::take(&mut line));
+            length = 0;
+        }
+        for character in word.chars() {
+            if length >= width && character != ' ' {
+                lines.push(std::mem::take(&mut line));
+                length = 0;
+            }
+            line.push(character);
+            length += 1;
+        }
+    }
+    lines.push(line);
+    lines.into_iter().map(|line| vec![(line.trim_end().to_owned(), tone)]).collect()
 }

@@ -1,47 +1,75 @@
-//! The overlay of keys, made from the table of keys.
+//! The overlay of keys, made from the tables of keys.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::widgets::{Block, Clear, Widget};
+use ratatui::widgets::{Block, BorderType, Clear, Widget};
 
 use super::text::{Tone, columns, put, row};
-use crate::tui::keymap::KEYMAP;
+use crate::tui::keymap::{KEYMAP, OVERLAY};
 use crate::tui::state::State;
 
-const TITLE: &str = " keys ";
 /// What else is on the screen.
-const NOTES: &[(&str, &str)] =
-    &[("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer")];
+const NOTES: &[(&str, &str)] = &[
+    ("saved → seen", "from a save to the first changed cell"),
+    ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
+    ("bold", "what the last edit or a key has changed"),
+    ("render 1 s −.3", "the time of a stage, and against the last time"),
+];
 
 /// In the middle of the screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
-    let keys = || KEYMAP.iter().filter(|it| !it.help.is_empty());
-    let entries = || keys().map(|it| (it.label, it.help)).chain(NOTES.iter().copied());
-    let labels = entries().map(|(label, _)| columns(label)).max().unwrap_or(0);
-    let helps = entries().map(|(_, help)| columns(help)).max().unwrap_or(0);
-    let lines = u16::try_from(entries().count()).unwrap_or(u16::MAX);
-    let area = centred(buffer.area, labels + helps + 6, lines.saturating_add(2));
+    let area = area(state);
+    let inner = inner(area);
+    let (page, last) = extent(state);
+    let first = state.help.scroll.min(last);
+    let entries: Vec<_> = entries().collect();
+    let mut title = " keys ".to_owned();
+    if last > 0 {
+        title = format!(" keys {}–{} of {} · j k ", first + 1, first + page, entries.len());
+    }
     Clear.render(area, buffer);
-    let block = Block::bordered().title(TITLE).border_style(Tone::Plain.style(state.depth));
-    let inner = if area.height > 3 && area.width > 3 { block.inner(area) } else { area };
     if inner != area {
-        block.render(area, buffer);
+        let border = Tone::Faint.style(state.depth);
+        let title_style = Tone::Strong.style(state.depth);
+        let block = Block::bordered().border_type(BorderType::Rounded).border_style(border);
+        block.title_style(title_style).title(title).render(area, buffer);
     }
-    let hidden = lines.saturating_sub(inner.height);
-    for (index, (label, help)) in (0..inner.height).zip(entries()) {
+    let labels = widest(|(label, _)| label).min(inner.width / 3);
+    for (index, (label, help)) in (0..inner.height).zip(entries.iter().skip(first)) {
         let line = row(inner, index);
-        if hidden > 0 && index + 1 == inner.height {
-            put(
-                buffer,
-                line,
-                &[(&format!(" … {} more: enlarge the window", hidden + 1), Tone::Faint)],
-                state.depth,
-            );
-            break;
-        }
-        let label = format!(" {label:<width$}  ", width = usize::from(labels));
-        put(buffer, line, &[(&label, Tone::Strong), (help, Tone::Plain)], state.depth);
+        let used = labels + 3;
+        let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
+        put(buffer, place, &[(label, Tone::Strong)], state.depth);
+        put(buffer, super::text::rest(line, used), &[(help, Tone::Plain)], state.depth);
     }
+}
+
+/// Lines on a page of the help, and the furthest line that it can be scrolled to.
+pub(in crate::tui) fn extent(state: &State) -> (usize, usize) {
+    let page = usize::from(inner(area(state)).height).max(1);
+    (page, entries().count().saturating_sub(page))
+}
+
+fn entries() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let keys = KEYMAP.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
+    let overlay = OVERLAY.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
+    keys.chain(overlay).chain(NOTES.iter().copied())
+}
+
+fn widest(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
+    entries().map(|entry| columns(part(entry))).max().unwrap_or(0)
+}
+
+fn area(state: &State) -> Rect {
+    let window = Rect::new(0, 0, state.window.columns, state.window.rows);
+    // The line of keys tells how to scroll and to close.
+    let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
+    let lines = u16::try_from(entries().count()).unwrap_or(u16::MAX);
+    centred(above, widest(|(label, _)| label) + widest(|(_, help)| help) + 6, lines.saturating_add(2))
+}
+
+fn inner(area: Rect) -> Rect {
+    if area.height > 3 && area.width > 3 { Block::bordered().inner(area) } else { area }
 }
 
 fn centred(area: Rect, width: u16, height: u16) -> Rect {

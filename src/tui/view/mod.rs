@@ -1,13 +1,17 @@
 //! The state as cells.
 
 pub(super) mod diagnostics;
-mod help;
+mod header;
+pub(super) mod help;
+mod keys;
 pub(super) mod layout;
+mod panel;
 pub(super) mod preview;
 pub(super) mod ramp;
 mod stages;
-mod status;
 mod text;
+mod under;
+pub(super) mod views;
 
 use ratatui::buffer::Buffer;
 
@@ -17,16 +21,18 @@ use super::state::State;
 /// The whole screen, into a buffer of the window's size.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let layout = Layout::of(state);
-    status::header(state, layout.header, buffer);
+    header::draw(state, &layout, buffer);
     preview::draw(state, layout.preview, buffer);
-    stages::draw(state, layout.stages, buffer);
-    status::bar(state, layout.bar, buffer);
-    status::status(state, &layout, buffer);
-    status::bottom(state, layout.bottom, buffer);
+    panel::draw(state, layout.panel, buffer);
+    under::draw(state, &layout, buffer);
+    keys::draw(state, &layout, buffer);
     if state.pane.open {
         diagnostics::draw(state, layout.pane, buffer);
     }
-    if state.help {
+    if state.views.is_some() {
+        views::draw(state, &layout, buffer);
+    }
+    if state.help.open {
         help::draw(state, buffer);
     }
 }

@@ -57,7 +57,10 @@ fn in_cells(kind: PreviewKind) -> PreviewKind {
 
 /// Whether the picture is drawn in pixels: where nothing may lie over it.
 fn is_in_pixels(state: &State) -> bool {
-    matches!(state.preview, PreviewKind::Pixels(_)) && !state.help && !state.pane.open
+    matches!(state.preview, PreviewKind::Pixels(_))
+        && !state.help.open
+        && !state.pane.open
+        && state.views.is_none()
 }
 
 /// Where the picture is drawn in pixels; none: it is drawn in cells.

@@ -1,107 +1,89 @@
-//! The table of stages, the bars of loading assets, and what came out.
+//! The stages: a line for each while they are at work, one for all of them when they are done.
 
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-
-use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, row, seconds};
+use super::text::{Tone, columns, delta, seconds, shortened};
 use crate::pipeline::protocol::{Stage, StageReport, Status};
-use crate::scene::report::summary;
 use crate::scene::sanitize::visible;
-use crate::tui::state::{AssetBar, PreviewKind, State};
+use crate::tui::state::{AssetBar, State};
 
-/// From the top: stages, assets, results. What does not fit is cut at the bottom.
-pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
-    let mut next = 0;
-    let mut line = || {
-        next += 1;
-        row(area, next - 1)
-    };
-    for (stage, report) in Stage::ALL.iter().zip(&state.stages) {
-        stage_line(state, *stage, report.as_ref(), line(), buffer);
-    }
-    line();
-    for asset in &state.assets {
-        asset_line(state, asset, line(), buffer);
-    }
-    for (text, tone) in results(state) {
-        put(buffer, line(), &[(&text, tone)], state.depth);
-    }
-}
+/// Pieces of text with their tones.
+pub(super) type Line = Vec<(String, Tone)>;
 
-/// Mark, name, seconds, why.
-fn stage_line(state: &State, stage: Stage, report: Option<&StageReport>, area: Rect, buffer: &mut Buffer) {
+/// Stages that took less of the whole time than this are left out of the one line.
+const SMALL: f64 = 0.02;
+/// Fewer columns of a reason say nothing.
+const LEAST_WHY: u16 = 12;
+
+/// Sign, name, time, how much that changed, and why, as far as there is room.
+pub(super) fn line(state: &State, stage: Stage, room: u16) -> Line {
+    let report = state.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.is_running();
-    let (mark, tone) = match report.map(|report| report.status) {
-        Some(Status::Running) if has_ended => ("✗", Tone::Error),
-        None => ("·", Tone::Faint),
-        Some(Status::Running) => (">", Tone::Strong),
-        Some(Status::Done) => ("✓", Tone::Good),
-        Some(Status::Reused) => ("=", Tone::Faint),
-        Some(Status::Skipped) => ("-", Tone::Faint),
+    let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
+        None => ("·", Tone::Faint, String::new()),
+        Some((Status::Running, _)) if has_ended => ("✗", Tone::Error, "stopped".to_owned()),
+        Some((Status::Running, _)) => (">", Tone::Working, "…".to_owned()),
+        Some((Status::Done, time)) => ("✓", Tone::Good, seconds(time)),
+        Some((Status::Reused, _)) => ("=", Tone::Faint, "reused".to_owned()),
+        Some((Status::Skipped, _)) => ("-", Tone::Faint, "skipped".to_owned()),
     };
-    let time = match report {
-        Some(StageReport { status: Status::Done, seconds: time, .. }) => seconds(*time),
-        Some(StageReport { status: Status::Running, .. }) if has_ended => "stopped".to_owned(),
-        Some(StageReport { status: Status::Running, .. }) => "…".to_owned(),
-        Some(StageReport { status: Status::Reused, .. }) => "reused".to_owned(),
-        Some(StageReport { status: Status::Skipped, .. }) => "skipped".to_owned(),
-        None => String::new(),
-    };
-    let why = report.map_or("", |report| report.why.as_str());
-    let line = format!(" {:<8} {time:>8}", stage.name());
-    let tone_of_text = if tone == Tone::Faint { Tone::Faint } else { Tone::Plain };
-    let why = shortened(&visible(why), area.width.saturating_sub(columns(&line) + 3));
-    put(
-        buffer,
-        area,
-        &[(mark, tone), (&line, tone_of_text), ("  ", Tone::Faint), (&why, Tone::Faint)],
-        state.depth,
-    );
+    let text = format!(" {:<8} {time:>7}", stage.name());
+    let text_tone = if tone == Tone::Faint { Tone::Faint } else { weight(state, report) };
+    let mut line = vec![(sign.to_owned(), tone), (text, text_tone)];
+    let change = report.map_or(String::new(), |report| change(state, report));
+    if !change.is_empty() {
+        line.push((format!(" {change}"), Tone::Strong));
+    }
+    let used: u16 = line.iter().map(|(text, _)| columns(text)).sum();
+    let room = room.saturating_sub(used + 2);
+    let why = visible(report.map_or("", |report| report.why.as_str()));
+    if !why.is_empty() && (room >= LEAST_WHY || columns(&why) <= room) {
+        line.push((format!("  {}", shortened(&why, room)), Tone::Faint));
+    }
+    line
 }
 
-/// What fits of a text, with an ellipsis where it is cut; nothing where so little fits that it says nothing.
-fn shortened(text: &str, room: u16) -> String {
-    const LEAST: u16 = 12;
-    if columns(text) <= room {
-        return text.to_owned();
-    }
-    if room < LEAST {
-        return String::new();
-    }
-    let mut short = text.to_owned();
-    while columns(&short) >= room && short.pop().is_some() {}
-    format!("{}…", short.trim_end())
+/// Bold for what an edit made again.
+fn weight(state: &State, report: Option<&StageReport>) -> Tone {
+    let is_again = report.is_some_and(|it| it.status == Status::Done && state.renders > 0);
+    if is_again && state.edits > 0 { Tone::Strong } else { Tone::Plain }
 }
 
-fn asset_line(state: &State, asset: &AssetBar, area: Rect, buffer: &mut Buffer) {
+/// Against the last time that the stage was at work.
+fn change(state: &State, report: &StageReport) -> String {
+    match report.status {
+        Status::Done => delta(report.seconds, state.before.get(report.name as usize).copied().flatten()),
+        Status::Running | Status::Reused | Status::Skipped => String::new(),
+    }
+}
+
+/// The stages that count, and how many were reused.
+pub(super) fn in_one_line(state: &State) -> Line {
+    let total: f64 =
+        state.stages.iter().flatten().filter(|it| it.status == Status::Done).map(|it| it.seconds).sum();
+    let mut line = Line::new();
+    let mut reused = 0;
+    for report in state.stages.iter().flatten() {
+        reused += usize::from(report.status == Status::Reused);
+        if report.status == Status::Done && report.seconds >= SMALL * total {
+            let comma = if line.is_empty() { "" } else { ", " };
+            line.push((
+                format!("{comma}{} {}", report.name.name(), seconds(report.seconds)),
+                weight(state, Some(report)),
+            ));
+            let change = change(state, report);
+            if !change.is_empty() {
+                line.push((format!(" {change}"), Tone::Strong));
+            }
+        }
+    }
+    if reused > 0 {
+        let comma = if line.is_empty() { "" } else { ", " };
+        line.push((format!("{comma}{reused} reused"), Tone::Faint));
+    }
+    line
+}
+
+/// How much of an asset is loaded.
+pub(super) fn fraction(asset: &AssetBar) -> f64 {
     let progress = &asset.progress;
-    let fraction = if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 };
-    let ascii = state.preview == PreviewKind::Ascii;
-    let bar = format!(" {} {:3}%", gauge(fraction, 8, ascii), percent(fraction));
-    let room = area.width.saturating_sub(columns(&bar));
-    let name = Rect { width: room, ..area };
-    put(buffer, name, &[(&visible(&progress.name), Tone::Plain)], state.depth);
-    put_right(buffer, area, &bar, Tone::Good, state.depth);
-}
-
-fn results(state: &State) -> Vec<(String, Tone)> {
-    let mut lines = Vec::new();
-    if let Some(report) = &state.report {
-        let what = if state.unchanged { "unchanged".to_owned() } else { format!("render {}", state.renders) };
-        lines.push((format!("total {} · {what}", seconds(report.seconds)), Tone::Strong));
-    }
-    if let Some(time) = state.first_change {
-        lines.push((format!("first change after {}", duration(time)), Tone::Plain));
-    }
-    for written in &state.written {
-        lines.push((format!("image {}", visible(&written.path.to_string_lossy())), Tone::Plain));
-        let size = state.effective.as_ref().map(|it| format!("{}×{} px, ", it.width, it.height));
-        lines.push((format!("  {}{}", size.unwrap_or_default(), bytes(written.bytes)), Tone::Faint));
-    }
-    match state.warnings.len() {
-        0 => {}
-        1 => lines.push((format!("{} (e shows it)", summary(&state.warnings)), Tone::Warning)),
-        _ => lines.push((format!("{} (e shows them)", summary(&state.warnings)), Tone::Warning)),
-    }
-    lines
+    if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }
 }

@@ -5,20 +5,25 @@ use std::time::Duration;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
-use unicode_width::UnicodeWidthStr;
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 pub(super) use crate::pipeline::words::seconds;
 use crate::tui::color::ColorDepth;
 
-/// What a piece of text is.
+/// What a piece of text is. The colours are those of the terminal's own palette of 16, which follow its theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
+    /// Settled, or less important.
     Faint,
+    /// New, or to be read first.
     Strong,
+    Working,
     Good,
     Warning,
     Error,
+    /// The line that is chosen of a list.
+    Chosen,
 }
 
 impl Tone {
@@ -28,28 +33,51 @@ impl Tone {
             Self::Plain => (Color::Reset, Modifier::empty()),
             Self::Faint => (Color::Reset, Modifier::DIM),
             Self::Strong => (Color::Reset, Modifier::BOLD),
+            Self::Working => (Color::Blue, Modifier::empty()),
             Self::Good => (Color::Green, Modifier::empty()),
             Self::Warning => (Color::Yellow, Modifier::empty()),
             Self::Error => (Color::Red, Modifier::BOLD),
+            Self::Chosen => (Color::Reset, Modifier::BOLD.union(Modifier::REVERSED)),
         };
         let color = if depth == ColorDepth::None { Color::Reset } else { color };
         Style::new().fg(color).bg(Color::Reset).add_modifier(modifier)
     }
+
+    /// The same as a block of colour, black or white on it, whichever every theme can read; without colours reversed.
+    pub(super) fn block(self, depth: ColorDepth) -> Style {
+        let (fg, bg) = match self {
+            _ if depth == ColorDepth::None => (Color::Reset, Color::Reset),
+            Self::Working => (Color::White, Color::Blue),
+            Self::Good => (Color::Black, Color::Green),
+            Self::Warning => (Color::Black, Color::Yellow),
+            Self::Error => (Color::White, Color::Red),
+            Self::Plain | Self::Faint | Self::Strong | Self::Chosen => (Color::Reset, Color::Reset),
+        };
+        let modifier = if bg == Color::Reset { Modifier::REVERSED } else { Modifier::empty() };
+        Style::new().fg(fg).bg(bg).add_modifier(modifier | Modifier::BOLD)
+    }
 }
 
-/// Writes pieces from the left into the first row of the area; what does not fit is cut. Returns the columns
-/// used.
+/// Writes pieces from the left into the first row of the area; what does not fit is cut and ends in `…`. Returns the
+/// columns used.
 pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], depth: ColorDepth) -> u16 {
     let area = area.intersection(buffer.area);
     if area.is_empty() {
         return 0;
     }
+    let length: usize = pieces.iter().map(|(text, _)| text.width()).sum();
+    let is_cut = length > usize::from(area.width);
+    let end = area.right() - u16::from(is_cut);
     let mut x = area.x;
     for (text, tone) in pieces {
-        let room = usize::from(area.right() - x);
-        x = buffer.set_stringn(x, area.y, text, room, tone.style(depth)).0;
+        let style = tone.style(depth);
+        x = buffer.set_stringn(x, area.y, text, usize::from(end - x), style).0;
+        if is_cut && x + 1 >= end && columns(text) > 0 {
+            // A character of two columns may leave one of them.
+            buffer.set_stringn(x, area.y, "…", 1, style);
+        }
     }
-    x - area.x
+    if is_cut { area.width } else { x - area.x }
 }
 
 /// Writes a text so that it ends at the right edge of the first row, if it fits.
@@ -71,9 +99,37 @@ pub(super) fn row(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
 
+/// What is left of a row to the right of the columns used.
+pub(super) fn rest(area: Rect, used: u16) -> Rect {
+    let used = used.min(area.width);
+    Rect { x: area.x + used, width: area.width - used, ..area }
+}
+
+/// What fits of a text, with an ellipsis where it is cut.
+pub(super) fn shortened(text: &str, room: u16) -> String {
+    if columns(text) <= room {
+        return text.to_owned();
+    }
+    let mut short = String::new();
+    let mut width = 1;
+    for character in text.chars() {
+        width += character.width().unwrap_or(0);
+        if width > usize::from(room) {
+            break;
+        }
+        short.push(character);
+    }
+    if room == 0 { short } else { format!("{}…", short.trim_end()) }
+}
+
 /// A duration in a few characters.
 pub(super) fn duration(time: Duration) -> String {
     seconds(time.as_secs_f64())
+}
+
+/// A time that runs and does not flicker: tenths of seconds until a minute.
+pub(super) fn running(time: Duration) -> String {
+    if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { duration(time) }
 }
 
 /// A size of a file.
@@ -86,16 +142,53 @@ pub(super) fn bytes(bytes: u64) -> String {
     }
 }
 
-/// A bar of this many columns, filled as far as `fraction` says.
-pub(super) fn gauge(fraction: f64, columns: usize, ascii: bool) -> String {
-    let (full, empty) = if ascii { ("#", "-") } else { ("█", "░") };
+/// How much longer or shorter a stage took than before, in the unit of its time; empty where that says nothing.
+pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
+    /// Times of the same work differ by so much.
+    const NOISE: f64 = 0.05;
+    let Some(before) = before else { return String::new() };
+    let change = seconds - before;
+    let in_units = if seconds < 0.999_5 { change * 1e3 } else { change };
+    let amount = match in_units.abs() {
+        x if x >= 9.95 => format!("{x:.0}"),
+        x => format!("{x:.1}"),
+    };
+    let amount = amount.strip_prefix('0').unwrap_or(&amount);
+    if change.abs() <= NOISE * before || amount == ".0" || !change.is_finite() {
+        return String::new();
+    }
+    format!("{}{amount}", if change < 0.0 { "−" } else { "+" })
+}
+
+/// A thin bar: its filled part and the rest, together of this many columns.
+pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
+    let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
+    let columns = usize::from(columns);
     let filled = ((fraction.clamp(0.0, 1.0) * columns as f64).floor() as usize).min(columns);
-    full.repeat(filled) + &empty.repeat(columns - filled)
+    (full.repeat(filled), empty.repeat(columns - filled))
 }
 
 /// Whole percent; 100 only when everything is done.
 pub(super) fn percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
+}
+
+/// Three digits or more.
+pub(super) fn number(x: f32) -> String {
+    let digits = match x.abs() {
+        x if x >= 100.0 => 0,
+        x if x >= 10.0 => 1,
+        x if x >= 1.0 => 2,
+        x if x >= 1e-3 || x == 0.0 => 4,
+        _ => return format!("{x:.1e}"),
+    };
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// `1 error`, `2 errors`.
+pub(super) fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]
@@ -104,9 +197,51 @@ mod tests {
 
     #[test]
     fn a_bar_is_full_only_at_the_end() {
-        assert_eq!(gauge(0.999, 4, false), "███░");
-        assert_eq!(gauge(1.0, 4, false), "████");
-        assert_eq!(gauge(f64::NAN, 2, true), "--");
+        let bar = |fraction, ascii| {
+            let (filled, rest) = gauge(fraction, 4, ascii);
+            filled + &rest
+        };
+        assert_eq!(bar(0.999, false), "━━━─");
+        assert_eq!(bar(1.0, false), "━━━━");
+        assert_eq!(bar(f64::NAN, true), "----");
         assert_eq!((percent(0.999), percent(1.0)), (99, 100));
+    }
+
+    #[test]
+    fn the_change_of_a_time_is_told_in_its_unit() {
+        for (seconds, before, words) in [
+            (1.12, Some(1.42), "−.3"),
+            (1.12, Some(1.10), ""),
+            (0.023, Some(0.019), "+4.0"),
+            (0.5, Some(1.5), "−1000"),
+            (12.0, Some(1.0), "+11"),
+            (2.0, Some(1.96), ""),
+            (0.000_02, Some(0.000_01), ""),
+            (1.0, None, ""),
+        ] {
+            assert_eq!(delta(seconds, before), words, "{seconds} {before:?}");
+        }
+    }
+
+    #[test]
+    fn every_text_that_is_cut_says_so() {
+        for (text, room, shown) in [
+            ("abcdef", 6, "abcdef"),
+            ("abcdef", 5, "abcd…"),
+            ("日本語", 5, "日本…"),
+            ("日本語", 4, "日…"),
+            ("ab", 1, "…"),
+        ] {
+            assert_eq!(shortened(text, room), shown);
+            for split in text.char_indices().map(|(at, _)| at) {
+                let area = Rect::new(0, 0, room, 1);
+                let mut buffer = Buffer::empty(area);
+                let (first, second) = text.split_at(split);
+                put(&mut buffer, area, &[(first, Tone::Plain), (second, Tone::Faint)], ColorDepth::None);
+                let seen: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
+                // The right half of a wide character is a blank of the buffer.
+                assert_eq!(seen.replace(' ', ""), shown, "{text} {room} {split}");
+            }
+        }
     }
 }

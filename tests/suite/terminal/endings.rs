@@ -73,8 +73,9 @@ fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
         let mut terminal = folder.terminal();
         terminal.wait("the last stage", |screen| {
             let text = screen.contents();
-            text.contains("> write")
-                || text.lines().next().is_some_and(|line| line.trim_end().ends_with("done"))
+            text.lines().any(|line| line.starts_with("write "))
+                || text.contains("> write")
+                || text.lines().next().is_some_and(|line| line.contains("✓ done"))
         });
         terminal.press(key);
         if key != "q" {

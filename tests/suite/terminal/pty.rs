@@ -268,10 +268,10 @@ impl Terminal {
         let words = format!("· render {number}");
         self.wait(&words, |screen| {
             let text = screen.contents();
-            let is_done = text.lines().next().is_some_and(|line| line.trim_end().ends_with("done"));
-            // Frames arrive in pieces, from the top: the bar below the picture says that all of it is there.
-            let is_whole = text.contains("· total ");
-            is_done && is_whole && text.lines().any(|line| line.trim_end().ends_with(&words))
+            // Frames arrive in pieces, from the top: the bar below the picture is gone when all words are there.
+            let is_whole = !text.contains(" samples · ");
+            let is_done = |line: &str| line.contains("✓ done") && line.trim_end().ends_with(&words);
+            is_whole && text.lines().any(is_done)
         });
     }
 

@@ -82,10 +82,10 @@ fn the_line_is_measured_and_shown() {
     terminal.wait_for_render(1);
     terminal.wait("kB and ms", |screen| {
         let text = screen.contents();
-        let status = text.lines().find(|line| line.contains("shadows soft")).unwrap_or_default();
+        let status = text.lines().nth_back(1).unwrap_or_default();
         let words: Vec<&str> = status.split_whitespace().collect();
         let amount = |unit: &str| {
-            let place = words.iter().position(|word| *word == unit)?;
+            let place = words.iter().rposition(|word| *word == unit)?;
             words.get(place.checked_sub(1)?)?.parse::<u32>().ok()
         };
         amount("kB").is_some_and(|size| (1..200).contains(&size))

@@ -1,0 +1,71 @@
+//! The line that stays when the screen is given back.
+
+use super::state::{Activity, State};
+use crate::pipeline::protocol::Report;
+use crate::pipeline::words::seconds;
+use crate::scene::sanitize::visible;
+
+/// What was written, its samples and its seconds, and what came after it.
+pub(super) fn words(state: &State) -> String {
+    let files: Vec<_> =
+        state.written.iter().map(|it| visible(&it.path.to_string_lossy()).into_owned()).collect();
+    let files = if files.is_empty() {
+        "nothing is written".to_owned()
+    } else {
+        format!("wrote {}", files.join(", "))
+    };
+    let made = state.rendered.as_ref().map_or(String::new(), |report| format!(": {}", made(report)));
+    let next = if state.rendered.is_some() { "the render after it" } else { "the render" };
+    let since = match (state.activity, &state.progress) {
+        (Activity::Done, _) => String::new(),
+        (Activity::Running { .. } | Activity::Cancelled, Some(progress)) => {
+            format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
+        }
+        (Activity::Running { .. } | Activity::Cancelled, None) => format!("; {next} was stopped"),
+        (Activity::Waiting | Activity::Broken, _) => {
+            let name = state.scene.file_name().unwrap_or_default().to_string_lossy();
+            format!("; {} has errors since", visible(&name))
+        }
+    };
+    files + &made + &since
+}
+
+fn made(report: &Report) -> String {
+    let image = &report.image;
+    let samples = if image.samples.min == image.samples.max {
+        image.samples.max.to_string()
+    } else {
+        format!("{} to {}", image.samples.min, image.samples.max)
+    };
+    format!("{}×{}, {samples} samples, {}", image.width, image.height, seconds(report.seconds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::protocol::Event;
+    use crate::scene::diagnostic::Severity;
+    use crate::tui::fixtures::{Desk, diagnostic, done, progress};
+
+    #[test]
+    fn it_tells_what_was_written_and_what_was_not() {
+        let mut desk = Desk::new();
+        assert_eq!(words(&desk.state), "nothing is written; the render was stopped");
+        desk.worker(Event::Progress { generation: 1, progress: progress(0.388, None) });
+        assert_eq!(words(&desk.state), "nothing is written; the render was stopped at 38 %");
+        desk.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1 });
+        desk.worker(done(1, Vec::new(), false));
+        let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
+        assert_eq!(words(&desk.state), made);
+        desk.press('r');
+        desk.worker(Event::Started { generation: 2 });
+        desk.worker(done(2, Vec::new(), true));
+        assert_eq!(words(&desk.state), made, "nothing was rendered");
+        desk.press('r');
+        desk.worker(Event::Started { generation: 3 });
+        desk.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
+        assert_eq!(words(&desk.state), format!("{made}; the render after it was stopped at 50 %"));
+        desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
+        assert_eq!(words(&desk.state), format!("{made}; cornell.toml has errors since"));
+    }
+}

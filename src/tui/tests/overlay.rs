@@ -1,0 +1,219 @@
+//! What lies over the picture: the help, the list of views, the errors.
+
+use crossterm::event::KeyCode;
+
+use super::{RED, cells_of};
+use crate::choice::Choice;
+use crate::pipeline::protocol::{self, Failure};
+use crate::pipeline::settings::View;
+use crate::scene::diagnostic::{Diagnostic, Place, Severity};
+use crate::tui::event::{Event, KeyPress};
+use crate::tui::fixtures::*;
+use crate::tui::keymap::{KEYMAP, OVERLAY};
+
+const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);
+
+#[test]
+fn the_help_shows_every_line_of_the_tables_in_every_window() {
+    for (columns, rows) in [(80, 24), (120, 40), (80, 12), (80, 8)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.press('?');
+        let mut seen = desk.text();
+        for _ in 0..60 {
+            desk.press('j');
+            seen += &desk.text();
+        }
+        let lines =
+            KEYMAP.iter().map(|it| (it.label, it.help)).chain(OVERLAY.iter().map(|it| (it.label, it.help)));
+        for (label, help) in lines.filter(|(_, help)| !help.is_empty()) {
+            let line = seen.lines().find(|line| line.contains(help));
+            let line = line.unwrap_or_else(|| panic!("{help:?} is not in\n{seen}"));
+            assert!(line.contains(label), "{line:?}");
+        }
+        desk.key(ESCAPE);
+        assert!(!desk.text().contains(" keys "));
+    }
+}
+
+#[test]
+fn the_help_scrolls_by_every_key_and_stops_at_its_ends() {
+    let mut desk = Desk::with(state(60, 12));
+    desk.press('?');
+    let top = desk.text();
+    assert!(top.contains("j k scroll") && top.contains("esc close"), "{top}");
+    let special = |code| KeyPress::special(code);
+    for (forth, back) in [
+        (KeyPress::plain('j'), KeyPress::plain('k')),
+        (special(KeyCode::Down), special(KeyCode::Up)),
+        (special(KeyCode::PageDown), special(KeyCode::PageUp)),
+    ] {
+        desk.key(forth);
+        assert_ne!(desk.text(), top, "{forth:?}");
+        desk.key(back);
+        assert_eq!(desk.text(), top, "{back:?}");
+        desk.key(back);
+        assert!(!desk.state.dirty, "the top is the top");
+    }
+    for _ in 0..60 {
+        desk.press('j');
+    }
+    desk.screen();
+    desk.press('j');
+    assert!(!desk.state.dirty, "the end is the end");
+    desk.press('?');
+    desk.press('?');
+    assert_eq!(desk.text(), top, "it opens at its top");
+}
+
+#[test]
+fn every_cut_line_of_the_help_says_so() {
+    let mut desk = Desk::with(state(30, 8));
+    desk.press('?');
+    for _ in 0..40 {
+        for line in desk.text().lines().filter(|line| line.contains('│')) {
+            let inner = line.trim().trim_matches('│').trim();
+            let is_whole = KEYMAP.iter().any(|it| inner.ends_with(it.help) && !it.help.is_empty());
+            let is_whole =
+                is_whole || OVERLAY.iter().any(|it| inner.ends_with(it.help) && !it.help.is_empty());
+            assert!(is_whole || inner.ends_with('…'), "{line:?}");
+        }
+        desk.press('j');
+    }
+}
+
+#[test]
+fn views_are_listed_and_chosen_by_digits() {
+    for (columns, rows) in [(80, 24), (120, 40), (120, 24), (40, 12), (30, 8)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.finish(RED);
+        desk.press('5');
+        assert_eq!(desk.state.view(), View::Beauty, "no list, no digits");
+        desk.press('v');
+        let text = desk.text();
+        assert!(
+            text.contains("▸2 normal") && text.contains("1 beauty") && text.contains("3 depth"),
+            "{text}"
+        );
+        let effects = desk.press('3');
+        let wanted = request(&effects).expect("a request").overrides.view;
+        assert_eq!(wanted, Some(View::Depth));
+        assert!(desk.text().contains("▸3 depth"), "{}", desk.text());
+        // From the tenth on digits count anew.
+        for _ in 0..7 {
+            desk.press('v');
+        }
+        assert!(desk.text().contains("▸1 emission"), "{}", desk.text());
+        desk.press('9');
+        assert_eq!(desk.state.view(), *View::ALL.last().expect("views"));
+        desk.key(ESCAPE);
+        assert!(!desk.text().contains("▸"));
+        desk.press('1');
+        assert_eq!(desk.state.view(), View::Error, "the list is closed");
+    }
+}
+
+#[test]
+fn the_list_of_views_goes_by_itself() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.press('v');
+    desk.finish(RED);
+    let wake = desk.state.next_tick().expect("the list asks to be woken");
+    assert!(wake > desk.now);
+    desk.wait(3000);
+    desk.press('v');
+    desk.wait(3000);
+    assert!(desk.text().contains("▸3 depth"), "each key gives it another moment");
+    desk.wait(2000);
+    assert!(desk.state.dirty && !desk.text().contains("▸"));
+    desk.finish(RED);
+    assert_eq!(desk.state.next_tick(), None);
+}
+
+fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
+    let source: std::sync::Arc<str> = std::sync::Arc::from("first = 1\n".repeat(20));
+    let place = Place { source, span: line * 10 - 10..line * 10 - 5, label: String::new() };
+    Diagnostic { place: Some(place), help: None, ..diagnostic(severity, message) }
+}
+
+#[test]
+fn errors_come_before_warnings_and_one_fault_is_told_once_with_its_places() {
+    let mut desk = Desk::with(state(120, 40));
+    let material = |line| at(Severity::Error, "no material is named `wal`", line);
+    desk.fail(vec![
+        at(Severity::Warning, "texture `b` is not used", 1),
+        material(12),
+        material(5),
+        at(Severity::Error, "unknown key `radios`", 3),
+        material(17),
+    ]);
+    let text = desk.text();
+    assert!(text.contains("4 errors"), "{text}");
+    assert_eq!(text.matches("no material is named").count(), 1, "{text}");
+    assert!(
+        text.contains("scenes/cornell.toml:5:1") && text.contains("also in 2 places: 12:1, 17:1"),
+        "{text}"
+    );
+    let place = |words: &str| text.find(words).unwrap_or_else(|| panic!("{words} is not in\n{text}"));
+    assert!(place("radios") < place("wal`") && place("wal`") < place("not used"), "{text}");
+}
+
+#[test]
+fn errors_lie_beside_the_picture_where_there_is_room() {
+    for (columns, rows, is_beside) in [(160, 40, true), (80, 60, true), (80, 24, false)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.finish(RED);
+        let before = cells_of(&mut desk, RED);
+        desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        assert!(desk.text().contains("error: unknown key `heigth`"), "{}", desk.text());
+        let after = cells_of(&mut desk, RED);
+        assert_eq!(after == before, is_beside, "{after} of {before} at {columns}×{rows}\n{}", desk.text());
+    }
+}
+
+#[test]
+fn errors_scroll_by_every_key() {
+    let mut desk = Desk::new();
+    desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    let top = desk.text();
+    for (forth, back) in [('j', 'k')] {
+        desk.press(forth);
+        assert_ne!(desk.text(), top);
+        desk.press(back);
+        assert_eq!(desk.text(), top);
+    }
+    for (forth, back) in [(KeyCode::Down, KeyCode::Up), (KeyCode::PageDown, KeyCode::PageUp)] {
+        desk.key(KeyPress::special(forth));
+        assert_ne!(desk.text(), top, "{forth:?}");
+        desk.key(KeyPress::special(back));
+        assert_eq!(desk.text(), top, "{back:?}");
+    }
+    desk.key(ESCAPE);
+    assert!(!desk.text().contains("wrong number"));
+    desk.screen();
+    desk.key(ESCAPE);
+    assert!(!desk.state.dirty, "nothing is open");
+}
+
+#[test]
+fn a_long_failure_is_wrapped_between_words() {
+    let mut desk = Desk::with(state(40, 12));
+    let failure =
+        Failure::Work("cannot write /a/rather/long/name/of/a/folder/image.png: no such folder".to_owned());
+    desk.worker(protocol::Event::Failed { generation: 1, failure });
+    assert!(desk.text().contains("such folder"), "{}", desk.text());
+}
+
+#[test]
+fn a_resize_keeps_what_is_open_in_the_window() {
+    let mut desk = Desk::new();
+    desk.press('?');
+    for (columns, rows) in [(30, 8), (200, 60), (10, 2), (1, 1), (80, 24)] {
+        desk.event(Event::Resize(window(columns, rows)));
+        for _ in 0..5 {
+            desk.press('j');
+        }
+        desk.screen();
+    }
+    assert!(desk.text().contains(" keys "), "{}", desk.text());
+}

@@ -1,0 +1,67 @@
+//! What a key does to what lies over the picture: the help, the list of views, the errors.
+
+use crossterm::event::KeyCode;
+
+use super::keys::choose_view;
+use crate::choice::Choice;
+use crate::pipeline::settings::View;
+use crate::tui::event::{Effect, KeyPress};
+use crate::tui::keymap::{self, Overlay};
+use crate::tui::state::State;
+use crate::tui::view::views::PAGE;
+use crate::tui::view::{diagnostics, help};
+
+/// None: nothing is open that the key means something to.
+pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
+    if let Some(view) = chosen(state, key) {
+        state.message = None;
+        return Some(choose_view(state, view));
+    }
+    act(state, keymap::overlay(key)?).then(Vec::new)
+}
+
+/// Whether there is anything open that this means something to.
+pub(super) fn act(state: &mut State, action: Overlay) -> bool {
+    match action {
+        Overlay::Close => close(state),
+        Overlay::LineUp => scroll(state, |line, _| line.saturating_sub(1)),
+        Overlay::LineDown => scroll(state, |line, _| line + 1),
+        Overlay::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
+        Overlay::PageDown => scroll(state, |line, page| line + page),
+    }
+}
+
+/// The view of a digit, counted among those near the current one.
+fn chosen(state: &State, key: KeyPress) -> Option<View> {
+    let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
+    state.views.filter(|_| key.modifiers.is_empty())?;
+    let current = View::ALL.iter().position(|view| *view == state.view())?;
+    let number = digit.to_digit(10)? as usize - 1;
+    View::ALL.get(current / PAGE * PAGE + number).copied()
+}
+
+/// What was opened over all else.
+fn close(state: &mut State) -> bool {
+    let is_open = state.help.open || state.views.is_some() || state.pane.open;
+    if state.help.open {
+        state.help.open = false;
+    } else if state.views.take().is_none() {
+        state.pane.open = false;
+    }
+    state.dirty |= is_open;
+    is_open
+}
+
+/// The help, or errors that are longer than their pane; in a shorter one the keys mean what they mean else.
+fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
+    let (is_help, (page, last)) = match () {
+        () if state.help.open => (true, help::extent(state)),
+        () if state.pane.open => (false, diagnostics::extent(state)),
+        () => return false,
+    };
+    let pane = if is_help { &mut state.help } else { &mut state.pane };
+    let line = step(pane.scroll.min(last), page).min(last);
+    state.dirty |= line != pane.scroll;
+    pane.scroll = line;
+    is_help || last > 0
+}

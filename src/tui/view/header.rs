@@ -1,0 +1,144 @@
+//! The line at the top: what is going on, of what, and how far it is. Where the picture is alone it is all there is.
+
+use std::time::Duration;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::layout::Layout;
+use super::text::{Tone, columns, counted, number, percent, put, put_right, rest, running, seconds};
+use super::under;
+use crate::choice::Choice;
+use crate::pipeline::protocol::Status;
+use crate::pipeline::settings::View;
+use crate::scene::diagnostic::Severity;
+use crate::scene::sanitize::visible;
+use crate::tui::action::Action;
+use crate::tui::keymap;
+use crate::tui::state::{Activity, State};
+
+/// The block of the state has this many columns, so that the name beside it stands still.
+const BLOCK: usize = 13;
+/// From this width on there is room for that.
+const WIDE: u16 = 60;
+/// A name of fewer columns says nothing.
+const LEAST_NAME: u16 = 6;
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let area = layout.header;
+    let used = block(state, area, buffer);
+    let mut room = rest(area, used + 1);
+    // Where there is no other line for a message it takes all of this one.
+    if layout.keys.is_empty()
+        && let Some((message, tone)) = under::message(state)
+    {
+        put(buffer, room, &[(&message, tone)], state.depth);
+        return;
+    }
+    if state.is_alone {
+        let back =
+            keymap::of(Action::PictureAlone).map_or(String::new(), |it| format!("  {} back", it.label));
+        room.width -= put_right(buffer, room, &back, Tone::Faint, state.depth);
+    }
+    room.width -= put_right(buffer, room, &figures(state), Tone::Strong, state.depth);
+    room.width = room.width.saturating_sub(1);
+    if room.width >= LEAST_NAME {
+        name(state, room, buffer);
+    }
+}
+
+/// The state in its colour. Returns the columns used.
+fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
+    let (sign, word, tone) = activity(state);
+    let mut text = format!(" {sign} {word} ");
+    if area.width >= WIDE {
+        text = format!("{text:<BLOCK$}");
+    }
+    let area = area.intersection(buffer.area);
+    if area.is_empty() {
+        return 0;
+    }
+    let width = usize::from(area.width);
+    let end = buffer.set_stringn(area.x, area.y, text, width, tone.block(state.depth)).0;
+    end - area.x
+}
+
+/// A sign, a word and a colour, each of which tells it.
+pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
+    match state.activity {
+        _ if state.paused => ("‖", "paused", Tone::Warning),
+        Activity::Running { .. } => ("●", "rendering", Tone::Working),
+        Activity::Done => ("✓", "done", Tone::Good),
+        Activity::Waiting => ("…", "waiting", Tone::Warning),
+        Activity::Broken => ("✗", "broken", Tone::Error),
+        Activity::Cancelled => ("■", "stopped", Tone::Warning),
+    }
+}
+
+/// The file's name, the view, the picture's size, the file's folder.
+fn name(state: &State, area: Rect, buffer: &mut Buffer) {
+    let path = state.scene.to_string_lossy();
+    let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
+    let (folder, file) = (visible(folder), visible(file));
+    let size = state.effective.as_ref().map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
+    let folder = if folder.is_empty() { String::new() } else { format!("  {folder}") };
+    let view = view(state);
+    let view = (&*view, Tone::Strong);
+    let mut pieces = vec![(&*file, Tone::Strong), view, (&*size, Tone::Faint), (&*folder, Tone::Faint)];
+    // What does not fit is left out before the name is cut.
+    let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| columns(text)).sum::<u16>();
+    while pieces.len() > 1 && width(&pieces) > area.width {
+        pieces.pop();
+    }
+    put(buffer, area, &pieces, state.depth);
+}
+
+/// What is seen, where it is not the picture itself, and what it is stretched to.
+fn view(state: &State) -> String {
+    if state.view() == View::Beauty {
+        return String::new();
+    }
+    let shown = state.picture.as_ref().filter(|shown| shown.generation == state.generation);
+    let range = shown.and_then(|shown| shown.range);
+    let range =
+        range.map_or(String::new(), |[least, most]| format!(" {} to {}", number(least), number(most)));
+    format!("  view {}{range}", state.view().name())
+}
+
+/// How far it is, or what came of it.
+fn figures(state: &State) -> String {
+    match (state.activity, &state.report, &state.progress) {
+        (Activity::Running { .. }, _, Some(progress)) => {
+            let done = format!("{} %", percent(progress.fraction));
+            let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
+            match eta {
+                _ if state.paused => done,
+                Some(eta) => format!("{done}  ETA {}", running(eta)),
+                None => format!("{done}  ETA …"),
+            }
+        }
+        (Activity::Running { .. }, _, None) => {
+            at_work(state).map_or(String::new(), |name| format!("{name}…"))
+        }
+        (Activity::Done, _, _) if state.unchanged => format!("unchanged · render {}", state.renders),
+        (Activity::Done, Some(report), _) => {
+            format!("{} · render {}", seconds(report.seconds), state.renders)
+        }
+        (Activity::Waiting, _, _) => "for the file to be whole".to_owned(),
+        (Activity::Broken, _, _) => errors(state),
+        (Activity::Done | Activity::Cancelled, _, _) => String::new(),
+    }
+}
+
+/// The stage that is at work.
+pub(super) fn at_work(state: &State) -> Option<&'static str> {
+    let mut stages = state.stages.iter().flatten();
+    stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
+}
+
+/// How many errors there are.
+pub(super) fn errors(state: &State) -> String {
+    let Some(problems) = &state.problems else { return String::new() };
+    let errors = problems.diagnostics.iter().filter(|it| it.severity == Severity::Error).count();
+    counted(errors + usize::from(problems.work.is_some()), "error")
+}

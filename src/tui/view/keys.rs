@@ -1,0 +1,192 @@
+//! The line of keys: the toggles with their values, what is of use now, and the way to the rest.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::header::activity;
+use super::layout::Layout;
+use super::text::{Tone, columns, put, rest};
+use super::under;
+use crate::choice::Choice;
+use crate::scene::description::Integrator;
+use crate::scene::report::summary;
+use crate::tui::action::Action;
+use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
+use crate::tui::state::{Activity, State};
+
+/// A key, and what is said of it in full and in short.
+struct Hint {
+    key: &'static str,
+    words: String,
+    short: String,
+    tone: Tone,
+}
+
+impl Hint {
+    fn new(key: &'static str, words: impl Into<String>) -> Self {
+        let words = words.into();
+        Self { key, short: words.clone(), words, tone: Tone::Faint }
+    }
+
+    fn of(action: Action) -> Option<Self> {
+        keymap::of(action).map(|it| Self::new(it.label, it.hint))
+    }
+
+    fn width(&self, is_long: bool) -> u16 {
+        columns(self.key) + 1 + columns(self.said(is_long)) + GAP
+    }
+
+    fn said(&self, is_long: bool) -> &str {
+        if is_long { &self.words } else { &self.short }
+    }
+}
+
+/// Between two of them.
+const GAP: u16 = 2;
+/// Columns that are kept for what is of use now, before the toggles are said in full.
+const OF_USE: u16 = 26;
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let area = layout.keys;
+    if layout.under.is_empty()
+        && let Some((message, tone)) = under::message(state)
+    {
+        put(buffer, area, &[(&message, tone)], state.depth);
+        return;
+    }
+    let ways = [Hint::of(Action::Quit), Hint::of(Action::ToggleHelp)];
+    let ways: Vec<Hint> = ways.into_iter().flatten().collect();
+    let width = |hints: &[Hint], is_long| hints.iter().map(|hint| hint.width(is_long)).sum::<u16>();
+    // The help is never left out.
+    let skipped = usize::from(area.width < 44 && ways.len() > 1);
+    let ways = &ways[skipped..];
+    let toggles = if state.help.open { Vec::new() } else { toggles(state) };
+    let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
+    let is_long = width(&toggles, true) + OF_USE <= room;
+    let mut left = Rect { width: room, ..area };
+    for hint in fitting(of_use_first(state), toggles, room, is_long) {
+        left = rest(left, show(&hint, left, is_long, state, buffer));
+    }
+    let mut right = rest(area, room);
+    for hint in ways {
+        right = rest(right, show(hint, right, true, state, buffer));
+    }
+}
+
+/// Toggles and what is of use: what is urgent has its place, then the toggles, then what else there is room for.
+fn fitting(
+    (urgent, useful): (Vec<Hint>, Vec<Hint>),
+    toggles: Vec<Hint>,
+    room: u16,
+    is_long: bool,
+) -> Vec<Hint> {
+    let mut left = room;
+    let mut take = |hints: Vec<Hint>| -> Vec<Hint> {
+        let fits = |hint: &Hint| {
+            let width = hint.width(is_long);
+            let fits = width <= left;
+            left -= if fits { width } else { 0 };
+            fits
+        };
+        hints.into_iter().filter(fits).collect()
+    };
+    let urgent = take(urgent);
+    let toggles = take(toggles);
+    toggles.into_iter().chain(urgent).chain(take(useful)).collect()
+}
+
+fn show(hint: &Hint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
+    let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.said(is_long), hint.tone)];
+    put(buffer, area, &pieces, state.depth);
+    hint.width(is_long)
+}
+
+/// Each toggle with its value, in bold where the keys have changed it.
+fn toggles(state: &State) -> Vec<Hint> {
+    let shadows = match state.integrator() {
+        Integrator::Whitted => state.shadows().name(),
+        Integrator::Path => "–",
+    };
+    let on_off = |on| if on { "on" } else { "off" };
+    let photons = on_off(state.effective.as_ref().is_some_and(|it| it.photons));
+    let keys = &state.toggles;
+    let all = [
+        (Action::CycleShadows, "shadows", shadows.to_owned(), keys.shadows.is_some()),
+        (Action::TogglePhotons, "photons", photons.to_owned(), keys.photons.is_some()),
+        (Action::ToggleDepthOfField, "dof", on_off(depth_of_field(state)).to_owned(), keys.dof.is_some()),
+        (Action::NextView, "view", state.view().name().to_owned(), keys.view.is_some()),
+        (Action::CycleIntegrator, "", state.integrator().name().to_owned(), keys.integrator.is_some()),
+    ];
+    let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
+        let key = keymap::of(action)?.label.split(' ').next()?;
+        let words = format!("{name} {value}").trim_start().to_owned();
+        Some(Hint { key, words, short: value, tone: if is_changed { Tone::Strong } else { Tone::Faint } })
+    };
+    all.into_iter().filter_map(hint).collect()
+}
+
+/// What is of use now: what is urgent, and what else is.
+fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
+    let overlay = |wanted: &[Overlay]| -> Vec<Hint> {
+        let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
+        of.map(|it| Hint::new(it.label, it.hint)).collect()
+    };
+    let closing = || overlay(&[Overlay::Close]);
+    if state.help.open {
+        return (overlay(&[Overlay::LineDown, Overlay::PageDown, Overlay::Close]), Vec::new());
+    }
+    let mut urgent = Vec::new();
+    if state.views.is_some() {
+        urgent.extend([Hint::new("1-9", "choose")].into_iter().chain(closing()));
+    } else if state.pane.open {
+        urgent.extend(overlay(&[Overlay::LineDown]).into_iter().chain(closing()));
+    }
+    urgent.extend(unseen(state));
+    let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
+    let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
+    urgent.extend(state.changes().into_iter().map(changed));
+    let now: &[Action] = match state.activity {
+        _ if state.paused => &[Action::TogglePause, Action::WriteNow],
+        Activity::Running { .. } => &[Action::TogglePause],
+        Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
+    };
+    let first = now.iter().filter_map(|action| Hint::of(*action)).map(|hint| going_on(hint, state));
+    let is_other =
+        |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
+    let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.is_running();
+    let others = KEYMAP.iter().filter(is_other).filter(is_idle).map(|it| Hint::new(it.label, it.hint));
+    (urgent, first.chain(others).collect())
+}
+
+/// These have their own places in the line.
+const ELSEWHERE: [Action; 8] = [
+    Action::Quit,
+    Action::ToggleHelp,
+    Action::ToggleDiagnostics,
+    Action::CycleShadows,
+    Action::TogglePhotons,
+    Action::ToggleDepthOfField,
+    Action::NextView,
+    Action::CycleIntegrator,
+];
+
+fn going_on(hint: Hint, state: &State) -> Hint {
+    let is_pause = keymap::of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
+    if is_pause && state.paused { Hint::new(hint.key, "go on") } else { hint }
+}
+
+/// Errors and warnings that are not in sight.
+fn unseen(state: &State) -> Option<Hint> {
+    let key = keymap::of(Action::ToggleDiagnostics)?.label;
+    let (words, tone) = match &state.problems {
+        _ if state.pane.open => return None,
+        Some(_) => (super::header::errors(state), activity(state).2),
+        None if state.warnings.is_empty() => return None,
+        None => (summary(&state.warnings), Tone::Warning),
+    };
+    Some(Hint { tone, ..Hint::new(key, words) })
+}
+
+fn depth_of_field(state: &State) -> bool {
+    state.effective.as_ref().is_some_and(|it| it.dof) && state.overrides().dof != Some(false)
+}

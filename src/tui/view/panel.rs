@@ -1,0 +1,113 @@
+//! The panel beside or below the picture: stages and loading assets while they are at work, then what came out.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::layout::ENTRY_WIDTH;
+use super::stages::{self, Line};
+use super::text::{Tone, bytes, columns, gauge, percent, put, row, shortened};
+use super::under;
+use crate::pipeline::protocol::Stage;
+use crate::scene::report::summary;
+use crate::scene::sanitize::visible;
+use crate::tui::state::{Activity, AssetBar, PreviewKind, State};
+
+/// Columns of a bar.
+const BAR: u16 = 8;
+/// Columns of what a result is.
+const LABEL: usize = 8;
+
+/// In as many columns as there have to be and can be; what does not fit is left out at the end.
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
+    if area.is_empty() {
+        return;
+    }
+    let lines = lines(state, area.width);
+    let wanted = lines.len().div_ceil(usize::from(area.height));
+    let number = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (area.width / ENTRY_WIDTH).max(1));
+    let width = area.width / number;
+    for (index, line) in (0..).zip(lines.iter()) {
+        let (column, line_of) = (index / area.height, index % area.height);
+        if column >= number {
+            return;
+        }
+        let gap = u16::from(column + 1 < number);
+        let place = Rect { x: area.x + column * width, width: width - gap, ..area };
+        let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
+        put(buffer, row(place, line_of), &pieces, state.depth);
+    }
+}
+
+fn lines(state: &State, width: u16) -> Vec<Line> {
+    let is_done = matches!(state.activity, Activity::Done);
+    let mut lines = Vec::new();
+    if !is_done {
+        lines.extend(Stage::ALL.iter().map(|stage| stages::line(state, *stage, width)));
+    }
+    lines.extend(state.assets.iter().map(|asset| asset_line(state, asset, width)));
+    if is_done {
+        lines.extend(results(state));
+    }
+    lines.extend(hint(state, width));
+    lines
+}
+
+fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
+    let fraction = stages::fraction(asset);
+    let (filled, empty) = gauge(fraction, BAR, state.preview == PreviewKind::Ascii);
+    let percent = format!(" {:3} %", percent(fraction));
+    let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + columns(&percent) + 1);
+    let name = shortened(&visible(&asset.progress.name), room);
+    let pad = usize::from(room - columns(&name).min(room)) + 1;
+    let name = name + &" ".repeat(pad);
+    vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
+}
+
+/// What came out: a label and a value in each line.
+fn results(state: &State) -> Vec<Line> {
+    let fact =
+        |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
+    let mut lines = Vec::new();
+    for written in &state.written {
+        let name = visible(&written.path.to_string_lossy()).into_owned();
+        lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::Plain)]);
+        let size = state.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
+        lines.push(vec![(format!("  {}{}", bytes(written.bytes), size.unwrap_or_default()), Tone::Faint)]);
+    }
+    if let Some(report) = &state.report {
+        let samples = report.image.samples;
+        lines.push(fact(
+            "samples",
+            if samples.min == samples.max {
+                samples.max.to_string()
+            } else {
+                format!("{} to {}", samples.min, samples.max)
+            },
+        ));
+        lines.extend(report.image.error.map(|error| fact("noise", format!("{:.2} %", error * 100.0))));
+    }
+    lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
+    if !state.warnings.is_empty() {
+        let them = if state.warnings.len() == 1 { "it" } else { "them" };
+        let words = format!("{}: e shows {them}", summary(&state.warnings));
+        lines.push(vec![(words, Tone::Warning)]);
+    }
+    lines
+}
+
+/// The hint for whoever has not saved yet, broken between words.
+fn hint(state: &State, width: u16) -> Vec<Line> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in under::hint(state).split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if columns(line) + 1 + columns(word) <= width.min(ENTRY_WIDTH) => {
+                *line += &format!(" {word}")
+            }
+            Some(_) | None => lines.push(word.to_owned()),
+        }
+    }
+    if !lines.is_empty() {
+        lines.insert(0, String::new());
+    }
+    lines.into_iter().map(|line| vec![(line, Tone::Faint)]).collect()
+}

@@ -1,0 +1,125 @@
+//! The line under the picture: a message; else how far the render is; else what it took.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::header::at_work;
+use super::layout::Layout;
+use super::stages;
+use super::text::{Tone, bytes, columns, duration, gauge, put, put_right, rest, running};
+use crate::scene::sanitize::visible;
+use crate::tui::state::{Activity, PreviewKind, State};
+
+/// The hint in a narrow window.
+const SHORT_HINT: &str = "save it to render again";
+/// A shorter bar says nothing.
+const LEAST_BAR: u16 = 6;
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let area = layout.under;
+    if let Some((message, tone)) = message(state) {
+        put(buffer, area, &[(&message, tone)], state.depth);
+        return;
+    }
+    match state.activity {
+        Activity::Running { .. } => bar(state, layout, buffer),
+        Activity::Done => summary(state, layout, buffer),
+        Activity::Waiting | Activity::Cancelled => {}
+        Activity::Broken if state.picture.is_some() => {
+            put(
+                buffer,
+                area,
+                &[("the last good picture stays until the file is whole", Tone::Faint)],
+                state.depth,
+            );
+        }
+        Activity::Broken => {}
+    }
+}
+
+/// What was said last, until the next key.
+pub(super) fn message(state: &State) -> Option<(String, Tone)> {
+    let message = state.message.as_ref()?;
+    let tone = if message.starts_with("error") { Tone::Error } else { Tone::Strong };
+    Some((visible(message).into_owned(), tone))
+}
+
+/// Of the loading asset or of the render.
+fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let area = layout.under;
+    let time = state.running_for().map_or(String::new(), running);
+    let name = at_work(state).unwrap_or_default();
+    let (fraction, words) = match (&state.progress, state.assets.last()) {
+        (Some(progress), _) => {
+            let samples = format!("{}/{} samples", progress.samples, progress.total_samples);
+            (progress.fraction, format!("{samples} · {time}"))
+        }
+        (None, Some(asset)) if layout.panel.is_empty() => {
+            (stages::fraction(asset), visible(&asset.progress.name).into_owned())
+        }
+        (None, asset) => (asset.map_or(0.0, stages::fraction), time),
+    };
+    let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
+    if room < LEAST_BAR {
+        put(buffer, area, &[(&words, Tone::Plain)], state.depth);
+        return;
+    }
+    let (filled, empty) = gauge(fraction, room, state.preview == PreviewKind::Ascii);
+    let (tone, gap) = (if state.paused { Tone::Warning } else { Tone::Working }, (" ", Tone::Plain));
+    let pieces =
+        [(name, Tone::Faint), gap, (&*filled, tone), (&*empty, Tone::Faint), gap, (&*words, Tone::Plain)];
+    put(buffer, area, &pieces, state.depth);
+}
+
+/// The stages in one line, and what else is to be told where it is not in the panel.
+fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let area = layout.under;
+    let mut pieces = stages::in_one_line(state);
+    let mut is_room = |text: String, tone| {
+        let width: u16 = pieces.iter().map(|(text, _)| columns(text)).sum();
+        if !text.is_empty() && width + columns(&text) <= area.width {
+            pieces.push((text, tone));
+        }
+    };
+    if layout.panel.is_empty() {
+        for written in &state.written {
+            let name = visible(&written.path.to_string_lossy()).into_owned();
+            is_room(format!(" → {name} {}", bytes(written.bytes)), Tone::Faint);
+        }
+    }
+    let pieces: Vec<(&str, Tone)> = pieces.iter().map(|(text, tone)| (&**text, *tone)).collect();
+    let used = put(buffer, area, &pieces, state.depth);
+    let free = rest(area, used + 2);
+    let words = [hint(state), SHORT_HINT.to_owned()];
+    if layout.panel.is_empty() && state.edits == 0 {
+        let fitting = words.into_iter().find(|words| columns(words) <= free.width);
+        put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.depth);
+        return;
+    }
+    let used = put_right(buffer, free, &frame(state), Tone::Faint, state.depth);
+    let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
+    let seen = seen(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
+    put_right(buffer, free, &seen, Tone::Faint, state.depth);
+}
+
+/// From the save to the first changed cell.
+pub(super) fn seen(state: &State) -> Option<String> {
+    state.first_change.map(|time| format!("saved → seen {}", duration(time)))
+}
+
+/// What somebody who has not saved yet may not know.
+pub(super) fn hint(state: &State) -> String {
+    if state.edits > 0 {
+        return String::new();
+    }
+    let name = state.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    format!("save {} and it is rendered again", visible(&name))
+}
+
+/// What the last picture took on its way: its size, and how long the terminal takes to answer.
+fn frame(state: &State) -> String {
+    let Some(frame) = state.frame else { return String::new() };
+    let size = format!("{} kB", frame.bytes.div_ceil(1000));
+    let answer = frame.round_trip.map_or(String::new(), |time| format!(" {} ms", time.as_millis().max(1)));
+    size + &answer
+}

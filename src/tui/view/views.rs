@@ -1,0 +1,59 @@
+//! The list of views, for a moment after one was chosen: in the panel where that has room, else over the picture.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::{Clear, Widget};
+
+use super::layout::Layout;
+use super::text::{Tone, put};
+use crate::choice::Choice;
+use crate::pipeline::settings::View;
+use crate::tui::state::State;
+
+/// Columns of one view with its digit.
+const WIDTH: u16 = 16;
+/// Views that digits choose from at a time.
+pub(in crate::tui) const PAGE: usize = 9;
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
+    let area = area(layout).intersection(buffer.area);
+    if area.is_empty() {
+        return;
+    }
+    Clear.render(area, buffer);
+    let (columns, rows) = (usize::from((area.width / WIDTH).max(1)), usize::from(area.height));
+    // Where they do not all fit, the current one is in the middle.
+    let shown = columns * rows;
+    let first = current.saturating_sub(shown / 2).min(View::ALL.len().saturating_sub(shown));
+    for (index, number) in (first..View::ALL.len()).take(shown).enumerate() {
+        let (column, row) = ((index / rows) as u16, (index % rows) as u16);
+        let place =
+            Rect { x: area.x + column * WIDTH, y: area.y + row, width: WIDTH.min(area.width), height: 1 };
+        line(state, number, current, place, buffer);
+    }
+}
+
+fn line(state: &State, number: usize, current: usize, place: Rect, buffer: &mut Buffer) {
+    let is_near = number / PAGE == current / PAGE;
+    let digit = if is_near { (number % PAGE + 1).to_string() } else { " ".to_owned() };
+    let is_current = number == current;
+    let sign = if is_current { "▸" } else { " " };
+    let name = format!(" {:<11}", View::ALL[number].name());
+    let tone = if is_current { Tone::Chosen } else { Tone::Plain };
+    let pieces = [(sign, Tone::Strong), (&*digit, Tone::Strong), (&*name, tone)];
+    put(buffer, place, &pieces, state.depth);
+}
+
+/// One column in a panel that is high enough, else two or what there is room for.
+fn area(layout: &Layout) -> Rect {
+    let all = View::ALL.len() as u16;
+    let panel = layout.panel;
+    if panel.width >= WIDTH && panel.height >= all {
+        return Rect { height: all, ..panel };
+    }
+    let around = if panel.width >= 2 * WIDTH && panel.height >= all / 2 { panel } else { layout.preview };
+    let columns = if around.height >= all { 1 } else { 2 };
+    let width = (columns * WIDTH).min(around.width);
+    Rect { x: around.right() - width, width, height: all.div_ceil(columns).min(around.height), ..around }
+}

@@ -1,0 +1,150 @@
+//! The whole screen in windows of all sizes: the picture alone, the help, the list of views, the end.
+
+use super::pty::{Colors, Folder, SCENE, Terminal};
+
+const TAB: &str = "\t";
+const ESCAPE: &str = "\x1b";
+const PAGE_DOWN: &str = "\x1b[6~";
+
+/// The last row of the screen.
+fn last_line(screen: &vt100::Screen) -> String {
+    let rows = usize::from(screen.size().0.get());
+    screen.contents().lines().nth(rows - 1).unwrap_or_default().trim_end().to_owned()
+}
+
+/// Waits until the words for this size are there, and gives the red cells once they stay.
+fn resized(terminal: &mut Terminal, columns: u16, rows: u16) -> usize {
+    terminal.resize(columns, rows);
+    terminal.wait("the line of keys", |screen| last_line(screen).ends_with("? help"));
+    terminal.settled(|screen| Colors::of(screen).red)
+}
+
+#[test]
+fn tab_leaves_the_picture_alone_and_comes_back() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let beside = terminal.settled(|screen| Colors::of(screen).red);
+    terminal.press(TAB);
+    terminal.wait_for("tab back");
+    let alone = terminal.settled(|screen| Colors::of(screen).red);
+    assert!(alone > beside, "{alone} {beside}");
+    let last = terminal.look(last_line);
+    assert!(last.contains("✓ done") && last.ends_with("tab back"), "{last}");
+    terminal.press("e");
+    terminal
+        .wait("a message in the one line", |screen| last_line(screen).contains("no errors and no warnings"));
+    terminal.press(TAB);
+    terminal.wait("the keys", |screen| last_line(screen).ends_with("? help"));
+    assert_eq!(terminal.settled(|screen| Colors::of(screen).red), beside);
+}
+
+#[test]
+fn the_help_scrolls_where_it_does_not_fit() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    resized(&mut terminal, 60, 12);
+    terminal.press("?");
+    terminal.wait_for("show or hide this help");
+    terminal.wait_for("j k scroll");
+    for (forth, back) in [("j", "k"), ("\x1b[B", "\x1b[A"), (PAGE_DOWN, "\x1b[5~")] {
+        terminal.press(forth);
+        terminal.wait("further lines", |screen| !screen.contents().contains("show or hide this help"));
+        terminal.press(back);
+        terminal.wait_for("show or hide this help");
+    }
+    terminal.press(&PAGE_DOWN.repeat(9));
+    terminal.wait_for("the time of a stage");
+    terminal.press(ESCAPE);
+    terminal.wait("no help", |screen| !screen.contents().contains("the time of a stage"));
+}
+
+#[test]
+fn a_view_is_chosen_from_the_list() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("v");
+    terminal.wait_for("▸2 normal");
+    terminal.press("6");
+    terminal.wait_for("▸6 albedo");
+    terminal.wait_for_render(3);
+    terminal.press(ESCAPE);
+    terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
+    terminal.press("V");
+    terminal.wait_for("▸5 uv");
+    // It goes by itself.
+    terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
+    terminal.wait_for("v uv");
+}
+
+#[test]
+fn small_windows_show_picture_state_errors_and_keys() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    for (columns, rows) in [(40, 12), (30, 8)] {
+        folder.write("scene.toml", SCENE);
+        terminal.wait_for("done");
+        let red = resized(&mut terminal, columns, rows);
+        assert!(red > 20, "{red} at {columns}×{rows}\n{}", terminal.text());
+        terminal.wait_for("s soft");
+        folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
+        terminal.wait_for("broken");
+        terminal.wait_for("scene.toml:4:11");
+        terminal.press("?");
+        terminal.wait_for("show or hide");
+        terminal.press("?");
+        terminal.press(ESCAPE);
+        terminal.wait("the picture", |screen| Colors::of(screen).red == red);
+    }
+}
+
+#[test]
+fn without_colours_every_state_has_its_sign_and_word() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
+    terminal.wait_for("✓ done");
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    terminal.wait_for("● rendering");
+    terminal.wait_for("ETA");
+    terminal.press(" ");
+    terminal.wait_for("‖ paused");
+    terminal.press("v");
+    terminal.wait_for("▸2 normal");
+    folder.write("scene.toml", "[render");
+    terminal.wait_for("✗ broken");
+    terminal.wait_for("error");
+}
+
+#[test]
+fn a_storm_of_sizes_leaves_the_screen_of_the_last_one() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let red = terminal.settled(|screen| Colors::of(screen).red);
+    terminal.press("v");
+    terminal.press("1");
+    for step in 0..60_u16 {
+        terminal.resize(10 + step * 37 % 190, 2 + step * 23 % 58);
+        if step % 10 == 0 {
+            terminal.press(TAB);
+        }
+    }
+    terminal.press(ESCAPE);
+    terminal.resize(80, 24);
+    terminal.wait("the last line", |screen| last_line(screen).ends_with("? help"));
+    terminal.wait("the picture", |screen| Colors::of(screen).red == red);
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
+
+#[test]
+fn one_line_stays_when_it_is_left() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("q");
+    assert_eq!(terminal.end_saying("wrote scene.png: 64×48, 4 samples, "), 0);
+}
