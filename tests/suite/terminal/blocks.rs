@@ -8,7 +8,10 @@ fn oblique() -> String {
 }
 
 fn has_finer_blocks(screen: &vt100::Screen) -> bool {
-    screen.contents().chars().any(|symbol| matches!(symbol, '▖'..='▟' | '▌' | '▐' | '\u{1CD00}'..='\u{1CEAB}'))
+    screen
+        .contents()
+        .chars()
+        .any(|symbol| matches!(symbol, '▖'..='▟' | '▌' | '▐' | '\u{1CD00}'..='\u{1CEAB}'))
 }
 
 #[test]
