@@ -123,3 +123,56 @@ fn mean(first: [u8; 3], second: [u8; 3], tile: Tile) -> [u8; 3] {
     let mixed = (srgb8_to_linear(first) * a + srgb8_to_linear(second) * b) / (a + b);
     mixed.to_array().map(crate::math::color::linear_to_srgb8)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::color::XTERM;
+
+    fn cell(shades: &Shades, rgb: [u8; 3], x: usize, y: usize) -> Shown {
+        shades.cell(Fitted { tile: Tile::HALVES, pair: [rgb; 2] }, x, y)
+    }
+
+    #[test]
+    fn a_cell_hangs_on_its_colours_and_place_alone() {
+        for depth in [ColorDepth::Indexed256, ColorDepth::Ansi16] {
+            let (one, other) = (Shades::new(depth, &XTERM), Shades::new(depth, &XTERM));
+            for i in 0..200 {
+                // Other colours, in another order.
+                cell(&other, [i as u8, 90, 200 - i as u8], i, 3);
+            }
+            for (x, y) in [(0, 0), (3, 1), (7, 5)] {
+                assert_eq!(cell(&one, [150, 75, 50], x, y), cell(&other, [150, 75, 50], x + 8, y + 8));
+            }
+        }
+    }
+
+    #[test]
+    fn exact_colours_of_16_stay_at_every_place() {
+        let shades = Shades::new(ColorDepth::Ansi16, &XTERM);
+        for (rgb, name) in XTERM.into_iter().zip(NAMES) {
+            for place in 0..64 {
+                assert_eq!(cell(&shades, rgb, place % 8, place / 8).pair, [name; 2], "{rgb:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_grey_between_two_of_16_is_mixed_of_greys_in_its_cells() {
+        let shades = Shades::new(ColorDepth::Ansi16, &XTERM);
+        for place in 0..64 {
+            let Shown { pair, .. } = cell(&shades, [70; 3], place % 8, place / 8);
+            assert!(pair.iter().all(|color| [Color::Black, Color::DarkGray].contains(color)), "{pair:?}");
+        }
+    }
+
+    #[test]
+    fn edges_are_drawn_as_halves_and_other_colours_of_the_terminal_are_heeded() {
+        let mut ansi = XTERM;
+        ansi[1] = [150, 75, 50];
+        let shades = Shades::new(ColorDepth::Ansi16, &ansi);
+        assert_eq!(cell(&shades, [150, 75, 50], 2, 2).pair, [Color::Red; 2]);
+        let edge = Fitted { tile: Tile::HALVES, pair: [[255; 3], [0; 3]] };
+        assert_eq!(shades.cell(edge, 1, 1), Shown { tile: Tile::HALVES, pair: [Color::White, Color::Black] });
+    }
+}

@@ -25,7 +25,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     match &state.picture {
         Some(_) if is_in_pixels(state) => {}
         Some(shown) => {
-            let kind = in_cells(state.preview);
+            let kind = in_cells(state.preview, state.depth);
             let placed = Placed::fit(&shown.picture, area, kind, state.window.cell_aspect);
             placed.draw(&shown.picture, kind, Inks::of(state), buffer);
         }
@@ -51,8 +51,11 @@ pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Sp
 }
 
 /// What is drawn where the picture has to be in cells.
-fn in_cells(kind: PreviewKind) -> PreviewKind {
-    if matches!(kind, PreviewKind::Pixels(_)) { PreviewKind::HalfBlock } else { kind }
+fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
+    match kind {
+        PreviewKind::Pixels(_) => PreviewKind::of(PreviewChoice::Auto, depth),
+        kind => kind,
+    }
 }
 
 /// Whether the picture is drawn in pixels: where nothing may lie over it.
@@ -88,7 +91,7 @@ impl<'a> Inks<'a> {
 /// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colours of xterm.
 pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
     let mut buffer = Buffer::empty(area);
-    let kind = in_cells(PreviewKind::of(choice, depth));
+    let kind = in_cells(PreviewKind::of(choice, depth), depth);
     let shades = Shades::new(depth, &XTERM);
     let inks = Inks { depth, shades: &shades, is_light: false };
     Placed::fit(picture, area, kind, 2.0).draw(picture, kind, inks, &mut buffer);
