@@ -1,6 +1,7 @@
 //! The worker driven by messages, as front ends do it.
 
 mod orders;
+mod photons;
 mod reuse;
 mod targets;
 
