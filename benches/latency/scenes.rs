@@ -85,6 +85,26 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["s", "v"],
     },
+    Scene {
+        name: "photons",
+        edits: &[
+            ("material", "red = { diffuse = [0.63,", "red = { diffuse = [{},"),
+            ("camera", "position = [0, 1, 4.4]", "position = [{}, 1, 4.4]"),
+            ("object", "center = [-0.42, 0.42,", "center = [-{}, 0.42,"),
+            ("light", "emission = [150,", "emission = [15{},"),
+        ],
+        keys: &["p", "v"],
+    },
+    Scene {
+        name: "water",
+        edits: &[
+            ("material", "table = { diffuse = [0.62,", "table = { diffuse = [{},"),
+            ("camera", "position = [0.5, 3.3, 5.2]", "position = [{}, 3.3, 5.2]"),
+            ("object", "corner = [-4, 0, 3]", "corner = [-{}, 0, 3]"),
+            ("light", "irradiance = [3.6,", "irradiance = [{},"),
+        ],
+        keys: &["p", "v"],
+    },
 ];
 
 /// Copies of scenes and assets, to be edited.

@@ -1,5 +1,6 @@
 //! Pictures of numbers at the first hit. But for distances their values are meant as display values in [0, 1], not as radiance.
 
+use super::photons::Look;
 use super::queues::Queues;
 use super::shot::Shot;
 use super::vertices::Vertex;
@@ -38,16 +39,11 @@ pub fn shade(
 
 /// Photons around a point, of the pass of a sample.
 fn photons(shot: &Shot<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
-    let mut count = 0.0;
-    if let Some(maps) = shot.photons {
-        let place = (vertex.surface.point, vertex.normal);
-        let (_, _, sample) = shot.block.place(slot);
-        let pass = maps.pass(sample);
-        for map in [&pass.caustic, &pass.bounced] {
-            map.visit(place, u32::MAX, |_, _| count += 1.0);
-        }
-    }
-    count
+    let Some(maps) = shot.photons else { return 0.0 };
+    let look = Look { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
+    let (_, _, sample) = shot.block.place(slot);
+    let pass = maps.pass(sample);
+    [&pass.caustic, &pass.bounced].map(|map| map.count_around(&look) as f32).iter().sum()
 }
 
 /// Distance along the view axis.

@@ -5,7 +5,7 @@ use super::super::lit_row::LitRow;
 use super::super::shot::Shot;
 use super::super::view::{Measure, Ways};
 use super::PhotonMaps;
-use super::map::Photon;
+use super::map::{Look, PhotonMap};
 use crate::geometry::rows::lanes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
@@ -15,6 +15,9 @@ use crate::world::Loops;
 
 /// The chance of a look-up at a vertex that the eye does not see: a path has many of them, and little of its noise is of what they bring.
 const LOOKS_UNSEEN: f32 = 0.25;
+
+/// That of a look-up of photons thrown back from caustics where the eye sees the vertex: they bring little light, and even.
+const LOOKS_BOUNCED: f32 = 0.5;
 
 /// Gathers photons at the vertices of a row.
 pub struct Gathering<'a> {
@@ -38,48 +41,63 @@ impl Loops for Gathering<'_> {
     fn run(self, _: impl Folds) -> Lanes3 {
         let Self { shot, row, maps, depth, measure } = self;
         let mut sums = [[0.0; PACKET]; 3];
-        let looks = if row.used & !row.seen == 0 || measure == Measure::Work {
-            [0.0; PACKET]
-        } else {
-            let [looks, _] = row.sampler(shot).pairs(&row.path, Decision::Gather, 0, 1);
-            looks
-        };
+        let [looks, _] = row.sampler(shot).pairs(&row.path, Decision::Gather, 0, 1);
         let Some(most_depth) = shot.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let Ways { caustic, indirect, .. } = measure.ways();
         for i in lanes(row.used) {
             let (_, _, sample) = shot.block.place(row.slot[i]);
             let pass = maps.pass(sample);
             let is_seen = row.seen & 1 << i != 0;
-            if !is_seen && !(looks[i] < LOOKS_UNSEEN) {
-                continue;
-            }
-            let place = row.place_of(i);
+            let (point, normal) = row.place_of(i);
+            let look = Look { point, normal, most_depth };
             // At a surface without a glossy lobe photons stand for what comes from a caustic, and the path from there leaves it out.
-            let gathers_bounced = row.albedos[1][i] == 0.0;
+            let gathers_bounced = indirect && row.albedos[1][i] == 0.0;
             let gathers_caustic = if is_seen { caustic } else { indirect && row.from_gloss & 1 << i != 0 };
-            let maps = [
-                gathers_caustic.then_some(&pass.caustic),
-                (indirect && gathers_bounced).then_some(&pass.bounced),
-            ];
-            let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
-            let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
+            let chances = if measure == Measure::Work {
+                [1.0; 2]
+            } else if is_seen {
+                [1.0, LOOKS_BOUNCED]
+            } else {
+                [LOOKS_UNSEEN; 2]
+            };
+            let maps = [(gathers_caustic, &pass.caustic), (gathers_bounced, &pass.bounced)];
             let mut sum = Vec3::ZERO;
-            for map in maps.into_iter().flatten() {
-                if measure == Measure::Work {
-                    map.visit(place, most_depth, |_, _| sum += Vec3::ONE);
-                    continue;
+            for ((gathers, map), chance) in maps.into_iter().zip(chances) {
+                if gathers && looks[i] < chance {
+                    sum += brought(row, i, (map, &look), measure) / chance;
                 }
-                map.visit(place, most_depth, |photon: &Photon, density| {
-                    let mut f = diffuse;
-                    if specular != Vec3::ZERO {
-                        f += specular * gloss(mirrored, photon.direction, shininess);
-                    }
-                    sum += f * photon.flux * (density * row.landed(i, photon.direction));
-                });
             }
-            let counts = if is_seen || measure == Measure::Work { 1.0 } else { 1.0 / LOOKS_UNSEEN };
-            set_lane(&mut sums, i, sum * counts);
+            set_lane(&mut sums, i, sum);
         }
         sums
     }
+}
+
+/// What photons of a map bring to a vertex that goes on to the eye.
+#[inline(always)]
+fn brought(row: &LitRow, i: usize, (map, look): (&PhotonMap, &Look), measure: Measure) -> Vec3 {
+    let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
+    if measure == Measure::Work {
+        Vec3::splat(map.count_around(look) as f32)
+    } else if specular == Vec3::ZERO && row.apart & 1 << i == 0 {
+        diffuse * map.irradiance(look)
+    } else {
+        reflected(row, i, map, look)
+    }
+}
+
+/// The same, each by its direction.
+#[inline(always)]
+fn reflected(row: &LitRow, i: usize, map: &PhotonMap, look: &Look) -> Vec3 {
+    let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
+    let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
+    let mut sum = Vec3::ZERO;
+    map.visit(look, |photon, density| {
+        let mut f = diffuse;
+        if specular != Vec3::ZERO {
+            f += specular * gloss(mirrored, photon.direction, shininess);
+        }
+        sum += f * photon.flux * (density * row.landed(i, photon.direction));
+    });
+    sum
 }

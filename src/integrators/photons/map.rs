@@ -1,8 +1,11 @@
 //! A photon map: photons by the cells of a grid, of which only a hash is kept, so that the grid may be as fine as the radius asks for
-//! wherever photons are.
+//! wherever photons are. Look-ups weigh sixteen photons at a time.
 
+use super::packed::{self, Packed};
 use crate::control::{CancelToken, Cancelled};
+use crate::geometry::rows::lanes;
 use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, Truths, bits, lane, set_lane};
 
 /// Light that arrived at a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,8 +25,23 @@ pub struct Photon {
 /// Photons that are put into their places between two looks at the token.
 const POLL_INTERVAL: usize = 1 << 16;
 
-/// Photons that are looked up together.
-const LANES: usize = 16;
+/// Photons side by side: eight cache lines.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Block {
+    point: Lanes3,
+    normal: Packed,
+    direction: Packed,
+    flux: Lanes3,
+}
+
+/// Lanes without photons are nowhere.
+const EMPTY: Block = Block {
+    point: [[f32::INFINITY; LANES]; 3],
+    normal: [0; LANES],
+    direction: [0; LANES],
+    flux: [[0.0; LANES]; 3],
+};
 
 /// Photons and where they are.
 #[derive(Clone, Debug)]
@@ -35,11 +53,11 @@ pub struct PhotonMap {
     mask: u32,
     /// Where the photons of each bucket start; one more for the end.
     starts: Vec<u32>,
-    /// Coordinates of the photons, and some more that are nowhere: loops run over all lanes.
-    x: Vec<f32>,
-    y: Vec<f32>,
-    z: Vec<f32>,
-    photons: Vec<Photon>,
+    count: usize,
+    blocks: Vec<Block>,
+    depths: Vec<[u32; LANES]>,
+    /// The largest of the depths.
+    most_depth: u32,
 }
 
 /// Least cosine between the normals of surfaces that a kernel reaches over.
@@ -48,13 +66,58 @@ const LEAST_COSINE: f32 = 0.7;
 /// How far from a tangent plane photons are taken, in radii.
 const REACH: f32 = 0.3;
 
+/// The length of a cell in radii: more than that of the box around any kernel, 2·√(1 + REACH²), so that it meets two cells along an
+/// axis at most.
+const CELL: f32 = 2.1;
+
+/// Where photons are asked for, and of which surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// A point of it.
+    pub point: Vec3,
+    /// The normal of its facet on the side at hand.
+    pub normal: Vec3,
+    /// Most scatterings of the photons.
+    pub most_depth: u32,
+}
+
+/// Ranges of photons among which those of a kernel are.
+struct Ranges {
+    of: [[u32; 2]; 8],
+    count: usize,
+}
+
+impl Ranges {
+    /// Add one, joined with those that it meets, as columns of other cells may have the same hash.
+    #[inline(always)]
+    fn add(&mut self, mut range: [u32; 2]) {
+        if range[0] == range[1] {
+            return;
+        }
+        let mut i = 0;
+        while i < self.count {
+            let other = self.of[i];
+            if range[0] <= other[1] && other[0] <= range[1] {
+                range = [range[0].min(other[0]), range[1].max(other[1])];
+                self.count -= 1;
+                self.of[i] = self.of[self.count];
+                i = 0;
+            } else {
+                i += 1;
+            }
+        }
+        self.of[self.count] = range;
+        self.count += 1;
+    }
+}
+
 impl PhotonMap {
     /// Of some photons, for a kernel of this radius; those of a cell in the order given.
     ///
     /// # Errors
     /// [`Cancelled`].
     pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
-        let cells = 0.5 / radius;
+        let cells = 1.0 / (CELL * radius);
         let mask = (photons.len().max(1).next_power_of_two() - 1) as u32;
         let mut starts = vec![0_u32; mask as usize + 2];
         let mut buckets = Vec::with_capacity(photons.len());
@@ -73,38 +136,57 @@ impl PhotonMap {
         token.check()?;
         let mut next = starts.clone();
         let mut order = vec![0_u32; photons.len()];
-        for (number, &bucket) in (0..).zip(&buckets) {
-            let place = &mut next[bucket as usize];
-            order[*place as usize] = number;
-            *place += 1;
+        for (part, buckets) in buckets.chunks(POLL_INTERVAL).enumerate() {
+            token.check()?;
+            for (number, &bucket) in ((part * POLL_INTERVAL) as u32..).zip(buckets) {
+                let place = &mut next[bucket as usize];
+                order[*place as usize] = number;
+                *place += 1;
+            }
         }
-        let mut sorted = Vec::with_capacity(photons.len());
+        let rows = photons.len().div_ceil(LANES);
+        let (mut blocks, mut depths) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
         for order in order.chunks(POLL_INTERVAL) {
             token.check()?;
-            sorted.extend(order.iter().map(|&number| photons[number as usize]));
+            for order in order.chunks(LANES) {
+                let (mut block, mut depth) = (EMPTY, [0; LANES]);
+                for (i, &number) in order.iter().enumerate() {
+                    depth[i] = block.put(i, &photons[number as usize]);
+                }
+                blocks.push(block);
+                depths.push(depth);
+            }
         }
-        let photons = sorted;
-        let nowhere = std::iter::repeat_n(f32::INFINITY, LANES);
-        let along = |axis: usize| {
-            photons.iter().map(move |photon| photon.point[axis]).chain(nowhere.clone()).collect::<Vec<f32>>()
-        };
-        let (x, y, z) = (along(0), along(1), along(2));
-        Ok(Self { radius, cells, mask, starts, x, y, z, photons })
+        let most_depth = depths.as_flattened().iter().copied().max().unwrap_or(0);
+        Ok(Self { radius, cells, mask, starts, count: photons.len(), blocks, depths, most_depth })
     }
 
     /// All photons, by their cells.
-    pub fn photons(&self) -> &[Photon] {
-        &self.photons
+    pub fn photons(&self) -> impl Iterator<Item = Photon> + '_ {
+        (0..self.count).map(|number| self.photon(number / LANES, number % LANES))
+    }
+
+    /// A photon; its directions as they are kept, to five digits.
+    #[inline(always)]
+    fn photon(&self, block: usize, i: usize) -> Photon {
+        let Block { point, normal, direction, flux } = &self.blocks[block];
+        Photon {
+            point: lane(point, i),
+            direction: packed::unit(direction[i]),
+            flux: lane(flux, i),
+            normal: packed::unit(normal[i]),
+            depth: self.depths[block][i],
+        }
     }
 
     /// Of how many photons.
     pub fn len(&self) -> usize {
-        self.photons.len()
+        self.count
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.photons.is_empty()
+        self.count == 0
     }
 
     /// Radius of its kernel.
@@ -114,74 +196,180 @@ impl PhotonMap {
 
     /// Bytes that it takes.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(&*self.photons) + 4 * (self.starts.len() + 3 * self.x.len())
+        size_of_val(&*self.blocks) + size_of_val(&*self.depths) + size_of_val(&*self.starts)
     }
 
-    /// Visit the photons within the radius of a point of a surface whose normal on the side at hand is known, which came to that side
-    /// after at most so many scatterings; each with what its flux counts: Epanechnikov's kernel, in m⁻², whose integral over the
-    /// tangent plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
+    /// The sum of what photons around a point bring: W·m⁻².
     #[inline(always)]
-    pub fn visit(&self, (point, normal): (Vec3, Vec3), most_depth: u32, mut visit: impl FnMut(&Photon, f32)) {
-        if self.photons.is_empty() {
-            return;
-        }
-        let radius_squared = self.radius * self.radius;
-        let reach = REACH * self.radius;
-        let scale = 2.0 / (std::f32::consts::PI * radius_squared);
-        debug_assert!(self.x.len() == self.photons.len() + LANES);
-        let corner = point - Vec3::splat(self.radius);
-        let first = cell_of(corner, self.cells);
-        // Cells are as long as the kernel is wide: it reaches over two of them.
-        for number in 0..4_u32 {
-            let (y, z) =
-                (first[1].wrapping_add((number & 1) as i32), first[2].wrapping_add((number >> 1) as i32));
-            let begin = bucket(first[0], y, z, self.mask);
-            for bucket in
-                [begin, begin.wrapping_add(1) & self.mask].into_iter().take(self.mask.min(1) as usize + 1)
-            {
-                let range = self.starts[bucket as usize] as usize..self.starts[bucket as usize + 1] as usize;
-                for start in range.clone().step_by(LANES) {
-                    let mut near = [0_u32; LANES];
-                    let mut squares = [0.0; LANES];
-                    let (Some(xs), Some(ys), Some(zs)) =
-                        (row(&self.x, start), row(&self.y, start), row(&self.z, start))
-                    else {
-                        continue;
-                    };
+    pub fn irradiance(&self, look: &Look) -> Vec3 {
+        let mut sums = [[0.0; LANES]; 3];
+        let ranges = self.ranges(look);
+        for range in &ranges.of[..ranges.count] {
+            for block in blocks(*range) {
+                let Some(weights) = self.weights(look, *range, block) else { continue };
+                let flux = &self.blocks[block].flux;
+                for axis in 0..3 {
                     for i in 0..LANES {
-                        let (dx, dy, dz) = (xs[i] - point.x, ys[i] - point.y, zs[i] - point.z);
-                        let above = dx * normal.x + dy * normal.y + dz * normal.z;
-                        let along = dx * dx + dy * dy + dz * dz - above * above;
-                        squares[i] = along;
-                        near[i] = u32::from((along < radius_squared) & (above.abs() < reach));
-                    }
-                    for i in 0..LANES.min(range.end - start) {
-                        if near[i] == 0 {
-                            continue;
-                        }
-                        let photon = &self.photons[start + i];
-                        let [_, own_y, own_z] = cell_of(photon.point, self.cells);
-                        // Of other cells with the same hash.
-                        if own_y != y || own_z != z {
-                            continue;
-                        }
-                        let faces =
-                            photon.normal.dot(normal) > LEAST_COSINE && photon.direction.dot(normal) > 0.0;
-                        if faces && photon.depth <= most_depth {
-                            let share = 1.0 - squares[i].max(0.0) / radius_squared;
-                            visit(photon, scale * share);
-                        }
+                        sums[axis][i] += flux[axis][i] * weights[i];
                     }
                 }
             }
         }
+        Vec3::from(sums.map(folded)) * self.peak()
+    }
+
+    /// How many photons are around a point.
+    #[inline(always)]
+    pub fn count_around(&self, look: &Look) -> u32 {
+        let mut count = 0;
+        let ranges = self.ranges(look);
+        for range in &ranges.of[..ranges.count] {
+            for block in blocks(*range) {
+                let Some(weights) = self.weights(look, *range, block) else { continue };
+                count += above_zero(&weights).count_ones();
+            }
+        }
+        count
+    }
+
+    /// Visit the photons around a point, each with what its flux counts: Epanechnikov's kernel, in m⁻², whose integral over the tangent
+    /// plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
+    #[inline(always)]
+    pub fn visit(&self, look: &Look, mut visit: impl FnMut(&Photon, f32)) {
+        let peak = self.peak();
+        let ranges = self.ranges(look);
+        for range in &ranges.of[..ranges.count] {
+            for block in blocks(*range) {
+                let Some(weights) = self.weights(look, *range, block) else { continue };
+                for i in lanes(above_zero(&weights)) {
+                    visit(&self.photon(block, i), peak * weights[i]);
+                }
+            }
+        }
+    }
+
+    /// The kernel in its middle.
+    #[inline(always)]
+    fn peak(&self) -> f32 {
+        2.0 / (std::f32::consts::PI * (self.radius * self.radius))
+    }
+
+    /// Where photons may be that a kernel reaches.
+    #[inline(always)]
+    fn ranges(&self, look: &Look) -> Ranges {
+        let mut ranges = Ranges { of: [[0; 2]; 8], count: 0 };
+        if self.count == 0 {
+            return ranges;
+        }
+        // The box around the kernel.
+        let own = look.normal.abs();
+        let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
+        let along = Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt());
+        let half = (along + own * REACH) * self.radius;
+        let first = cell_of(look.point - half, self.cells);
+        let last = cell_of(look.point + half, self.cells);
+        let more = |axis: usize| u32::from(first[axis] != last[axis]);
+        let (columns, rows, run) = (more(1) + 1, more(2) + 1, more(0));
+        for row in 0..rows {
+            for column in 0..columns {
+                let (y, z) = (first[1].wrapping_add(column as i32), first[2].wrapping_add(row as i32));
+                let begin = bucket(first[0], y, z, self.mask);
+                let end = begin + run;
+                if end <= self.mask {
+                    ranges.add([self.starts[begin as usize], self.starts[end as usize + 1]]);
+                } else {
+                    ranges.add([self.starts[begin as usize], self.starts[begin as usize + 1]]);
+                    ranges.add([self.starts[0], self.starts[1]]);
+                }
+            }
+        }
+        ranges
+    }
+
+    /// What the photons of a block count that are in a range and in a kernel, by its value in the middle; none where there are none.
+    #[inline(always)]
+    fn weights(&self, look: &Look, range: [u32; 2], number: usize) -> Option<Lanes> {
+        let Look { point, normal, most_depth } = *look;
+        let block = &self.blocks[number];
+        let radius_squared = self.radius * self.radius;
+        let (reach, share) = (REACH * self.radius, 1.0 / radius_squared);
+        let [xs, ys, zs] = &block.point;
+        let (mut near, mut weights) = ([0; LANES], [0.0; LANES]);
+        let first = (number * LANES) as u32;
+        for i in 0..LANES {
+            let (dx, dy, dz) = (xs[i] - point.x, ys[i] - point.y, zs[i] - point.z);
+            let above = dx * normal.x + dy * normal.y + dz * normal.z;
+            let along = dx * dx + dy * dy + dz * dz - above * above;
+            let place = first + i as u32;
+            let is_near =
+                (along < radius_squared) & (above.abs() < reach) & (place >= range[0]) & (place < range[1]);
+            near[i] = if is_near { TRUE } else { 0 };
+            let left = 1.0 - along * share;
+            weights[i] = if left < 1.0 { left } else { 1.0 };
+        }
+        if bits(near) == 0 {
+            return None;
+        }
+        let (own, from) = (packed::lanes(&block.normal), packed::lanes(&block.direction));
+        for i in 0..LANES {
+            let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
+            let squared = own[0][i] * own[0][i] + own[1][i] * own[1][i] + own[2][i] * own[2][i];
+            let arriving = from[0][i] * normal.x + from[1][i] * normal.y + from[2][i] * normal.z;
+            let faces = (cosine > 0.0)
+                & (cosine * cosine > (LEAST_COSINE * LEAST_COSINE) * squared)
+                & (arriving > 0.0);
+            near[i] &= if faces { TRUE } else { 0 };
+        }
+        if most_depth < self.most_depth {
+            let depths = &self.depths[number];
+            for i in 0..LANES {
+                near[i] &= if depths[i] <= most_depth { TRUE } else { 0 };
+            }
+        }
+        for i in 0..LANES {
+            weights[i] = f32::from_bits(weights[i].to_bits() & near[i]);
+        }
+        Some(weights)
     }
 }
 
-/// Numbers from a place on; there are some more behind the last.
+impl Block {
+    /// Put a photon into a lane; its depth.
+    fn put(&mut self, i: usize, photon: &Photon) -> u32 {
+        set_lane(&mut self.point, i, photon.point);
+        set_lane(&mut self.flux, i, photon.flux);
+        self.normal[i] = packed::pack(photon.normal);
+        self.direction[i] = packed::pack(photon.direction);
+        photon.depth
+    }
+}
+
+/// The blocks of a range that is not empty.
 #[inline(always)]
-fn row(of: &[f32], start: usize) -> Option<&[f32; LANES]> {
-    of.get(start..)?.first_chunk()
+fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
+    start as usize / LANES..(end as usize).div_ceil(LANES)
+}
+
+/// A bit for each lane above 0.
+#[inline(always)]
+fn above_zero(weights: &Lanes) -> u32 {
+    let mut above: Truths = [0; LANES];
+    for i in 0..LANES {
+        above[i] = if weights[i] > 0.0 { TRUE } else { 0 };
+    }
+    bits(above)
+}
+
+/// The sum of all lanes, by halves.
+#[inline(always)]
+fn folded(mut row: Lanes) -> f32 {
+    for i in 0..8 {
+        row[i] += row[i + 8];
+    }
+    for i in 0..4 {
+        row[i] += row[i + 4];
+    }
+    (row[0] + row[2]) + (row[1] + row[3])
 }
 
 /// The cell of a point.
@@ -236,7 +424,7 @@ mod tests {
                         None => place(&mut next),
                     };
                     let mut found = Vec::new();
-                    map.visit((point, normal), 1, |photon, density| {
+                    map.visit(&Look { point, normal, most_depth: 1 }, |photon, density| {
                         found.push((photon.point.to_array(), density));
                     });
                     let near = |photon: &&Photon| {
@@ -274,9 +462,10 @@ mod tests {
         let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("nobody cancels");
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
-            map.visit((Vec3::new(0.1, 0.5, -0.2), normal), most_depth, |_, density| {
-                sum += density * step * step;
-            });
+            let look = Look { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
+            map.visit(&look, |_, density| sum += density * step * step);
+            let flux = f64::from(map.irradiance(&look).x * step * step);
+            assert!((flux - f64::from(sum)).abs() < 1e-4, "{flux} is not {sum}");
             sum
         };
         assert!((sum(1, Vec3::Y) - 1.0).abs() < 2e-3, "{}", sum(1, Vec3::Y));

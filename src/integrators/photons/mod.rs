@@ -21,6 +21,7 @@
 
 pub(super) mod gather;
 mod map;
+mod packed;
 mod shoot;
 
 use std::ops::Range;
@@ -40,6 +41,7 @@ use crate::lights::{Ball, LightBounds, PhotonSource};
 use crate::materials::{Bsdf, Material};
 use crate::scene::description::{Render, Shadows};
 use crate::world::{Hit, World, photon_source};
+pub(super) use map::Look;
 pub use map::{Photon, PhotonMap};
 use shoot::{Shooting, Shots};
 
@@ -244,8 +246,17 @@ impl Photons {
             .map(|number| chunk(number * CHUNK))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        let caustic = chunks.iter().flat_map(|chunk| &chunk.caustic).copied().collect();
-        let bounced = chunks.iter().flat_map(|chunk| &chunk.bounced).copied().collect();
+        let joined = |of: fn(&Shots) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
+            let mut all = Vec::with_capacity(chunks.iter().map(|chunk| of(chunk).len()).sum());
+            for chunk in &chunks {
+                token.check()?;
+                all.extend_from_slice(of(chunk));
+            }
+            Ok(all)
+        };
+        let (caustic, bounced) =
+            rayon::join(|| joined(|chunk| &chunk.caustic), || joined(|chunk| &chunk.bounced));
+        let (caustic, bounced) = (caustic?, bounced?);
         Ok(Sent { caustic, bounced, lookups })
     }
 }
@@ -286,14 +297,13 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToke
     let mut radius = largest.min(0.05 * extent);
     for _ in 0..12 {
         let map = PhotonMap::new(&some, radius, token)?;
-        let count = |photon: &Photon| {
-            let mut count = -1.0_f32;
-            map.visit((photon.point, photon.normal), u32::MAX, |_, _| count += 1.0);
-            count
+        // Others than itself.
+        let count = |&Photon { point, normal, .. }: &Photon| {
+            map.count_around(&Look { point, normal, most_depth: u32::MAX }).saturating_sub(1)
         };
-        let mut counts: Vec<f32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
-        counts.sort_by(f32::total_cmp);
-        let middle = counts[counts.len() / 2];
+        let mut counts: Vec<u32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
+        counts.sort_unstable();
+        let middle = counts[counts.len() / 2] as f32;
         let factor = (NEAR / middle.max(0.5)).sqrt();
         radius *= factor.clamp(0.2, 4.0);
         if (0.8..1.25).contains(&factor) {
@@ -355,6 +365,7 @@ impl Specular {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Vec3;
 
     #[test]
     fn the_radius_shrinks_as_the_squared_error_asks_for() {
@@ -362,5 +373,29 @@ mod tests {
         for (passes, exact) in [(1, 1.0), (100, 0.4882), (1000, 0.3328), (10_000, 0.2267)] {
             assert!((shrunk(passes - 1) - exact).abs() < 1e-3, "{passes}: {}", shrunk(passes - 1));
         }
+    }
+
+    #[test]
+    fn radii_are_held_to_a_part_of_the_scene() {
+        // Photons on a square of side 1: 12 are on a disc of radius √(12/100π) = .195.
+        let photons = |side: u16| -> Vec<Photon> {
+            let all = (0..side).flat_map(|x| (0..side).map(move |y| (f32::from(x), f32::from(y))));
+            let place = |(x, y)| Photon {
+                point: Vec3::new(x, 0.0, y) / f32::from(side),
+                direction: Vec3::Y,
+                flux: Vec3::ONE,
+                normal: Vec3::Y,
+                depth: 1,
+            };
+            all.map(place).collect()
+        };
+        let radius = |side, size| {
+            radius_to_hold(&photons(side), 12.0, size, &CancelToken::new()).expect("nobody cancels")
+        };
+        assert_eq!(radius(10, 1.0), 0.05);
+        assert!((radius(10, 100.0) / 0.195 - 1.0).abs() < 0.2, "{}", radius(10, 100.0));
+        assert!((radius(100, 1.0) / 0.0195 - 1.0).abs() < 0.2, "{}", radius(100, 1.0));
+        // Too few to tell.
+        assert_eq!(radius(3, 1.0), 0.02);
     }
 }

@@ -3,6 +3,7 @@
 mod adaptive;
 mod camera;
 mod orders;
+mod photons;
 mod reuse;
 mod targets;
 

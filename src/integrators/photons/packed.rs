@@ -1,0 +1,70 @@
+//! Directions in 32 bits: a square folded over an octahedron, 16 bits a side (Meyer, Süßmuth, Sußner, Stamminger, Greiner, *On
+//! Floating-Point Normal Vectors*, 2010).
+
+use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes3};
+
+/// Directions side by side.
+pub type Packed = [u32; LANES];
+
+/// Half of the side of the square.
+const SIDE: f32 = 32767.0;
+
+/// The nearest that 32 bits tell, but for their last ones.
+pub fn pack(direction: Vec3) -> u32 {
+    let Vec3 { x, y, z } = direction * (SIDE / (direction.x.abs() + direction.y.abs() + direction.z.abs()));
+    let (u, v) = if z < 0.0 { ((SIDE - y.abs()).copysign(x), (SIDE - x.abs()).copysign(y)) } else { (x, y) };
+    let whole = |x: f32| (x + 0.5_f32.copysign(x)) as i32 as u32 & 0xffff;
+    whole(u) | whole(v) << 16
+}
+
+/// The unit vector.
+#[inline(always)]
+pub fn unit(packed: u32) -> Vec3 {
+    let [x, y, z] = vector(packed);
+    Vec3::new(x, y, z).normalize()
+}
+
+/// Vectors of these directions; their lengths are between SIDE/√3 and SIDE.
+#[inline(always)]
+pub fn lanes(packed: &Packed) -> Lanes3 {
+    let mut vectors = [[0.0; LANES]; 3];
+    for i in 0..LANES {
+        let [x, y, z] = vector(packed[i]);
+        (vectors[0][i], vectors[1][i], vectors[2][i]) = (x, y, z);
+    }
+    vectors
+}
+
+#[inline(always)]
+fn vector(packed: u32) -> [f32; 3] {
+    let u = ((packed << 16) as i32 >> 16) as f32;
+    let v = (packed as i32 >> 16) as f32;
+    let z = SIDE - u.abs() - v.abs();
+    let folded = if z < 0.0 { -z } else { 0.0 };
+    [u - folded.copysign(u), v - folded.copysign(v), z]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::signed as random;
+
+    #[test]
+    fn directions_come_back_to_four_digits() {
+        let mut next = random(3);
+        let mut some: Vec<Vec3> = (0..10_000).map(|_| Vec3::new(next(), next(), next())).collect();
+        for axis in Vec3::AXES {
+            for other in Vec3::AXES {
+                some.extend([axis + other, axis - other, -axis - other, axis + other * 1e-30]);
+            }
+        }
+        for direction in some.into_iter().filter_map(Vec3::try_normalize) {
+            let packed = pack(direction);
+            assert!((unit(packed) - direction).length() < 7e-5, "{direction}: {}", unit(packed));
+            let long = lanes(&[packed; LANES]);
+            let first = Vec3::new(long[0][0], long[1][0], long[2][0]);
+            assert!((first.normalize() - direction).length() < 7e-5, "{direction}: {first}");
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Photons in the worker: what is kept of them, and what is heard while they are sent.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::*;
+use crate::control::{CancelToken, Cancelled};
+use crate::film::{Rect, TileSamples};
+use crate::integrators::{RayCounters, RenderSettings};
+use crate::world::World;
+
+/// All light comes through the glass around the lamp; so many photons in a pass.
+fn wrapped(count: u32) -> String {
+    let glass = "[[sphere]]\ncenter = [0, 3, 0]\nradius = 0.1\nmaterial = \"clear\"\n[[plane]]\nmaterial = \"wall\"\n[materials.clear]\ntype = \"glass\"\n";
+    format!("{SCENE}{glass}[photons]\nenabled = true\ncount = {count}\n")
+}
+
+#[test]
+fn write_is_heard_while_photons_are_sent() {
+    let text = wrapped(1_000_000).replace("samples = 4", "samples = 1000000");
+    let mut bench = Bench::new(&text);
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
+    // Nearly all time is that of photons under way: held, they arrive nowhere.
+    bench.worker.send(Command::Pause(true));
+    std::thread::sleep(Duration::from_millis(100));
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::Written { .. }) {}
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+}
+
+#[test]
+fn time_that_ends_while_photons_are_sent_ends_the_render() {
+    // A pass of photons takes longer than that, a sample of the picture does not.
+    let text = wrapped(2_000_000).replace("samples = 4", "samples = 1000000");
+    let mut bench = Bench::new(&text);
+    bench.overrides.time_seconds = Some(0.2);
+    let report = bench.done().0;
+    assert_eq!(report.image.samples.max, 1);
+    assert!(!report.image.complete);
+}
+
+static WITHOUT: AtomicBool = AtomicBool::new(false);
+
+/// Renders without photons.
+fn without(
+    world: &World,
+    settings: &RenderSettings,
+    tile: Rect,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    WITHOUT.store(true, Ordering::SeqCst);
+    KERNEL(world, settings, tile, samples, token)
+}
+
+#[test]
+fn the_first_coarse_picture_has_photons() {
+    let mut bench = Bench::with(&wrapped(1000), without);
+    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    let of = bench.send();
+    assert!(bench.until_end(of).iter().any(|event| matches!(event, Event::Preview { .. })));
+    assert!(!WITHOUT.load(Ordering::SeqCst));
+}
