@@ -7,6 +7,7 @@ use super::vertices::Vertex;
 use super::{FirstHit, RayCounters};
 use crate::control::Cancelled;
 use crate::geometry::SurfacePoint;
+use crate::math::lanes::PlainFolds;
 use crate::math::{DVec2, Vec3};
 
 /// Show what each camera ray in the queue hits; black where nothing.
@@ -43,7 +44,7 @@ fn photons(shot: &Shot<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = Look { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = shot.block.place(slot);
     let pass = maps.pass(sample);
-    [&pass.caustic, &pass.bounced].map(|map| map.count_around(&look) as f32).iter().sum()
+    [&pass.caustic, &pass.bounced].map(|map| map.count_around(&look, PlainFolds) as f32).iter().sum()
 }
 
 /// Distance along the view axis.

@@ -38,7 +38,7 @@ impl Loops for Gathering<'_> {
 
     /// What arrives there and goes on to the eye, before the throughput of the paths.
     #[inline(always)]
-    fn run(self, _: impl Folds) -> Lanes3 {
+    fn run(self, folds: impl Folds) -> Lanes3 {
         let Self { shot, row, maps, depth, measure } = self;
         let mut sums = [[0.0; PACKET]; 3];
         let [looks, _] = row.sampler(shot).pairs(&row.path, Decision::Gather, 0, 1);
@@ -64,7 +64,7 @@ impl Loops for Gathering<'_> {
             let mut sum = Vec3::ZERO;
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {
                 if gathers && looks[i] < chance {
-                    sum += brought(row, i, (map, &look), measure) / chance;
+                    sum += brought(row, i, (map, &look), measure, folds) / chance;
                 }
             }
             set_lane(&mut sums, i, sum);
@@ -75,24 +75,30 @@ impl Loops for Gathering<'_> {
 
 /// What photons of a map bring to a vertex that goes on to the eye.
 #[inline(always)]
-fn brought(row: &LitRow, i: usize, (map, look): (&PhotonMap, &Look), measure: Measure) -> Vec3 {
+fn brought(
+    row: &LitRow,
+    i: usize,
+    (map, look): (&PhotonMap, &Look),
+    measure: Measure,
+    folds: impl Folds,
+) -> Vec3 {
     let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
     if measure == Measure::Work {
-        Vec3::splat(map.count_around(look) as f32)
+        Vec3::splat(map.count_around(look, folds) as f32)
     } else if specular == Vec3::ZERO && row.apart & 1 << i == 0 {
-        diffuse * map.irradiance(look)
+        diffuse * map.irradiance(look, folds)
     } else {
-        reflected(row, i, map, look)
+        reflected(row, i, map, look, folds)
     }
 }
 
 /// The same, each by its direction.
 #[inline(always)]
-fn reflected(row: &LitRow, i: usize, map: &PhotonMap, look: &Look) -> Vec3 {
+fn reflected(row: &LitRow, i: usize, map: &PhotonMap, look: &Look, folds: impl Folds) -> Vec3 {
     let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
     let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
     let mut sum = Vec3::ZERO;
-    map.visit(look, |photon, density| {
+    map.visit(look, folds, |photon, density| {
         let mut f = diffuse;
         if specular != Vec3::ZERO {
             f += specular * gloss(mirrored, photon.direction, shininess);

@@ -5,7 +5,7 @@ use super::packed::{self, Packed};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::rows::lanes;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, TRUE, Truths, bits, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane};
 
 /// Light that arrived at a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -201,12 +201,12 @@ impl PhotonMap {
 
     /// The sum of what photons around a point bring: W·m⁻².
     #[inline(always)]
-    pub fn irradiance(&self, look: &Look) -> Vec3 {
+    pub fn irradiance(&self, look: &Look, folds: impl Folds) -> Vec3 {
         let mut sums = [[0.0; LANES]; 3];
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block) else { continue };
+                let Some(weights) = self.weights(look, *range, block, folds) else { continue };
                 let flux = &self.blocks[block].flux;
                 for axis in 0..3 {
                     for i in 0..LANES {
@@ -220,13 +220,13 @@ impl PhotonMap {
 
     /// How many photons are around a point.
     #[inline(always)]
-    pub fn count_around(&self, look: &Look) -> u32 {
+    pub fn count_around(&self, look: &Look, folds: impl Folds) -> u32 {
         let mut count = 0;
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block) else { continue };
-                count += above_zero(&weights).count_ones();
+                let Some(weights) = self.weights(look, *range, block, folds) else { continue };
+                count += above_zero(&weights, folds).count_ones();
             }
         }
         count
@@ -235,13 +235,13 @@ impl PhotonMap {
     /// Visit the photons around a point, each with what its flux counts: Epanechnikov's kernel, in m⁻², whose integral over the tangent
     /// plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
     #[inline(always)]
-    pub fn visit(&self, look: &Look, mut visit: impl FnMut(&Photon, f32)) {
+    pub fn visit(&self, look: &Look, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
         let peak = self.peak();
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block) else { continue };
-                for i in lanes(above_zero(&weights)) {
+                let Some(weights) = self.weights(look, *range, block, folds) else { continue };
+                for i in lanes(above_zero(&weights, folds)) {
                     visit(&self.photon(block, i), peak * weights[i]);
                 }
             }
@@ -288,7 +288,7 @@ impl PhotonMap {
 
     /// What the photons of a block count that are in a range and in a kernel, by its value in the middle; none where there are none.
     #[inline(always)]
-    fn weights(&self, look: &Look, range: [u32; 2], number: usize) -> Option<Lanes> {
+    fn weights(&self, look: &Look, range: [u32; 2], number: usize, folds: impl Folds) -> Option<Lanes> {
         let Look { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
@@ -307,7 +307,7 @@ impl PhotonMap {
             let left = 1.0 - along * share;
             weights[i] = if left < 1.0 { left } else { 1.0 };
         }
-        if bits(near) == 0 {
+        if folds.bits(&near) == 0 {
             return None;
         }
         let (own, from) = (packed::lanes(&block.normal), packed::lanes(&block.direction));
@@ -352,12 +352,12 @@ fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
 
 /// A bit for each lane above 0.
 #[inline(always)]
-fn above_zero(weights: &Lanes) -> u32 {
+fn above_zero(weights: &Lanes, folds: impl Folds) -> u32 {
     let mut above: Truths = [0; LANES];
     for i in 0..LANES {
         above[i] = if weights[i] > 0.0 { TRUE } else { 0 };
     }
-    bits(above)
+    folds.bits(&above)
 }
 
 /// The sum of all lanes, by halves.
@@ -393,6 +393,7 @@ fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::lanes::PlainFolds;
     use crate::math::random::signed as random;
 
     fn photon(point: Vec3, normal: Vec3) -> Photon {
@@ -424,7 +425,7 @@ mod tests {
                         None => place(&mut next),
                     };
                     let mut found = Vec::new();
-                    map.visit(&Look { point, normal, most_depth: 1 }, |photon, density| {
+                    map.visit(&Look { point, normal, most_depth: 1 }, PlainFolds, |photon, density| {
                         found.push((photon.point.to_array(), density));
                     });
                     let near = |photon: &&Photon| {
@@ -463,8 +464,8 @@ mod tests {
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
             let look = Look { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
-            map.visit(&look, |_, density| sum += density * step * step);
-            let flux = f64::from(map.irradiance(&look).x * step * step);
+            map.visit(&look, PlainFolds, |_, density| sum += density * step * step);
+            let flux = f64::from(map.irradiance(&look, PlainFolds).x * step * step);
             assert!((flux - f64::from(sum)).abs() < 1e-4, "{flux} is not {sum}");
             sum
         };

@@ -24,6 +24,7 @@ mod map;
 mod packed;
 mod shoot;
 
+use crate::math::lanes::PlainFolds;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -299,7 +300,7 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToke
         let map = PhotonMap::new(&some, radius, token)?;
         // Others than itself.
         let count = |&Photon { point, normal, .. }: &Photon| {
-            map.count_around(&Look { point, normal, most_depth: u32::MAX }).saturating_sub(1)
+            map.count_around(&Look { point, normal, most_depth: u32::MAX }, PlainFolds).saturating_sub(1)
         };
         let mut counts: Vec<u32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
         counts.sort_unstable();

@@ -44,7 +44,8 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
     let picture = &state.picture.as_ref()?.picture;
     let area = Layout::of(state).preview;
-    let cells = Placed::fit(picture, area, in_cells(state.preview), state.window.cell_aspect).cells;
+    let cells =
+        Placed::fit(picture, area, in_cells(state.preview, state.depth), state.window.cell_aspect).cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
     cells.contains((column, row).into()).then(spot)
