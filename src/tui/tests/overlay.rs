@@ -176,12 +176,10 @@ fn errors_scroll_by_every_key() {
     let mut desk = Desk::new();
     desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     let top = desk.text();
-    for (forth, back) in [('j', 'k')] {
-        desk.press(forth);
-        assert_ne!(desk.text(), top);
-        desk.press(back);
-        assert_eq!(desk.text(), top);
-    }
+    desk.press('j');
+    assert_ne!(desk.text(), top);
+    desk.press('k');
+    assert_eq!(desk.text(), top);
     for (forth, back) in [(KeyCode::Down, KeyCode::Up), (KeyCode::PageDown, KeyCode::PageUp)] {
         desk.key(KeyPress::special(forth));
         assert_ne!(desk.text(), top, "{forth:?}");

@@ -101,7 +101,7 @@ fn hint(state: &State, width: u16) -> Vec<Line> {
     for word in under::hint(state).split_whitespace() {
         match lines.last_mut() {
             Some(line) if columns(line) + 1 + columns(word) <= width.min(ENTRY_WIDTH) => {
-                *line += &format!(" {word}")
+                *line += &format!(" {word}");
             }
             Some(_) | None => lines.push(word.to_owned()),
         }
