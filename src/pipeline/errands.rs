@@ -25,7 +25,7 @@ pub(super) enum Errand {
 
 impl Errand {
     /// There is nothing to ask.
-    pub(super) fn fail(self, why: &str, sink: &Sink) {
+    pub(super) fn fail(&self, why: &str, sink: &Sink) {
         let generation = sink.generation;
         match self {
             Self::KeepCamera(_) => {
@@ -47,12 +47,12 @@ pub(super) struct AtHand {
 }
 
 impl AtHand {
-    pub(super) fn run(&self, errand: Errand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
+    pub(super) fn run(&self, errand: &Errand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
         let generation = sink.generation;
         sink.send(match errand {
-            Errand::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(spot, canvas)) },
+            Errand::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, canvas)) },
             Errand::KeepCamera(camera) => {
-                Event::CameraKept { generation, outcome: self.keep_camera(&camera, inputs) }
+                Event::CameraKept { generation, outcome: self.keep_camera(camera, inputs) }
             }
         });
     }

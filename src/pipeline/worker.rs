@@ -294,7 +294,7 @@ impl Worker {
                 Task::Preview(size, token) => {
                     catch_unwind(AssertUnwindSafe(|| engine.show_now(size, &sink, &token)))
                 }
-                Task::Errand(errand) => catch_unwind(AssertUnwindSafe(|| engine.errand(errand, &sink))),
+                Task::Errand(errand) => catch_unwind(AssertUnwindSafe(|| engine.errand(&errand, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
                     let meanwhile = Meanwhile { token: &token, writing: &writing, orders: &self.remote };

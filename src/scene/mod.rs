@@ -52,8 +52,8 @@ pub struct Loaded {
 ///
 /// # Errors
 /// Why it cannot be read, with its name.
-pub fn text_now(path: &Path) -> Result<Arc<str>, Diagnostic> {
-    read::text(path).map_err(|problem| *problem)
+pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
+    read::text(path)
 }
 
 impl Loaded {

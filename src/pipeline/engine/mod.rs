@@ -195,7 +195,7 @@ impl Engine {
     }
 
     /// Do what is asked of the picture at hand, outside of a request.
-    pub(super) fn errand(&self, errand: Errand, sink: &Sink) {
+    pub(super) fn errand(&self, errand: &Errand, sink: &Sink) {
         match &self.at_hand {
             Some(at_hand) => at_hand.run(errand, self.films.current(), &self.inputs, sink),
             None => errand.fail("there is no picture yet", sink),
@@ -348,7 +348,7 @@ impl Engine {
                 write_by_hand(canvas, to, &mut written.borrow_mut());
             }
             if let Some((errand, at_hand)) = orders.take_errand().zip(self.at_hand.as_ref()) {
-                at_hand.run(errand, Some(canvas), &self.inputs, sink);
+                at_hand.run(&errand, Some(canvas), &self.inputs, sink);
             }
         };
         let rendering = Rendering {
