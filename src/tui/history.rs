@@ -131,7 +131,8 @@ mod tests {
     fn the_oldest_go_where_memory_ends() {
         let mut history = History::default();
         for generation in 0..10 {
-            history.record(shown(generation, 1000), Instant::now());
+            let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
+            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now());
         }
         assert_eq!(history.past.len(), 5, "3 MB each");
         history.record(shown(10, 10_000), Instant::now());
