@@ -22,7 +22,7 @@ fn a_moved_camera_is_shown_and_not_written_until_it_goes_back() {
     assert_eq!((moved.write, moved.force), (Writing::No, false));
     let text = desk.text();
     assert!(text.contains("camera moved: shown, not written; w writes it"), "{text}");
-    assert!(text.contains("camera moved · shadows soft"), "{text}");
+    assert!(text.lines().last().is_some_and(|line| line.contains("0 camera moved")), "{text}");
     show(&mut desk);
     let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
     let edited = request(&effects).expect("a request");
@@ -79,7 +79,7 @@ fn a_step_that_can_have_no_picture_holds_nothing_up() {
 fn the_arrows_scroll_the_errors_while_they_are_open() {
     let mut desk = Desk::new();
     desk.finish(RED);
-    desk.fail((0..9).map(|_| diagnostic(Severity::Error, "wrong")).collect());
+    desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     let down = KeyPress::special(KeyCode::Down);
     assert!(desk.key(down).is_empty());
     assert!(desk.state.pane.scroll > 0);
@@ -103,5 +103,5 @@ fn exposure_starts_from_the_scene_s_own() {
     show(&mut desk);
     let effects = desk.press(']');
     assert_eq!(request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
-    assert!(desk.text().contains("exposure +1.5 · shadows"), "{}", desk.text());
+    assert!(desk.text().contains("0 exposure +1.5"), "{}", desk.text());
 }

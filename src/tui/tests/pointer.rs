@@ -9,7 +9,7 @@ use crate::tui::event::{Effect, Event, Mouse, MouseKind};
 use crate::tui::fixtures::*;
 use crate::tui::state::PreviewKind;
 
-/// 80×24, with a picture of 50×38 pixels in the cells (0, 1) to (50, 20).
+/// 80×24, with a picture in 55×21 cells from (0, 1) on.
 fn desk() -> Desk {
     let mut desk = Desk::new();
     desk.finish(RED);
@@ -61,7 +61,7 @@ fn a_drag_turns_and_a_click_asks() {
     assert!(pose.position.x < -1.0, "the scene goes with the hand: {pose:?}");
     assert!(mouse(&mut desk, MouseKind::Release, 30, 10).is_empty(), "that was no click");
     let spot = asked(&click(&mut desk, 12, 10));
-    assert!((spot.x - 0.25).abs() < 0.02 && (spot.y - 0.5).abs() < 0.03, "{spot:?}");
+    assert!((spot.x - 12.5 / 55.0).abs() < 1e-9 && (spot.y - 9.5 / 21.0).abs() < 1e-9, "{spot:?}");
     for (column, row) in [(70, 10), (20, 0), (20, 23)] {
         assert!(click(&mut desk, column, row).is_empty(), "there is no picture");
     }
@@ -73,7 +73,7 @@ fn the_wheel_goes_nearer_and_scrolls_the_errors() {
     let mut desk = desk();
     let effects = mouse(&mut desk, MouseKind::WheelUp, 20, 10);
     assert!(request(&effects).expect("a request").overrides.camera.pose.expect("a pose").distance() < 4.0);
-    desk.fail((0..9).map(|_| diagnostic(Severity::Error, "wrong")).collect());
+    desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     assert!(mouse(&mut desk, MouseKind::WheelDown, 20, 15).is_empty());
     assert!(desk.state.pane.scroll > 0);
     mouse(&mut desk, MouseKind::WheelUp, 20, 15);
@@ -118,7 +118,7 @@ fn a_click_after_f_focuses_there() {
     // Without the mouse, the crosshair at once.
     desk.press('m');
     let spot = asked(&desk.press('f'));
-    assert!((spot.x - 0.25).abs() < 0.02, "the last click: {spot:?}");
+    assert!((spot.x - 12.5 / 55.0).abs() < 1e-9, "the last click: {spot:?}");
     assert!(answer(&mut desk, None).is_empty());
     assert!(desk.text().contains("nothing to focus on"));
     desk.state.camera.as_mut().expect("a camera").aperture = 0.0;
