@@ -1,6 +1,6 @@
 //! What the picture is made of, as the terminal says what it is.
 
-use super::pty::{Folder, SCENE};
+use super::pty::{Colors, Folder, SCENE};
 
 /// A board seen from the side: its edges are oblique.
 fn oblique() -> String {
@@ -47,11 +47,11 @@ fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
         let call = [folder.program(), "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, &[]);
         terminal.wait_for_render(1);
-        let has_blocks = |screen: &vt100::Screen| screen.contents().contains('▀');
+        let has_blocks = |screen: &vt100::Screen| Colors::of(screen).red > 0;
         assert!(!terminal.settled(has_blocks), "{protocol}: the picture is in pixels");
-        terminal.press("?");
-        terminal.wait("half blocks beside the help", has_blocks);
-        terminal.press("?");
+        terminal.press("e");
+        terminal.wait("half blocks above the pane", has_blocks);
+        terminal.press("e");
         terminal.wait("pixels again", |screen| !has_blocks(screen));
         terminal.press("q");
         assert_eq!(terminal.end(), 0);
