@@ -1,6 +1,6 @@
 //! What the picture is made of, as the terminal says what it is.
 
-use super::pty::{Colors, Folder, SCENE};
+use super::pty::{Folder, SCENE};
 
 /// A board seen from the side: its edges are oblique.
 fn oblique() -> String {
@@ -47,11 +47,15 @@ fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
         let call = [folder.program(), "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, &[]);
         terminal.wait_for_render(1);
-        let has_blocks = |screen: &vt100::Screen| Colors::of(screen).red > 0;
+        // The first column of the picture, which the help leaves free.
+        let has_blocks = |screen: &vt100::Screen| {
+            let own = vt100::Color::Default;
+            screen.cell(10, 0).is_some_and(|cell| cell.fgcolor() != own || cell.bgcolor() != own)
+        };
         assert!(!terminal.settled(has_blocks), "{protocol}: the picture is in pixels");
-        terminal.press("e");
-        terminal.wait("half blocks above the pane", has_blocks);
-        terminal.press("e");
+        terminal.press("?");
+        terminal.wait("half blocks beside the help", has_blocks);
+        terminal.press("?");
         terminal.wait("pixels again", |screen| !has_blocks(screen));
         terminal.press("q");
         assert_eq!(terminal.end(), 0);
