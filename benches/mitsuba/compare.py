@@ -24,6 +24,8 @@ THREADS = 2
 SAMPLES = 256
 # Mitsuba's direct light as it comes samples the light and the BSDF; told that the light is enough, it does half of the work.
 LIGHT_ALONE = {"emitter_samples": 1, "bsdf_samples": 0}
+# The noise at which glimt is told, in a row of its own, to give a tile no more samples.
+STOP = "3e-4"
 # Renders of a reference, of as many samples: of direct light, which is soon done, and of paths.
 DIRECT_REFERENCE, PATH_REFERENCE = (24, 1024), (16, 1024)
 
@@ -65,13 +67,13 @@ def reference(scene, renderer, render):
     return total / count
 
 
-def glimt(binary, scene, samples, seed):
+def glimt(binary, scene, samples, seed, options=()):
     """Seconds of the stage `render`, and the picture."""
     folder = HOME / "out"
     folder.mkdir(exist_ok=True)
     file, picture, report = folder / "scene.toml", folder / "picture.exr", folder / "report.json"
     file.write_text(scene.toml(samples, seed, assets.directory(HOME)))
-    command = [binary, "--once", file, "-o", picture, "--report", report, "--threads", str(THREADS)]
+    command = [binary, "--once", file, "-o", picture, "--report", report, "--threads", str(THREADS), *options]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     stages = {stage["name"]: stage for stage in json.loads(report.read_text())["stages"]}
     image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
@@ -88,7 +90,7 @@ def compare(scene, binaries, rounds, by_spread):
     """Print the rows of a scene."""
     ways = {"Mitsuba": {}, "its light alone": LIGHT_ALONE} if scene.max_depth == 1 else {"Mitsuba": {}}
     loaded = {name: Mitsuba(scene, options) for name, options in ways.items()}
-    by_glimt = lambda binary: lambda samples, seed: glimt(binary, scene, samples, seed)
+    by_glimt = lambda binary, *more: lambda samples, seed: glimt(binary, scene, samples, seed, more)
     # Each is held to its own: Mitsuba lifts shadow rays off surfaces by a fixed epsilon, which moves the edges of shadows.
     own = glimts = None
     if not by_spread:
@@ -100,6 +102,8 @@ def compare(scene, binaries, rounds, by_spread):
         renderers.append((name, mitsuba.render, own))
     for binary in binaries if rounds > 0 else ():
         renderers.append((Path(binary).name, by_glimt(binary), glimts))
+    if rounds > 0:
+        renderers.append((f"error = {STOP}", by_glimt(binaries[-1], "--error", STOP), glimts))
     seconds, pictures = [[] for _ in renderers], [[] for _ in renderers]
     for round_number in range(1, rounds + 1):
         for (_, render, _), taken, seen in zip(renderers, seconds, pictures):
@@ -121,7 +125,7 @@ def compare(scene, binaries, rounds, by_spread):
             print(f"{scene.name}: no anchor, Mitsuba's relMSE is {off:+.0%} off {scene.anchor:.1e}")
     # Brightness on the whole tells a lost or doubled part of the light, which noise hides pixel by pixel.
     if by_spread:
-        own, glimts = np.mean(pictures[0], axis=0), np.mean(pictures[-1], axis=0)
+        own, glimts = np.mean(pictures[0], axis=0), np.mean(pictures[-2], axis=0)
     bias = np.mean(glimts) / np.mean(own) - 1
     print(f"{scene.name:18}{'references':16}{'':9}{rel_mse(glimts, own):10.2e}  apart, mean {bias:+.3%}", flush=True)
 

@@ -47,6 +47,7 @@ fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
         let call = [folder.program(), "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, &[]);
         terminal.wait_for_render(1);
+        terminal.resize(120, 24);
         // The first column of the picture, which the help leaves free.
         let has_blocks = |screen: &vt100::Screen| {
             let own = vt100::Color::Default;

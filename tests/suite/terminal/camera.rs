@@ -27,7 +27,7 @@ fn the_camera_moves_and_goes_back_and_nothing_is_written() {
     ] {
         terminal.press(&keys);
         terminal.wait_for("camera moved: shown, not written; w writes it");
-        terminal.wait_for("camera moved · shadows soft");
+        terminal.wait_for("0 camera moved");
         wait_for_red(&terminal, &keys, |now| if is_more { now > red + 20 } else { now + 20 < red });
         terminal.wait_for("done");
         terminal.press("0");

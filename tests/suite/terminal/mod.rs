@@ -159,7 +159,7 @@ fn the_picture_follows_the_size_of_the_window() {
 fn without_colours_the_picture_is_made_of_characters() {
     let folder = Folder::new();
     let terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
-    let is_ink = |cell: &vt100::Cell| "=+*#%@".contains(cell.contents()) && cell.has_contents();
+    let is_ink = |cell: &vt100::Cell| "=+*#%@$&{}[]?".contains(cell.contents()) && cell.has_contents();
     terminal.wait("a picture", |screen| cells(screen).filter(|cell| is_ink(cell)).count() > 100);
     terminal.wait_for("done");
     terminal.look(|screen| {

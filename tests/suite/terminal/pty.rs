@@ -338,7 +338,8 @@ impl Colors {
         let mut colors = Self::default();
         for color in cells(screen).filter_map(upper) {
             let vt100::Color::Rgb(r, g, b) = color else { continue };
-            let above = |a: u8, b: u8, c: u8| a > 90 && a / 2 > b.max(c);
+            // Far from what the edges of things have: the last bits of a colour hang on what was there before.
+            let above = |a: u8, b: u8, c: u8| a > 50 && a / 2 > b.max(c);
             colors.red += usize::from(above(r, g, b));
             colors.green += usize::from(above(g, r, b));
             colors.blue += usize::from(above(b, r, g));
