@@ -158,7 +158,7 @@ def main():
     if "large" in asked.names:
         settings = ["render.max_depth=30", "photons.bounces=30"]
         subject = Subject(asked.glimt, CAUSTIC, (1074, 1051), asked.reference // 8, False, settings)
-        subject.rows("photons", [8, 16, 24], 1)
+        subject.rows("photons", [8, 12, 16, 24], 1)
 
 
 main()
