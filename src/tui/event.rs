@@ -173,4 +173,6 @@ pub(super) enum Effect {
 pub(super) struct Written {
     pub path: PathBuf,
     pub bytes: u64,
+    /// Of which request.
+    pub generation: u64,
 }

@@ -240,7 +240,7 @@ pub(super) struct State {
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
-    /// Of the last request that rendered something and finished.
+    /// Of the last request that rendered a picture for its files and finished.
     pub rendered: Option<Box<Report>>,
     pub unchanged: bool,
     /// Requests that were rendered and finished.

@@ -86,7 +86,7 @@ fn what_was_clicked_is_said_and_led_to() {
     click(&mut desk, 12, 10);
     assert!(answer(&mut desk, Some(thing())).is_empty());
     let text = desk.text();
-    assert!(text.contains("sphere \"ball\" · cornell.toml:47 · glass crystal · (0.2, 0.5, -0.3)"), "{text}");
+    assert!(text.contains("sphere \"ball\" · cornell.toml:47 · glass crystal · 3.9 away · (0.2"), "{text}");
     let place = |effects: &[Effect]| match effects {
         [Effect::Edit(place)] => (place.path.to_string_lossy().into_owned(), place.line, place.column),
         other => panic!("{other:?}"),

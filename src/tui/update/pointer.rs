@@ -133,7 +133,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     effects
 }
 
-/// Shape, name, line, material, place, normal, distance, colour.
+/// Shape, name, line, material, distance, place, colour, normal: what a narrow window cuts comes last.
 fn words(Picked { thing, color, pixel: [x, y] }: &Picked) -> String {
     let light = color.map(|color| format!(" · L {}", numbers(color.map(f64::from))));
     let light = light.unwrap_or_default();
@@ -143,12 +143,12 @@ fn words(Picked { thing, color, pixel: [x, y] }: &Picked) -> String {
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
     format!(
-        "{shape}{name} · {}:{line} · {} · {} · n {}{back} · {} away{light}",
+        "{shape}{name} · {}:{line} · {} · {} away · {}{light} · n {}{back}",
         visible(&file),
         visible(material),
+        number(*distance),
         numbers(*position),
         numbers(normal.map(f64::from)),
-        number(*distance),
     )
 }
 
@@ -183,8 +183,8 @@ mod tests {
         let picked = Picked { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
         assert_eq!(
             words(&picked),
-            "sphere \"ball\" · still.toml:47 · glass crystal · (0.214, 0.5, -33.1) · n (0, 1, 0) · 3.82 away · L \
-             (0.61, 1235, 0)"
+            "sphere \"ball\" · still.toml:47 · glass crystal · 3.82 away · (0.214, 0.5, -33.1) · L (0.61, 1235, 0) · \
+             n (0, 1, 0)"
         );
         assert_eq!(words(&Picked { thing: None, color: None, ..picked }), "nothing at pixel 3, 4");
     }

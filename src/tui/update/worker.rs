@@ -1,7 +1,7 @@
 //! What the worker's events do to the state. Those of older generations do nothing.
 
 use super::{camera, history, pointer, resized_preview, say};
-use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, StageReport, Status};
+use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, Stage, StageReport, Status};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Written};
@@ -38,7 +38,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => state.progress = Some(progress),
         Event::Preview { .. } | Event::Files { .. } | Event::CameraKept { .. } | Event::Picked { .. } => {}
-        Event::Written { path, bytes, .. } => wrote(state, Written { path, bytes }),
+        Event::Written { path, bytes, generation } => wrote(state, Written { path, bytes, generation }),
         Event::WriteFailed { message, .. } => {
             state.asked_to_write = false;
             say(state, format!("error: {}", visible(&message)));
@@ -144,7 +144,8 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.activity = Activity::Done;
     state.set_paused(false);
     state.assets.retain(|asset| asset.finished.is_some());
-    if !unchanged {
+    // What was found again took its time before.
+    if report.stages[Stage::Render as usize].status == Status::Done && state.is_written() {
         state.rendered = Some(report.clone());
     }
     state.report = Some(report);

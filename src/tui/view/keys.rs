@@ -142,6 +142,13 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         urgent.extend(overlay(&[Overlay::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(unseen(state));
+    let named = |action, words| keymap::of(action).map(|it| Hint::new(it.label, words));
+    if state.problems.is_some() || state.picked.is_some() {
+        urgent.extend(named(Action::Edit, "edit"));
+    }
+    if state.toggles.camera.is_any() {
+        urgent.extend(named(Action::KeepCamera, "keep"));
+    }
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
     let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
     urgent.extend(state.changes().into_iter().map(changed));
@@ -151,11 +158,13 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
     };
     let first = now.iter().filter_map(|action| Hint::of(*action)).map(|hint| going_on(hint, state));
+    let (held, first): (Vec<Hint>, Vec<Hint>) = first.partition(|_| state.paused);
+    urgent.extend(held);
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.is_running();
     let others = KEYMAP.iter().filter(is_other).filter(is_idle).map(|it| Hint::new(it.label, it.hint));
-    (urgent, first.chain(others).collect())
+    (urgent, first.into_iter().chain(others).collect())
 }
 
 /// These have their own places in the line.

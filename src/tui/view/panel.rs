@@ -10,6 +10,7 @@ use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::scene::report::summary;
 use crate::scene::sanitize::visible;
+use crate::tui::event::Written;
 use crate::tui::state::{Activity, AssetBar, PreviewKind, State};
 
 /// Columns of a bar.
@@ -68,7 +69,11 @@ fn results(state: &State) -> Vec<Line> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
-    for written in &state.written {
+    let is_of_now = |written: &Written| state.is_written() || written.generation == state.generation;
+    if !state.written.iter().any(is_of_now) && !state.is_written() {
+        lines.push(vec![("not written: w writes it".to_owned(), Tone::Faint)]);
+    }
+    for written in state.written.iter().filter(|written| is_of_now(written)) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::Plain)]);
         let size = state.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));

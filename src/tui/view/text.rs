@@ -33,7 +33,8 @@ impl Tone {
             Self::Plain => (Color::Reset, Modifier::empty()),
             Self::Faint => (Color::Reset, Modifier::DIM),
             Self::Strong => (Color::Reset, Modifier::BOLD),
-            Self::Working => (Color::Blue, Modifier::empty()),
+            // The plain blue of many palettes cannot be read on black.
+            Self::Working => (Color::LightBlue, Modifier::empty()),
             Self::Good => (Color::Green, Modifier::empty()),
             Self::Warning => (Color::Yellow, Modifier::empty()),
             Self::Error => (Color::Red, Modifier::BOLD),

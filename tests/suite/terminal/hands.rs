@@ -39,7 +39,7 @@ fn the_mouse_turns_goes_nearer_and_asks() {
     terminal.wait_for("back to the scene's own settings");
     terminal.press(&(press(20, 16) + &release(20, 16)));
     let line = SCENE.lines().position(|line| line == "[[quad]]").expect("a quad") + 1;
-    terminal.wait_for(&format!("quad · scene.toml:{line} · phong board · ("));
+    terminal.wait_for(&format!("quad · scene.toml:{line} · phong board · "));
 }
 
 #[test]
