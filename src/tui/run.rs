@@ -390,7 +390,10 @@ impl Ui {
         self.leave();
         input::hold(true);
         self.screen.suspend();
+        let modes = terminal::modes();
         let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
+        // An editor that was killed leaves them as they were in it.
+        terminal::set_modes(modes.as_ref());
         input::hold(false);
         let end = self.redraw();
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))

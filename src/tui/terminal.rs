@@ -18,7 +18,7 @@ use crossterm::terminal::{
     enable_raw_mode,
 };
 use crossterm::{execute, terminal};
-use nix::sys::termios::{FlushArg, tcflush};
+use nix::sys::termios::{FlushArg, SetArg, Termios, tcflush, tcgetattr, tcsetattr};
 
 use super::event::Window;
 use super::graphics;
@@ -101,6 +101,18 @@ impl Screen {
 impl Drop for Screen {
     fn drop(&mut self) {
         give_back();
+    }
+}
+
+/// The modes of the terminal, as another program is to find them; none: there is no terminal.
+pub(super) fn modes() -> Option<Termios> {
+    tcgetattr(io::stdin()).ok()
+}
+
+/// Sets the modes of the terminal. Errors are of no use: there is nothing else to be done.
+pub(super) fn set_modes(modes: Option<&Termios>) {
+    if let Some(modes) = modes {
+        let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, modes);
     }
 }
 

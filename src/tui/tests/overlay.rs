@@ -172,6 +172,16 @@ fn errors_lie_beside_the_picture_where_there_is_room() {
 }
 
 #[test]
+fn of_more_errors_than_anybody_reads_the_first_are_shown() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.fail((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    for _ in 0..100 {
+        desk.key(KeyPress::special(KeyCode::PageDown));
+    }
+    assert!(desk.text().contains("… 19900 more faults are not shown"), "{}", desk.text());
+}
+
+#[test]
 fn errors_scroll_by_every_key() {
     let mut desk = Desk::new();
     desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());

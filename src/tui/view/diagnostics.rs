@@ -1,5 +1,7 @@
 //! The pane of errors and warnings: beside the picture, else over its lower part.
 
+use std::collections::HashMap;
+
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::{Clear, Widget};
@@ -11,6 +13,9 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::{self, Role};
 use crate::scene::sanitize::visible;
 use crate::tui::state::State;
+
+/// Faults that are shown; who mends them sees the next ones.
+const MOST: usize = 100;
 
 /// Draws it, from the line that the person scrolled to.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
@@ -80,9 +85,14 @@ fn text(state: &State, area: Rect) -> Vec<Line> {
 
 /// Errors first; a fault that is in several places is told once, with all of them.
 fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
+    let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
     for one in diagnostics {
-        match faults.iter_mut().find(|fault| is_same(fault[0], one)) {
+        let label = one.place.as_ref().map(|place| place.label.as_str());
+        let is_error = one.severity == Severity::Error;
+        let number =
+            *numbers.entry((is_error, &one.message, &one.path, &one.help, label)).or_insert(faults.len());
+        match faults.get_mut(number) {
             Some(fault) => fault.push(one),
             None => faults.push(vec![one]),
         }
@@ -92,15 +102,13 @@ fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
         fault.sort_by_key(|one| start(one));
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
-    let mut lines: Vec<Line> = faults.iter().flat_map(|fault| one_fault(fault, width)).collect();
+    let mut lines: Vec<Line> = faults.iter().take(MOST).flat_map(|fault| one_fault(fault, width)).collect();
     lines.pop();
+    if let Some(more @ 1..) = faults.len().checked_sub(MOST) {
+        lines.push(Line::new());
+        lines.push(vec![(format!("… {} are not shown", counted(more, "more fault")), Tone::Plain)]);
+    }
     lines
-}
-
-fn is_same(one: &Diagnostic, other: &Diagnostic) -> bool {
-    let label = |one: &Diagnostic| one.place.as_ref().map(|place| place.label.clone());
-    (one.severity, &one.message, &one.path, &one.help, label(one))
-        == (other.severity, &other.message, &other.path, &other.help, label(other))
 }
 
 /// The first place in full, the others by line and column; an empty line.

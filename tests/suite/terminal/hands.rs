@@ -124,6 +124,21 @@ fn the_editor_has_the_terminal_and_gives_it_back() {
 }
 
 #[test]
+fn an_editor_that_dies_in_raw_mode_leaves_a_terminal_that_echoes() {
+    let folder = Folder::new();
+    folder.write("vi", "#!/bin/sh\nstty raw -echo\nkill -9 $$\n");
+    fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
+    let editor = folder.path("vi");
+    let variables = [("VISUAL", ""), ("EDITOR", editor.to_str().expect("a name"))];
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
+    terminal.wait_for_render(1);
+    terminal.press("o");
+    terminal.wait_for("ended with");
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
+
+#[test]
 fn an_editor_that_is_not_there_is_said() {
     let folder = Folder::new();
     let variables = [("VISUAL", "no-such-editor")];

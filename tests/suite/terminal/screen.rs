@@ -136,6 +136,8 @@ fn a_storm_of_sizes_leaves_the_screen_of_the_last_one() {
     terminal.resize(80, 24);
     terminal.wait("the last line", |screen| last_line(screen).ends_with("? help"));
     terminal.wait("the picture", |screen| Colors::of(screen).red == red);
+    // Right after an escape character it would be alt-q.
+    terminal.settled(vt100::Screen::contents);
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
 }
