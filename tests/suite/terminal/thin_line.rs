@@ -30,14 +30,32 @@ fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::S
     begin.elapsed()
 }
 
+/// Whether something took no longer than [`SEEN`] at least once: other tests may have the processors meanwhile, so that the least of
+/// several times is what the program takes.
+#[track_caller]
+fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
+    const TRIES: u32 = 12;
+    let mut least = Duration::MAX;
+    for _ in 0..TRIES {
+        least = least.min(once());
+        if least <= SEEN {
+            return;
+        }
+    }
+    panic!("{what} after {least:?}");
+}
+
 #[test]
 fn keys_are_seen_at_once_and_little_is_on_the_way() {
     for answers in ALL {
         let (folder, mut terminal) = endless(answers);
-        for words in ["shadows hard", "shadows off", "shadows soft"] {
-            std::thread::sleep(Duration::from_millis(700));
-            let taken = time(&mut terminal, "s", words, |screen| screen.contents().contains(words));
-            assert!(taken <= SEEN, "{answers:?}: {words} after {taken:?}");
+        let mut words = ["shadows hard", "shadows off", "shadows soft"].into_iter().cycle();
+        for _ in 0..3 {
+            assert_at_once(&format!("{answers:?}: shadows"), || {
+                std::thread::sleep(Duration::from_millis(700));
+                let words = words.next().expect("without end");
+                time(&mut terminal, "s", words, |screen| screen.contents().contains(words))
+            });
         }
         // An edit while the line is full: the newest picture only.
         folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
@@ -54,10 +72,12 @@ fn keys_are_seen_at_once_and_little_is_on_the_way() {
 #[test]
 fn the_shell_is_back_at_once() {
     for answers in ALL {
-        let (_folder, mut terminal) = endless(answers);
-        let taken = time(&mut terminal, "q", "the shell's screen", |screen| !screen.alternate_screen());
-        assert!(taken <= SEEN, "{answers:?}: the screen after {taken:?}");
-        assert_eq!(terminal.end(), 0);
+        assert_at_once(&format!("{answers:?}: the shell's screen"), || {
+            let (_folder, mut terminal) = endless(answers);
+            let taken = time(&mut terminal, "q", "the shell's screen", |screen| !screen.alternate_screen());
+            assert_eq!(terminal.end(), 0);
+            taken
+        });
     }
 }
 
@@ -97,23 +117,25 @@ fn the_line_is_measured_and_shown() {
 
 #[test]
 fn a_terminal_that_takes_nothing_does_not_hold_up_the_end() {
-    let folder = Folder::new();
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
-    let mut terminal = folder.terminal();
-    terminal.wait_for("ETA");
-    terminal.set_reading(false);
-    // Each view is another picture, until nothing more fits in.
-    for _ in 0..40 {
-        terminal.press("v");
-        std::thread::sleep(Duration::from_millis(100));
-    }
-    let begin = Instant::now();
-    terminal.press("q");
-    assert_eq!(terminal.code(), 0);
-    let taken = begin.elapsed();
-    assert!(taken <= SEEN, "{taken:?}");
-    terminal.set_reading(true);
-    assert_eq!(terminal.end(), 0);
+    assert_at_once("the end", || {
+        let folder = Folder::new();
+        folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+        let mut terminal = folder.terminal();
+        terminal.wait_for("ETA");
+        terminal.set_reading(false);
+        // Each view is another picture, until nothing more fits in.
+        for _ in 0..40 {
+            terminal.press("v");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        let begin = Instant::now();
+        terminal.press("q");
+        assert_eq!(terminal.code(), 0);
+        let taken = begin.elapsed();
+        terminal.set_reading(true);
+        assert_eq!(terminal.end(), 0);
+        taken
+    });
 }
 
 /// A terminal cuts what does not fit; the program may see the last size only.
