@@ -268,6 +268,8 @@ pub(super) struct State {
     /// Whether the picture has the screen for itself.
     pub is_alone: bool,
     pub message: Option<String>,
+    /// When the camera was written into the scene file.
+    pub kept: Option<Instant>,
 
     pub change: Option<PendingChange>,
     /// From the last save to its first changed cell.
@@ -336,6 +338,7 @@ impl State {
             views: None,
             is_alone: false,
             message: None,
+            kept: None,
             change: None,
             first_change: None,
             frame: None,

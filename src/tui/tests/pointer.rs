@@ -4,6 +4,7 @@ use super::{BLUE, RED};
 use crate::pipeline::protocol::{self, Command, Kept, Picked, Spot, Thing, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
+use crate::tui::Changed;
 use crate::tui::color::ColorDepth;
 use crate::tui::event::{Effect, Event, Mouse, MouseKind};
 use crate::tui::fixtures::*;
@@ -145,6 +146,11 @@ fn a_camera_in_the_file_is_the_scene_s_own() {
         text.contains("the camera is in scenes/cornell.toml now") && !text.contains("camera moved"),
         "{text}"
     );
+    // The watcher hears of that, too.
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    assert!(desk.text().contains("the camera is in scenes/cornell.toml now"), "{}", desk.text());
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    assert!(!desk.text().contains("the camera is in"), "{}", desk.text());
 
     desk.press('l');
     desk.press('c');

@@ -95,6 +95,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         state.toggles.camera = CameraChange::default();
         effects = render(state, false);
     }
+    state.kept = is_new.then_some(state.now);
     say(state, words);
     effects
 }

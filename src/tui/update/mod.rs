@@ -57,7 +57,11 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Worker(event) => worker::update(state, event),
         Event::Picture { generation, picture, range } => show(state, Shown { generation, picture, range }),
         Event::Changed(Changed { noticed }) => {
-            state.message = None;
+            // It may be glimt's own save: what was said of that stays.
+            const OWN: Duration = Duration::from_secs(1);
+            if state.kept.take().is_none_or(|kept| state.now > kept + OWN) {
+                state.message = None;
+            }
             state.is_settled = false;
             history::record(state);
             state.history.edited();
