@@ -53,8 +53,9 @@ fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
         generation: *generation,
         scene: scene.to_owned(),
         overrides,
-        preview: Some(PreviewSize { width: 118, height: 74 }),
+        preview: Some(PreviewSize { width: 118, height: 74, around: None }),
         write: Writing::No,
         force: false,
+        first: None,
     })));
 }

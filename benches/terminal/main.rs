@@ -90,8 +90,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Renders a scene and an edit of it, and prints a line for each.
 fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
-    let size =
-        PreviewSize { width: u32::from(columns - BESIDE), height: 2 * u32::from(rows - ABOVE_AND_BELOW) };
+    let size = PreviewSize {
+        width: u32::from(columns - BESIDE),
+        height: 2 * u32::from(rows - ABOVE_AND_BELOW),
+        around: None,
+    };
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let text = fs::read_to_string(scenes.join(edit.scene).with_extension("toml"))?;
     if !text.contains(edit.from) {

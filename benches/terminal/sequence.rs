@@ -34,6 +34,7 @@ pub(crate) fn render(
         preview: Some(size),
         write: Writing::No,
         force: false,
+        first: None,
     };
     let start = Instant::now();
     handle.send(Command::Render(Box::new(request)));

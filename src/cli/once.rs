@@ -36,6 +36,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         preview: None,
         write: Writing::Must,
         force: false,
+        first: None,
     })));
     let mut reporter = progress::reporter(order.progress, console);
     let mut deadline = Deadline::default();

@@ -11,6 +11,7 @@ mod noise;
 mod preview;
 mod quantity;
 mod resample;
+mod section;
 mod srgb;
 pub mod stretch;
 mod sums;

@@ -8,7 +8,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub use super::answers::{Kept, Picked, Spot, Thing};
+pub use super::answers::{Kept, Picked, Section, Spot, Thing};
 use super::settings::{Effective, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Picture;
@@ -53,6 +53,8 @@ pub struct Request {
     pub write: Writing,
     /// Render again even where nothing changed.
     pub force: bool,
+    /// The part of the picture that gets its samples before the rest; the picture is the same in the end.
+    pub first: Option<Section>,
 }
 
 /// Whether a finished picture is written to disk.
@@ -68,12 +70,14 @@ pub enum Writing {
 }
 
 /// Upper bounds of a preview picture, in pixels of square shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewSize {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
+    /// As many of the picture's own pixels around this place; none: the whole picture at this size.
+    pub around: Option<Spot>,
 }
 
 /// From the worker to a front end.
@@ -473,4 +477,6 @@ pub struct LatestPreview {
     pub picture: Arc<Picture>,
     /// The numbers at both ends of the range that it is stretched to: near and far of distances, else 0 and the greatest.
     pub range: Option<[f32; 2]>,
+    /// The part of the picture that it shows, pixel by pixel; none: all of it.
+    pub section: Option<Section>,
 }

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, PoisonError};
 
-use super::protocol::{AssetProgress, Event, LatestPreview, PreviewSlot, RenderProgress, StageReport};
+use super::protocol::{
+    AssetProgress, Event, LatestPreview, PreviewSlot, RenderProgress, Section, StageReport,
+};
 use super::watch::content::FileRead;
 use crate::film::Picture;
 use crate::scene::diagnostic::Diagnostic;
@@ -47,8 +49,9 @@ impl Sink {
         self.send(Event::Refused { generation: self.generation, conflicts });
     }
 
-    pub(super) fn preview(&self, picture: Picture, range: Option<[f32; 2]>) {
-        let latest = LatestPreview { generation: self.generation, picture: Arc::new(picture), range };
+    pub(super) fn preview(&self, picture: Picture, range: Option<[f32; 2]>, section: Option<Section>) {
+        let latest =
+            LatestPreview { generation: self.generation, picture: Arc::new(picture), range, section };
         *self.previews.lock().unwrap_or_else(PoisonError::into_inner) = Some(latest);
         self.send(Event::Preview { generation: self.generation });
     }

@@ -329,6 +329,7 @@ mod tests {
             preview: None,
             write: Writing::No,
             force: false,
+            first: None,
         }))
     }
 

@@ -25,6 +25,8 @@ pub(super) enum Action {
     KeepCamera,
     Inspect,
     Focus,
+    CloseUp,
+    RectangleFirst,
     ToggleMouse,
     Edit,
     BeforeAfter,

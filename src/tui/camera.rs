@@ -9,8 +9,8 @@ use crate::scene::description::Pose;
 const POLE: f64 = 1.0;
 /// The field of view stays within these angles, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// Distances from what is looked at.
-const DISTANCE: (f64, f64) = (1e-9, 1e12);
+/// How many times nearer or farther than the scene's own camera the eye may come.
+pub(super) const REACH: f64 = 1000.0;
 
 /// Around `look_at`: so many degrees to the right and up.
 pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
@@ -28,12 +28,12 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     placed(pose, (level * sine + axis * cosine) * distance)
 }
 
-/// Towards `look_at`, or away from it: the distance becomes `factor` times as long.
-pub(super) fn dollied(pose: &Pose, factor: f64) -> Pose {
+/// Towards `look_at`, or away from it: the distance becomes `factor` times as long, within reach of the scene's `own`.
+pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
-    let wanted = (distance * factor).clamp(DISTANCE.0.min(distance), DISTANCE.1.max(distance));
-    placed(pose, arm * (wanted / distance))
+    let wanted = (distance * factor).clamp((own / REACH).min(distance), (own * REACH).max(distance));
+    if wanted == distance { *pose } else { placed(pose, arm * (wanted / distance)) }
 }
 
 /// The field of view, `factor` times as wide.
@@ -84,12 +84,17 @@ mod tests {
 
     #[test]
     fn dolly_and_zoom_have_their_ends() {
-        assert_eq!(dollied(&POSE, 0.5).position, DVec3::new(0.0, 1.0, 2.0));
-        let mut pose = POSE;
-        for _ in 0..1000 {
-            pose = dollied(&pose, 0.5);
+        assert_eq!(dollied(&POSE, 0.5, 4.0).position, DVec3::new(0.0, 1.0, 2.0));
+        for (factor, end) in [(0.5, 0.004), (2.0, 4000.0)] {
+            let mut pose = POSE;
+            for _ in 0..1000 {
+                pose = dollied(&pose, factor, 4.0);
+            }
+            assert!((pose.distance() / end - 1.0).abs() < 1e-4, "{}", pose.distance());
+            assert_eq!(dollied(&pose, factor, 4.0), pose, "the end is the end");
         }
-        assert!(pose.distance() > 0.0);
+        let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
+        assert_eq!(dollied(&far, 2.0, 4.0), far, "one that is farther stays where it is");
         let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
         assert_eq!(zoomed(&view, 1.1), 44.0);
         assert_eq!(zoomed(&view, 100.0), 160.0);

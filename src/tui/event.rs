@@ -11,7 +11,7 @@ use super::input::Answer;
 use super::options::{Changed, News};
 use super::state::FrameReport;
 use crate::film::Picture;
-use crate::pipeline::protocol;
+use crate::pipeline::protocol::{self, Section};
 
 /// One thing that happened.
 #[derive(Clone, Debug)]
@@ -34,8 +34,9 @@ pub(super) enum Event {
     Resize(Window),
     /// The worker says something. Pictures come as [`Event::Picture`].
     Worker(protocol::Event),
-    /// The newest picture of the slot, with the least and the greatest number where it is stretched to them.
-    Picture { generation: u64, picture: Arc<Picture>, range: Option<[f32; 2]> },
+    /// The newest picture of the slot, with the least and the greatest number where it is stretched to them, and the part that it is
+    /// where it is shown pixel by pixel.
+    Picture { generation: u64, picture: Arc<Picture>, range: Option<[f32; 2]>, section: Option<Section> },
     /// A file that the scene depends on was written.
     Changed(Changed),
     /// Nobody is writing the files that were said to have changed.

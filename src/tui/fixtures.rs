@@ -102,7 +102,12 @@ impl Desk {
             settings: Box::new(settings()),
             camera: camera(),
         });
-        self.event(Event::Picture { generation, picture: plain_picture(50, 38, color), range: None });
+        self.event(Event::Picture {
+            generation,
+            picture: plain_picture(50, 38, color),
+            range: None,
+            section: None,
+        });
         self.worker(done(generation, Vec::new(), false));
     }
 

@@ -32,6 +32,14 @@ impl History {
         self.edits += 1;
     }
 
+    /// The camera that keys had moved since this request was written into the scene: an edit, which its pictures are after.
+    pub(super) fn kept_camera(&mut self, since: u64) {
+        self.edits += 1;
+        for past in self.past.iter_mut().filter(|past| past.shown.generation >= since) {
+            past.edits = self.edits;
+        }
+    }
+
     /// That edit changed nothing that is seen.
     pub(super) fn edited_nothing(&mut self) {
         self.edits = self.edits.saturating_sub(1);
@@ -124,7 +132,7 @@ mod tests {
     use crate::tui::fixtures::plain_picture;
 
     fn shown(generation: u64, side: u32) -> Shown {
-        Shown { generation, picture: plain_picture(side, side, [1, 2, 3]), range: None }
+        Shown { generation, picture: plain_picture(side, side, [1, 2, 3]), range: None, section: None }
     }
 
     #[test]
@@ -159,6 +167,17 @@ mod tests {
         history.edited_nothing();
         let before = history.before_edit(shown(2, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
+    }
+
+    #[test]
+    fn a_camera_that_was_kept_is_an_edit() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now());
+        history.record(shown(2, 20), Instant::now());
+        history.record(shown(3, 30), Instant::now());
+        history.kept_camera(2);
+        let before = history.before_edit(shown(3, 30)).expect("a picture");
+        assert_eq!(before.generation, 1, "of the camera before");
     }
 
     #[test]

@@ -50,6 +50,14 @@ pub(super) const KEYMAP: &[Binding] = &[
     ),
     binding(&[KeyPress::special(KeyCode::Tab)], "tab", Action::PictureAlone, "the picture alone", "picture"),
     binding(&[KeyPress::plain('V')], "", Action::PreviousView, "", ""),
+    binding(&[KeyPress::plain('x')], "x", Action::CloseUp, "pixels 1:1 around the crosshair, and back", ""),
+    binding(
+        &[KeyPress::plain('z')],
+        "z",
+        Action::RectangleFirst,
+        "then a drag: render that first; z z around the crosshair",
+        "",
+    ),
     binding(
         &[LEFT, KeyPress::plain('h')],
         "arrows hjkl",
@@ -186,7 +194,7 @@ mod tests {
 
     #[test]
     fn the_fixed_keys_are_there() {
-        for key in "?qsdpiv rw0hjkl+-<>[]fcombnN".chars() {
+        for key in "?qsdpiv rw0hjkl+-<>[]fcombnNxze".chars() {
             assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
         }
     }

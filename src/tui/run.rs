@@ -289,12 +289,12 @@ impl Ui {
         self.take_preview()
     }
 
-    /// Whether the newest picture has another size than the one that is drawn.
+    /// Whether the newest picture has another size than the one that is drawn, or is of another part.
     fn is_resized(&self) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
-        let size = |picture: &Picture| (picture.width, picture.height);
-        let sizes = latest.as_ref().zip(self.drawn.picture.as_ref());
-        sizes.is_some_and(|(latest, drawn)| size(&latest.picture) != size(drawn))
+        let what = |picture: &Picture, section| (picture.width, picture.height, section);
+        let both = latest.as_ref().zip(self.state.picture.as_ref());
+        both.is_some_and(|(new, old)| what(&new.picture, new.section) != what(&old.picture, old.section))
     }
 
     /// What to do with a picture of the same request as the one that is drawn.
@@ -342,8 +342,8 @@ impl Ui {
     fn take_preview(&mut self) -> Option<End> {
         self.drawn.is_old = false;
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let LatestPreview { generation, picture, range } = latest?;
-        self.apply(Event::Picture { generation, picture, range })
+        let LatestPreview { generation, picture, range, section } = latest?;
+        self.apply(Event::Picture { generation, picture, range, section })
     }
 
     fn apply(&mut self, event: Event) -> Option<End> {

@@ -14,7 +14,7 @@ use super::mosaic::Grid;
 use super::options::PreviewChoice;
 use crate::film::Picture;
 use crate::pipeline::protocol::{
-    AssetProgress, PreviewSize, RenderProgress, Report, Spot, Stage, StageReport, Viewpoint,
+    AssetProgress, PreviewSize, RenderProgress, Report, Section, Spot, Stage, StageReport, Viewpoint,
 };
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
@@ -155,15 +155,19 @@ pub(super) struct Shown {
     pub picture: Arc<Picture>,
     /// The least and the greatest number that it shows, where it is stretched to them.
     pub range: Option<[f32; 2]>,
+    /// The part of the picture that is shown pixel by pixel; none: all of it.
+    pub section: Option<Section>,
 }
 
 /// The left button went down over a cell of the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Press {
     /// Where it was seen last.
     pub column: u16,
     pub row: u16,
     pub has_moved: bool,
+    /// The place of the picture where it began.
+    pub from: Option<Spot>,
 }
 
 /// Why it was asked what is at a place.
@@ -221,15 +225,25 @@ pub(super) struct State {
     /// The camera of the newest request that was understood.
     pub camera: Option<Viewpoint>,
     pub nudge: Nudge,
+    /// The first request of a camera that keys have moved.
+    pub moved_since: Option<u64>,
     pub is_mouse_on: bool,
     pub press: Option<Press>,
     /// Whether the next click is for the focus.
     pub is_focusing: bool,
     /// The last click, else the middle of the picture.
     pub crosshair: Spot,
+    /// Where the picture is shown pixel by pixel; none: all of it is shown.
+    pub close_up: Option<Spot>,
+    /// What is rendered before the rest.
+    pub first: Option<Section>,
+    /// Whether the next drag tells what that is.
+    pub is_marking: bool,
     /// What the last answer about a place is for.
     pub asked: Purpose,
-    /// What was found there, in the scene file.
+    /// What was found there, until the next key.
+    pub inspected: Option<Vec<String>>,
+    /// The same, in the scene file.
     pub picked: Option<FilePlace>,
     pub history: History,
     /// The request of the last edit.
@@ -249,6 +263,8 @@ pub(super) struct State {
     pub edits: u64,
     /// Whether the next picture that is written is one that was asked for.
     pub asked_to_write: bool,
+    /// Why the picture at hand is not on disk although it is to be.
+    pub unwritten: Option<String>,
     pub written: Vec<Written>,
     pub picture: Option<Shown>,
 
@@ -308,11 +324,16 @@ impl State {
             effective: None,
             camera: None,
             nudge: Nudge::default(),
+            moved_since: None,
             is_mouse_on: true,
             press: None,
             is_focusing: false,
             crosshair: Spot { x: 0.5, y: 0.5 },
+            close_up: None,
+            first: None,
+            is_marking: false,
             asked: Purpose::default(),
+            inspected: None,
             picked: None,
             history: History::default(),
             edit: None,
@@ -326,6 +347,7 @@ impl State {
             renders: 0,
             edits: 0,
             asked_to_write: false,
+            unwritten: None,
             written: Vec::new(),
             picture: None,
             problems: None,

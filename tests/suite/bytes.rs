@@ -15,9 +15,9 @@ use ratatui::style::Color;
 
 /// Windows, and the previews that fit into them beside the words.
 const SIZES: [(Rect, PreviewSize); 3] = [
-    (Rect { x: 0, y: 0, width: 80, height: 24 }, PreviewSize { width: 60, height: 40 }),
-    (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewSize { width: 90, height: 72 }),
-    (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewSize { width: 170, height: 112 }),
+    (Rect { x: 0, y: 0, width: 80, height: 24 }, PreviewSize { width: 60, height: 40, around: None }),
+    (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewSize { width: 90, height: 72, around: None }),
+    (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewSize { width: 170, height: 112, around: None }),
 ];
 /// Pixels across and down of the film. Larger ones have less noise in their previews.
 const FILM: u32 = 320;
@@ -56,6 +56,7 @@ impl Studio {
             preview: Some(self.preview),
             write: Writing::No,
             force: false,
+            first: None,
         };
         self.handle.send(Command::Render(Box::new(request)));
         for event in &self.handle.events {

@@ -365,6 +365,7 @@ impl Engine {
             preview: request.preview,
             most_film_bytes: self.means.most_film_bytes,
             force: request.force,
+            first: request.first,
             sink,
             pulse: &pulse,
             take_preview: &|| orders.take_preview(),

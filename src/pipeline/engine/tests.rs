@@ -64,6 +64,7 @@ impl Desk {
             preview: None,
             write: Writing::No,
             force: false,
+            first: None,
         };
         let token = CancelToken::new();
         self.engine.request(&request, &sink, &Meanwhile { token: &token, writing: &token, orders: &Silence });

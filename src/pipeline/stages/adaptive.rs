@@ -8,7 +8,7 @@
 use crate::film::{Film, HalfNoise, samples_to};
 
 /// Samples before which noise is not asked for.
-const LEAST: u32 = 16;
+pub(super) const LEAST: u32 = 16;
 
 /// The part of the noise asked for that is aimed at, as noise is known by some samples only.
 const AIM: f64 = 0.82;
@@ -49,9 +49,9 @@ impl Goals {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
-    /// Decide for every half that has no goal yet, by the noise of the other one. `done` are the samples that they have, in those
-    /// without a goal the same power of two.
-    pub(super) fn judge(&mut self, film: &Film, done: &[[u32; 2]], error: f64) {
+    /// Decide for every half that has no goal yet and has now `samples`, a power of two, by the noise of the other one. `done` are
+    /// the samples that all of them have. Before all have enough of them for the picture's brightness, nothing is decided.
+    pub(super) fn judge(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
         let open = |goals: &[u32; 2], done: &[u32; 2]| {
             (0..2).any(|half| goals[half] > done[half] && done[half] < LEAST)
         };
@@ -61,7 +61,7 @@ impl Goals {
         let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
         self.brightness = Some(brightness);
         for (tile, done) in done.iter().enumerate() {
-            if self.decided[tile].iter().all(|goal| *goal < u32::MAX) {
+            if (0..2).all(|half| self.decided[tile][half] < u32::MAX || done[half] != samples) {
                 continue;
             }
             let [even, odd] = [0, 1].map(|half| film.half_noise(tile, half));
@@ -114,7 +114,7 @@ mod tests {
 
     fn judged(rows: [(f32, f32); 2], samples: u32, error: f64) -> Goals {
         let mut goals = Goals::none(1);
-        goals.judge(&film(rows, samples), &[[samples; 2]], error);
+        goals.judge(&film(rows, samples), &[[samples; 2]], samples, error);
         goals
     }
 
@@ -154,7 +154,7 @@ mod tests {
             film.add(tile as usize, &TileSamples { rect, samples: 16, radiance, negative: None });
         }
         let mut goals = Goals::none(2);
-        goals.judge(&film, &[[16; 2]; 2], 0.01);
+        goals.judge(&film, &[[16; 2]; 2], 16, 0.01);
         assert_eq!((goals.of(0, 0), goals.of(1, 0)), (u32::MAX, 16));
     }
 
@@ -176,7 +176,7 @@ mod tests {
                 }
                 done[0][half] += samples;
             }
-            goals.judge(&film, &done, 0.6);
+            goals.judge(&film, &done, target, 0.6);
         }
         film.mean_luminance().expect("samples")
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::plan::Plan;
 use super::super::trace::{Job, Rows};
 use super::adaptive::Goals;
-use crate::film::{Film, FilmError, Previewer, RadianceImage};
+use crate::film::{Film, FilmError, Previewer, RadianceImage, Rect};
 use crate::scene::fingerprint::Key;
 
 /// A film that is being rendered, or that was.
@@ -50,7 +50,14 @@ impl Canvas {
 
     /// Whether every pixel has this many samples, or those that it is to have.
     pub(in crate::pipeline) fn is_complete(&self, samples: u32) -> bool {
-        self.halves().all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
+        self.is_complete_in(None, samples)
+    }
+
+    /// The same of the tiles of a part; none: of all.
+    pub(super) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
+        self.halves()
+            .filter(|(tile, _)| self.is_in(part, *tile))
+            .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
     }
 
     /// Whether no pixel has more samples than these.
@@ -60,11 +67,23 @@ impl Canvas {
 
     /// Samples that every pixel has which is to have more, up to some.
     pub(in crate::pipeline) fn samples(&self, most: u32) -> u32 {
+        self.samples_in(None, most)
+    }
+
+    /// The same of the tiles of a part; none: of all.
+    pub(super) fn samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
             (done < self.goals.of(tile, half).min(most)).then_some(done)
         };
-        self.halves().filter_map(of).min().unwrap_or(most)
+        self.halves().filter(|(tile, _)| self.is_in(part, *tile)).filter_map(of).min().unwrap_or(most)
+    }
+
+    /// Whether a tile has pixels in a part.
+    fn is_in(&self, part: Option<Rect>, tile: usize) -> bool {
+        part.is_none_or(|part| {
+            self.film.tile_rect(tile).is_some_and(|rect| rect.intersection(&part).is_some())
+        })
     }
 
     /// Whether there are samples.
@@ -88,10 +107,11 @@ impl Canvas {
         self.film.memory_bytes() + done + base + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// What brings every tile to this many samples, or to those that it is to have: the tiles that lack some, in the film's order.
-    pub(super) fn jobs(&self, target: u32) -> Vec<Job> {
+    /// What brings every tile of a part (none: of all) to this many samples, or to those that it is to have: the tiles that lack
+    /// some, in the film's order.
+    pub(super) fn jobs(&self, part: Option<Rect>, target: u32) -> Vec<Job> {
         let mut jobs = Vec::new();
-        for &tile in self.film.tile_order() {
+        for &tile in self.film.tile_order().iter().filter(|tile| self.is_in(part, **tile)) {
             let Some(rect) = self.film.tile_rect(tile) else { continue };
             let [even, odd] = [0, 1].map(|half| self.done[tile][half]..self.goals.of(tile, half).min(target));
             if even == odd {
@@ -114,9 +134,9 @@ impl Canvas {
         job.pixels() * job.samples.len() as u64
     }
 
-    /// Decide which tiles have enough samples, where all that are to have more have the same power of two of them.
-    pub(super) fn judge(&mut self, error: f64) {
-        self.goals.judge(&self.film, &self.done, error);
+    /// Decide which tiles have enough samples, of those that have this power of two of them.
+    pub(super) fn judge(&mut self, samples: u32, error: f64) {
+        self.goals.judge(&self.film, &self.done, samples, error);
     }
 
     /// Pixels times samples that there are.

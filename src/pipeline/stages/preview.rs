@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPool;
 
 use super::super::plan::Plan;
-use super::super::protocol::PreviewSize;
+use super::super::protocol::{PreviewSize, Section, Spot};
 use super::super::sink::Sink;
 use super::canvas::Canvas;
 use crate::control::CancelToken;
-use crate::film::{Previewer, Quantity, tone::develop};
+use crate::film::{Previewer, Quantity, RadianceImage, Rect, tone::develop};
 
 /// The longest that a film is taken up without a look at the orders.
 const PATIENCE: Duration = Duration::from_millis(4);
@@ -24,7 +24,7 @@ pub(in crate::pipeline) struct Screen<'a> {
 }
 
 impl Screen<'_> {
-    /// Columns and rows of the pictures.
+    /// Columns and rows of pictures of the whole.
     pub(super) fn size(&self) -> Option<(u32, u32)> {
         let render = &self.plan.settings.render;
         self.bounds.and_then(|bounds| fit(render.width, render.height, bounds))
@@ -33,6 +33,9 @@ impl Screen<'_> {
     /// The whole film, unless that is cancelled. For when no tile is being rendered, as the pool helps.
     pub(in crate::pipeline) fn show(&self, canvas: &mut Canvas, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
+        if self.say_section(canvas) {
+            return;
+        }
         while !pool.install(|| catch_up(canvas, self.plan.settings.view.quantity(), size)) {
             if token.is_cancelled() {
                 return;
@@ -45,6 +48,9 @@ impl Screen<'_> {
     /// picture came of it.
     pub(super) fn show_some(&self, canvas: &mut Canvas) -> bool {
         let Some(size) = self.size() else { return false };
+        if self.say_section(canvas) {
+            return true;
+        }
         catch_up(canvas, self.plan.settings.view.quantity(), size);
         let is_whole = canvas.previewer.as_ref().is_some_and(Previewer::is_whole);
         if is_whole {
@@ -58,9 +64,40 @@ impl Screen<'_> {
             // The first coarse picture has none of the numbers about samples.
             let base = canvas.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
             let image = previewer.picture(base);
-            let tone = self.plan.tone.of_picture(&image);
-            self.sink.preview(develop(&image, &tone), tone.stretch.range().map(|range| range.ends()));
+            self.send(&image, None);
         }
+    }
+
+    /// The picture's own pixels, if they are asked for.
+    fn say_section(&self, canvas: &Canvas) -> bool {
+        let Some(rect) = self.section() else { return false };
+        let quantity = self.plan.settings.view.quantity();
+        let base = canvas.base.as_ref().filter(|_| quantity == Quantity::Radiance);
+        let render = &self.plan.settings.render;
+        let section = Section::of(rect, (render.width, render.height));
+        self.send(&canvas.film.section(quantity, rect, base), Some(section));
+        true
+    }
+
+    fn send(&self, image: &RadianceImage, section: Option<Section>) {
+        let tone = self.plan.tone.of_picture(image);
+        let range = tone.stretch.range().map(|range| range.ends());
+        self.sink.preview(develop(image, &tone), range, section);
+    }
+
+    /// The pixels that are shown one by one.
+    fn section(&self) -> Option<Rect> {
+        let render = &self.plan.settings.render;
+        let PreviewSize { width, height, around } = self.bounds?;
+        let Spot { x, y } = around?;
+        let along = |middle: f64, length: u32, side: u32| {
+            let length = length.min(side);
+            let start = (middle * f64::from(side)).max(0.0) as u32;
+            (start.saturating_sub(length / 2).min(side - length), length)
+        };
+        let (x, width) = along(x, width, render.width);
+        let (y, height) = along(y, height, render.height);
+        Some(Rect { x, y, width, height })
     }
 }
 
@@ -93,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_preview_keeps_the_aspect_ratio_inside_its_bounds() {
-        let bounds = |width, height| PreviewSize { width, height };
+        let bounds = |width, height| PreviewSize { width, height, around: None };
         assert_eq!(fit(640, 480, bounds(80, 48)), Some((64, 48)));
         assert_eq!(fit(640, 480, bounds(64, 100)), Some((64, 48)));
         assert_eq!(fit(10_000, 1, bounds(80, 48)), Some((80, 1)));

@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 
 use super::super::pace::{Clock, Pace};
 use super::super::plan::Plan;
-use super::super::protocol::{PreviewSize, RenderProgress};
+use super::super::protocol::{PreviewSize, RenderProgress, Section};
 use super::super::sink::Sink;
 use super::super::trace::{Job, Rows, Tracer, next_pass};
+use super::adaptive::LEAST;
 use super::canvas::Canvas;
 use super::films::Films;
 use super::photons::{PhotonStore, Sending};
@@ -44,6 +45,8 @@ pub(in crate::pipeline) struct Rendering<'a> {
     pub(in crate::pipeline) most_film_bytes: u64,
     /// Start from an empty film whatever is kept.
     pub(in crate::pipeline) force: bool,
+    /// What gets its samples before the rest.
+    pub(in crate::pipeline) first: Option<Section>,
     pub(in crate::pipeline) sink: &'a Sink,
     /// Called often with the film as it is, for orders that come during the render; and whether every pixel of it
     /// has a sample.
@@ -144,43 +147,66 @@ impl<'a> Painter<'a> {
             if self.canvas.base.is_none() {
                 self.coarse()?;
             }
-            self.pass(1)?;
+            let first = self.first();
+            if first.is_some() {
+                self.pass(first, 1)?;
+            }
+            self.pass(None, 1)?;
             self.is_first = false;
             self.canvas.base = None;
             self.show();
             self.tick();
         }
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
-        while !self.canvas.is_complete(samples) && !self.is_over_time {
-            let target = next_pass(self.canvas.samples(samples), samples);
-            self.pass(target)?;
-            if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
-                self.canvas.judge(error.into());
-                self.total_units = self.canvas.units_to_come(samples);
-                self.pace.expect(self.total_units);
-            }
+        if let Some(first) = self.first() {
+            // Noise is held against the brightness of the whole picture, which is known then.
+            let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
+            self.passes(None, of_all)?;
+            self.passes(Some(first), samples)?;
         }
+        self.passes(None, samples)?;
         self.show();
         self.say_progress(true);
         Ok(())
     }
 
-    /// All tiles that have fewer samples than `target`.
-    fn pass(&mut self, target: u32) -> Result<(), Stop> {
-        let Some(photons) = self.rendering.photons else { return self.pass_by(target, None) };
-        while !self.canvas.is_complete(target) && !self.is_over_time {
-            let samples = self.canvas.samples(target);
-            let part = target.min(samples.saturating_add(photons.at_once()));
+    /// The pixels that come before the rest.
+    fn first(&self) -> Option<Rect> {
+        let Render { width, height, .. } = self.rendering.plan.settings.render;
+        self.rendering.first.map(|section| section.pixels((width, height)))
+    }
+
+    /// Pass after pass until a part (none: all) has so many samples, or those that it is to have.
+    fn passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
+        let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
+        while !self.canvas.is_complete_in(part, samples) && !self.is_over_time {
+            let target = next_pass(self.canvas.samples_in(part, samples), samples);
+            self.pass(part, target)?;
+            if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
+                self.canvas.judge(target, error.into());
+                self.total_units = self.canvas.units_to_come(most);
+                self.pace.expect(self.total_units);
+            }
+        }
+        Ok(())
+    }
+
+    /// All tiles of a part that have fewer samples than `target`.
+    fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
+        let Some(photons) = self.rendering.photons else { return self.pass_by(part, target, None) };
+        while !self.canvas.is_complete_in(part, target) && !self.is_over_time {
+            let samples = self.canvas.samples_in(part, target);
+            let end = target.min(samples.saturating_add(photons.at_once()));
             // Photons that no time is left for are not sent, nor gathered.
             self.tick();
             if self.is_over_time {
                 break;
             }
-            let maps = self.maps(photons, samples..part)?;
+            let maps = self.maps(photons, samples..end)?;
             if self.is_over_time {
                 break;
             }
-            self.pass_by(part, Some(&maps))?;
+            self.pass_by(part, end, Some(&maps))?;
         }
         Ok(())
     }
@@ -192,8 +218,8 @@ impl<'a> Painter<'a> {
         Ok(photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?)
     }
 
-    fn pass_by(&mut self, target: u32, photons: Option<&PhotonMaps>) -> Result<(), Stop> {
-        let jobs = self.canvas.jobs(target);
+    fn pass_by(&mut self, part: Option<Rect>, target: u32, photons: Option<&PhotonMaps>) -> Result<(), Stop> {
+        let jobs = self.canvas.jobs(part, target);
         let tracer = Tracer { photons, ..self.rendering.tracer };
         let film = Arc::clone(&self.canvas.film);
         let keep =

@@ -1,7 +1,7 @@
 //! Tiles that stop by their noise.
 
 use super::Bench;
-use crate::pipeline::protocol::Stage;
+use crate::pipeline::protocol::{Section, Stage};
 
 /// A lamp over a floor with a ball: penumbras in some tiles, next to nothing in others.
 const LIT: &str = r#"
@@ -62,6 +62,11 @@ fn it_has_the_same_bits_whatever_the_threads_and_the_way_there() {
         bench.overrides.samples = Some(samples);
         bench.done();
     }
+    pictures.push(bench.picture());
+    // A part of it before the rest.
+    let mut bench = Bench::new(LIT);
+    bench.first = Some(Section { left: 0.3, top: 0.2, width: 0.3, height: 0.4 });
+    bench.done();
     pictures.push(bench.picture());
     assert!(pictures.iter().all(|picture| *picture == pictures[0]));
 }

@@ -13,7 +13,8 @@ use std::time::Duration;
 
 use crate::pipeline::engine::Means;
 use crate::pipeline::protocol::{
-    Command, Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing,
+    Command, Event, Failure, LatestPreview, PreviewSize, Report, Request, Section, Spot, Stage, Status,
+    Writing,
 };
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::trace::Kernel;
@@ -77,6 +78,7 @@ pub(in crate::pipeline) struct Bench {
     pub(super) overrides: Overrides,
     pub(super) preview: Option<PreviewSize>,
     pub(super) force: bool,
+    pub(super) first: Option<Section>,
     pub(super) writing: Writing,
 }
 
@@ -101,6 +103,7 @@ impl Bench {
             overrides,
             preview: None,
             force: false,
+            first: None,
             writing: Writing::Must,
         };
         bench.write("scene.toml", scene);
@@ -132,6 +135,7 @@ impl Bench {
             preview: self.preview,
             write: self.writing,
             force: self.force,
+            first: self.first,
         })));
         self.generation
     }

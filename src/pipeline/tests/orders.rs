@@ -9,6 +9,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::{Rect, TileSamples};
 use crate::integrators::{RayCounters, RenderSettings};
 use crate::pipeline::engine::Means;
+use crate::pipeline::settings::View;
 use crate::world::World;
 
 /// As the real one, and slowly: a tile takes until it is told to stop.
@@ -126,15 +127,42 @@ fn a_film_that_does_not_fit_is_an_error() {
 #[test]
 fn previews_fit_their_bounds_and_a_new_size_renders_nothing() {
     let mut bench = Bench::new(SCENE);
-    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let generation = bench.send();
     assert!(bench.until_end(generation).iter().any(|event| matches!(event, Event::Preview { .. })));
     let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
     assert_eq!((latest.generation, latest.picture.width, latest.picture.height), (generation, 12, 9));
-    bench.preview = Some(PreviewSize { width: 20, height: 30 });
+    bench.preview = Some(PreviewSize { width: 20, height: 30, around: None });
     assert_statuses(&bench.done().0, "rrrrrsrr");
     let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
     assert_eq!((latest.picture.width, latest.picture.height), (20, 15));
+}
+
+#[test]
+fn a_close_up_has_the_picture_s_own_pixels() {
+    let mut bench = Bench::new(SCENE);
+    bench.preview = Some(PreviewSize { width: 40, height: 30, around: None });
+    bench.done();
+    let latest =
+        |bench: &Bench| bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
+    let whole = latest(&bench);
+    assert_eq!((whole.picture.width, whole.section), (40, None));
+    for (spot, left, top) in [((0.5, 0.5), 14, 11), ((0.0, 1.0), 0, 22), ((2.0, -1.0), 28, 0)] {
+        let around = Some(Spot { x: spot.0, y: spot.1 });
+        bench.preview = Some(PreviewSize { width: 12, height: 8, around });
+        assert_statuses(&bench.done().0, "rrrrrsrr");
+        let LatestPreview { picture, section, .. } = latest(&bench);
+        let section = section.expect("a part");
+        assert_eq!((picture.width, picture.height), (12, 8));
+        assert_eq!((section.left, section.top), (f64::from(left) / 40.0, f64::from(top) / 30.0));
+        for (i, pixel) in (0..).zip(&picture.pixels) {
+            let at = (top + i / 12) * 40 + left + i % 12;
+            assert_eq!(*pixel, whole.picture.pixels[at as usize], "pixel {i} around {spot:?}");
+        }
+    }
+    bench.preview = Some(PreviewSize { width: 200, height: 200, around: Some(Spot { x: 0.3, y: 0.3 }) });
+    bench.done();
+    assert_eq!(latest(&bench).picture, whole.picture, "a small picture is there whole, in its own size");
 }
 
 /// Slow enough that orders arrive during the render.
@@ -152,7 +180,7 @@ fn slow(
 #[test]
 fn another_size_of_the_preview_interrupts_nothing() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
-    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     let until_wide = |bench: &Bench, wide: u32| {
@@ -166,7 +194,7 @@ fn another_size_of_the_preview_interrupts_nothing() {
             }
         }
     };
-    let order = |width| Command::Preview(Some(PreviewSize { width, height: 100 }));
+    let order = |width| Command::Preview(Some(PreviewSize { width, height: 100, around: None }));
     bench.worker.send(order(24));
     until_wide(&bench, 24);
     bench.worker.send(Command::Pause(true));
@@ -188,6 +216,31 @@ fn samples_on_disk(bench: &Bench) -> String {
     let text = String::from_utf8_lossy(&bench.picture()).into_owned();
     let line = text.lines().find_map(|line| line.strip_prefix("# glimt:samples: "));
     line.expect("the picture says so").to_owned()
+}
+
+#[test]
+fn a_part_that_comes_first_has_its_samples_before_the_rest() {
+    let text = wide().replace("width = 640", "width = 256").replace("height = 640", "height = 256");
+    let text = text.replace("samples = 4", "samples = 32");
+    let mut bench = Bench::with(&text, slow);
+    bench.overrides.view = Some(View::Samples);
+    bench.preview = Some(PreviewSize { width: 256, height: 256, around: None });
+    bench.first = Some(Section { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
+    let of = bench.send();
+    // The tile in the corner, which comes last else, is whole before the one in the middle.
+    loop {
+        let event = bench.next();
+        assert!(!matches!(event, Event::Done { .. }), "not seen");
+        let latest = bench.worker.previews.lock().expect("not poisoned").clone();
+        let Some(LatestPreview { picture, range: Some([_, most]), .. }) = latest else { continue };
+        let value = |x: usize, y: usize| f32::from(picture.pixels[y * 256 + x][0]) / 255.0 * most;
+        if value(5, 5) > 31.0 {
+            assert!(value(128, 128) < 31.0, "{}", value(128, 128));
+            break;
+        }
+    }
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
 }
 
 #[test]
@@ -344,7 +397,7 @@ fn a_target_that_cannot_be_written_fails_before_the_render() {
 fn a_target_that_cannot_be_written_is_said_and_the_picture_shown_all_the_same() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
-    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     bench.writing = Writing::Try;
     let of = bench.send();
     let events = bench.until_end(of);
@@ -379,7 +432,7 @@ fn warnings_are_said_before_anything_is_rendered() {
     let mut bench = Bench::new(SCENE);
     // A face without area.
     bench.write("one.obj", &format!("{OBJ}f 1 1 2\n"));
-    bench.preview = Some(PreviewSize { width: 20, height: 20 });
+    bench.preview = Some(PreviewSize { width: 20, height: 20, around: None });
     let of = bench.send();
     let events = bench.until_end(of);
     let at = |what: &dyn Fn(&Event) -> bool| events.iter().position(what).expect("it is said");

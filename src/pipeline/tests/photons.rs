@@ -58,7 +58,7 @@ fn without(
 #[test]
 fn the_first_coarse_picture_has_photons() {
     let mut bench = Bench::with(&wrapped(1000), without);
-    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let of = bench.send();
     assert!(bench.until_end(of).iter().any(|event| matches!(event, Event::Preview { .. })));
     assert!(!WITHOUT.load(Ordering::SeqCst));

@@ -26,7 +26,7 @@ fn a_conflict_is_said_before_the_work_and_the_picture_shown_all_the_same() {
     let (good, report) = (bench.path("good.png"), bench.path("r.json"));
     bench.overrides.outputs = vec![good.clone(), bench.path("skin.ppm")];
     bench.overrides.report = Some(report.clone());
-    bench.preview = Some(PreviewSize { width: 12, height: 12 });
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     bench.writing = Writing::Try;
     let of = bench.send();
     let events = bench.until_end(of);

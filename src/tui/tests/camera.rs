@@ -10,7 +10,12 @@ use crossterm::event::KeyCode;
 
 fn show(desk: &mut Desk) -> Vec<crate::tui::event::Effect> {
     let generation = desk.state.generation;
-    desk.event(Event::Picture { generation, picture: plain_picture(50, 38, BLUE), range: None })
+    desk.event(Event::Picture {
+        generation,
+        picture: plain_picture(50, 38, BLUE),
+        range: None,
+        section: None,
+    })
 }
 
 #[test]
@@ -104,4 +109,31 @@ fn exposure_starts_from_the_scene_s_own() {
     let effects = desk.press(']');
     assert_eq!(request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
     assert!(desk.text().contains("0 exposure +1.5"), "{}", desk.text());
+}
+
+#[test]
+fn keys_that_are_held_come_to_an_end_and_say_so() {
+    for (key, words) in [
+        ('+', "as near as keys go"),
+        ('-', "as far as keys go"),
+        ('<', "field of view 1°"),
+        ('>', "field of view 160°"),
+        ('[', "exposure -20"),
+        (']', "exposure +20"),
+    ] {
+        let mut desk = Desk::new();
+        desk.finish(RED);
+        for _ in 0..400 {
+            desk.press(key);
+            show(&mut desk);
+        }
+        assert!(desk.text().contains(words), "{key}: {}", desk.text());
+        let generation = desk.state.generation;
+        assert!(
+            desk.press(key).is_empty() && desk.state.generation == generation,
+            "{key}: nothing is rendered"
+        );
+        let view = desk.state.viewpoint().expect("a camera");
+        assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
+    }
 }

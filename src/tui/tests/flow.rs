@@ -15,7 +15,7 @@ fn the_first_request_has_room_for_the_preview() {
     let mut state = state(80, 24);
     let effects = crate::tui::update::start(&mut state);
     let request = request(&effects).expect("a request");
-    assert_eq!(request.preview, Some(PreviewSize { width: 56, height: 42 }));
+    assert_eq!(request.preview, Some(PreviewSize { width: 56, height: 42, around: None }));
     assert_eq!((request.generation, request.write, request.force), (1, Writing::Try, false));
 }
 
@@ -26,7 +26,12 @@ fn pictures_of_older_generations_are_dropped() {
     let old = desk.state.generation;
     desk.press('r');
     desk.screen();
-    desk.event(Event::Picture { generation: old, picture: plain_picture(50, 38, BLUE), range: None });
+    desk.event(Event::Picture {
+        generation: old,
+        picture: plain_picture(50, 38, BLUE),
+        range: None,
+        section: None,
+    });
     desk.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
     desk.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
     assert!(!desk.state.dirty, "nothing is drawn for them");
@@ -45,7 +50,12 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
     assert_eq!(request(&effects).map(|it| it.generation), Some(2));
     desk.event(Event::Shown { generation: 1 });
     assert_eq!(desk.state.first_change, None, "the old picture does not count");
-    desk.event(Event::Picture { generation: 2, picture: plain_picture(50, 38, BLUE), range: None });
+    desk.event(Event::Picture {
+        generation: 2,
+        picture: plain_picture(50, 38, BLUE),
+        range: None,
+        section: None,
+    });
     desk.now += Duration::from_millis(20);
     desk.event(Event::Shown { generation: 2 });
     desk.worker(done(2, Vec::new(), false));
@@ -60,7 +70,12 @@ fn only_the_first_picture_of_a_request_does_not_wait_for_its_turn() {
     let mut desk = Desk::new();
     let picture = |desk: &mut Desk, generation| {
         desk.state.urgent = false;
-        desk.event(Event::Picture { generation, picture: plain_picture(50, 38, RED), range: None });
+        desk.event(Event::Picture {
+            generation,
+            picture: plain_picture(50, 38, RED),
+            range: None,
+            section: None,
+        });
         desk.state.urgent
     };
     assert!(picture(&mut desk, 1));
@@ -109,9 +124,14 @@ fn another_window_asks_for_another_preview_once_it_is_quiet() {
     let effects = desk.wait(50);
     assert!(matches!(
         effects[..],
-        [Effect::Send(Command::Preview(Some(PreviewSize { width: 152, height: 114 })))]
+        [Effect::Send(Command::Preview(Some(PreviewSize { width: 152, height: 114, around: None })))]
     ));
-    desk.event(Event::Picture { generation: 1, picture: plain_picture(149, 112, BLUE), range: None });
+    desk.event(Event::Picture {
+        generation: 1,
+        picture: plain_picture(149, 112, BLUE),
+        range: None,
+        section: None,
+    });
     assert!(cells_of(&mut desk, BLUE) > 0, "the same request shows its picture again");
     desk.finish(RED);
     desk.event(Event::Resize(window(200, 60)));

@@ -3,7 +3,7 @@
 use super::{BLUE, RED, cells_of};
 use crate::choice::Choice;
 use crate::math::DVec3;
-use crate::pipeline::protocol::{self, Command, Writing};
+use crate::pipeline::protocol::{self, Command, Spot, Writing};
 use crate::pipeline::settings::{Effective, Overrides, View};
 use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
@@ -118,6 +118,24 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
         Action::Focus => {
             assert!(desk.key(key).is_empty(), "a click is waited for");
             assert!(matches!(desk.key(key)[..], [Effect::Send(Command::Pick(_))]));
+        }
+        Action::CloseUp => {
+            let around = |effects: &[Effect]| match effects {
+                [Effect::Send(Command::Preview(Some(size)))] => size.around,
+                other => panic!("{other:?}"),
+            };
+            assert_eq!(around(&desk.key(key)), Some(Spot { x: 0.5, y: 0.5 }));
+            assert!(desk.text().contains("x back"), "{}", desk.text());
+            assert_eq!(around(&desk.key(key)), None);
+        }
+        Action::RectangleFirst => {
+            let first = |effects: &[Effect]| request(effects).expect("a request").first;
+            desk.press('r');
+            assert!(desk.key(key).is_empty(), "a drag is waited for");
+            let section = first(&desk.key(key)).expect("around the crosshair");
+            assert!((section.left - 1.0 / 3.0).abs() < 1e-9 && (section.height - 1.0 / 3.0).abs() < 1e-9);
+            assert!(desk.text().contains("z rectangle first"), "{}", desk.text());
+            assert_eq!(first(&desk.key(key)), None);
         }
         Action::ToggleMouse => {
             assert!(matches!(desk.key(key)[..], [Effect::Mouse(false)]));

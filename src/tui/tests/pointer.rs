@@ -1,7 +1,7 @@
 //! The mouse, what it asks for, what is said of the answers; and the editor's places.
 
 use super::{BLUE, RED};
-use crate::pipeline::protocol::{self, Command, Kept, Picked, Spot, Thing, Writing};
+use crate::pipeline::protocol::{self, Command, Kept, Picked, Section, Spot, Thing, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
@@ -87,7 +87,11 @@ fn what_was_clicked_is_said_and_led_to() {
     click(&mut desk, 12, 10);
     assert!(answer(&mut desk, Some(thing())).is_empty());
     let text = desk.text();
-    assert!(text.contains("sphere \"ball\" · cornell.toml:47 · glass crystal · 3.9 away · (0.2"), "{text}");
+    for words in ["sphere \"ball\"", "cornell.toml:47", "glass crystal", "3.9 away", "at (0.2, 0.5, -0.3)"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    // The mark is where the click was.
+    assert_eq!(desk.screen()[(12, 10)].symbol(), "┼");
     let place = |effects: &[Effect]| match effects {
         [Effect::Edit(place)] => (place.path.to_string_lossy().into_owned(), place.line, place.column),
         other => panic!("{other:?}"),
@@ -189,11 +193,106 @@ fn older_pictures_wait_for_no_newer_one_and_a_render_ends_them() {
     desk.press('n');
     assert!(desk.text().contains("picture 1 of 2, 61 s ago"), "{}", desk.text());
     let generation = desk.state.generation;
-    desk.event(Event::Picture { generation, picture: plain_picture(50, 38, [10, 200, 10]), range: None });
+    desk.event(Event::Picture {
+        generation,
+        picture: plain_picture(50, 38, [10, 200, 10]),
+        range: None,
+        section: None,
+    });
     assert!(super::cells_of(&mut desk, RED) > 0, "the older one stays");
     desk.press('N');
     assert!(super::cells_of(&mut desk, BLUE) + super::cells_of(&mut desk, [10, 200, 10]) > 0);
     desk.press('n');
     desk.press('s');
     assert!(super::cells_of(&mut desk, RED) == 0, "a render goes on from the newest");
+}
+
+#[test]
+fn what_was_clicked_is_told_in_full_in_a_small_window() {
+    for (columns, rows) in [(40, 12), (30, 8), (80, 5)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.finish(RED);
+        desk.key(crate::tui::event::KeyPress::special(crossterm::event::KeyCode::Enter));
+        answer(&mut desk, Some(thing()));
+        let text = desk.text().replace('\n', " ");
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        for words in ["cornell.toml:47", "glass", "3.9 away", "L (0.5, 0.5, 0.5)", "n (0, 1, 0)"] {
+            assert!(words.split(' ').all(|word| text.contains(word)), "{words}: {}", desk.text());
+        }
+        desk.press('y');
+        desk.press('?');
+        desk.press('?');
+        assert!(!desk.text().contains("crystal"), "until the next key: {}", desk.text());
+    }
+}
+
+#[test]
+fn a_drag_after_z_marks_what_is_rendered_first() {
+    let mut desk = desk();
+    desk.press('r');
+    desk.press('z');
+    assert!(desk.text().contains("drag a rectangle"), "{}", desk.text());
+    mouse(&mut desk, MouseKind::Press, 10, 5);
+    assert!(mouse(&mut desk, MouseKind::Drag, 30, 12).is_empty(), "the camera stays");
+    assert_eq!(desk.screen()[(10, 5)].symbol(), "┌");
+    assert_eq!(desk.screen()[(30, 12)].symbol(), "┘");
+    let effects = mouse(&mut desk, MouseKind::Release, 30, 12);
+    let marked = request(&effects).expect("a request");
+    let section = marked.first.expect("a rectangle");
+    assert!((section.left - 10.5 / 55.0).abs() < 1e-9 && (section.width - 20.0 / 55.0).abs() < 1e-9);
+    assert!(!marked.overrides.camera.is_any());
+    // Each render has it, until z again.
+    assert_eq!(request(&desk.press('s')).expect("a request").first, Some(section));
+    assert_eq!(request(&desk.press('z')).expect("a request").first, None);
+    desk.finish(BLUE);
+    desk.press('z');
+    mouse(&mut desk, MouseKind::Press, 30, 12);
+    assert!(mouse(&mut desk, MouseKind::Release, 30, 12).is_empty(), "nothing is rendering");
+    assert!(desk.text().contains("from the next render on"), "{}", desk.text());
+    assert!(request(&desk.press('r')).expect("a request").first.is_some());
+}
+
+#[test]
+fn a_close_up_is_drawn_pixel_by_pixel_and_clicks_know_where_they_are() {
+    let mut desk = desk();
+    let spot = asked(&click(&mut desk, 12, 10));
+    desk.press('x');
+    let around = desk.state.requested.expect("a size").around;
+    assert_eq!(around, Some(spot));
+    // 20 × 10 pixels of the picture, fewer than there is room for.
+    let section = Some(Section { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
+    let generation = desk.state.generation;
+    let picture = plain_picture(20, 10, BLUE);
+    desk.event(Event::Picture { generation, picture, range: None, section });
+    assert_eq!(super::cells_of(&mut desk, BLUE), 20 * 5, "{}", desk.text());
+    assert!(desk.text().contains("cornell.toml  1:1"), "{}", desk.text());
+    // The area has 56 × 21 cells from (0, 1) on: the picture begins at (18, 9).
+    let spot = asked(&click(&mut desk, 18, 9));
+    assert!((spot.x - (0.2 + 0.1 * 0.5 / 20.0)).abs() < 1e-9, "{spot:?}");
+    assert!((spot.y - (0.4 + 0.2 * 0.5 / 5.0)).abs() < 1e-9, "{spot:?}");
+}
+
+#[test]
+fn an_older_picture_is_said_to_be_older_in_the_first_line() {
+    let mut desk = desk();
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.finish(BLUE);
+    desk.press('b');
+    let first = |desk: &mut Desk| desk.text().lines().next().map(str::to_owned).unwrap_or_default();
+    assert!(first(&mut desk).contains("◂ older") && first(&mut desk).contains("picture 1 of 2"));
+    desk.press('b');
+    assert!(first(&mut desk).contains("✓ done"));
+}
+
+#[test]
+fn before_and_after_a_camera_that_was_kept_differ() {
+    let mut desk = desk();
+    desk.press('l');
+    desk.finish(BLUE);
+    desk.press('c');
+    kept(&mut desk, true, true);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.finish(BLUE);
+    desk.press('b');
+    assert!(super::cells_of(&mut desk, RED) > 0, "the camera from before: {}", desk.text());
 }

@@ -38,7 +38,7 @@ fn upper_and_lower_pixels_are_foreground_and_background() {
             *pixel = BLUE;
         }
     }
-    desk.event(Event::Picture { generation, picture: picture.into(), range: None });
+    desk.event(Event::Picture { generation, picture: picture.into(), range: None, section: None });
     let screen = desk.screen();
     for place in [(0, 1), (55, 21), (17, 9)] {
         assert_eq!((screen[place].fg, screen[place].bg), (Color::Rgb(200, 20, 10), Color::Rgb(10, 20, 200)));
@@ -68,7 +68,7 @@ fn what_a_picture_is_stretched_to_stands_beside_its_view() {
         (None, "view depth  "),
     ] {
         let generation = desk.state.generation;
-        desk.event(Event::Picture { generation, picture: plain_picture(51, 40, RED), range });
+        desk.event(Event::Picture { generation, picture: plain_picture(51, 40, RED), range, section: None });
         assert!(desk.text().contains(words), "{words}: {}", desk.text());
     }
 }
@@ -78,7 +78,7 @@ fn a_picture_that_lies_about_its_size_is_not_shown() {
     let mut desk = Desk::new();
     let mut picture = (*plain_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
-    desk.event(Event::Picture { generation: 1, picture: picture.into(), range: None });
+    desk.event(Event::Picture { generation: 1, picture: picture.into(), range: None, section: None });
     assert!(desk.state.picture.is_none());
 }
 
@@ -143,7 +143,7 @@ fn the_render_bar_tells_percent_samples_and_what_is_to_go() {
     desk.worker(protocol::Event::Progress { generation: 1, progress: progress(1.0, Some(0.0)) });
     desk.worker(done(1, Vec::new(), false));
     let text = desk.text();
-    assert!(text.contains("1.93 s · render 1\n") && !text.contains(['━', '─']), "{text}");
+    assert!(text.contains("1.93 s · run 1\n") && !text.contains(['━', '─']), "{text}");
 }
 
 #[test]
@@ -190,21 +190,21 @@ fn a_stage_that_failed_does_not_look_at_work() {
     assert!(desk.text().contains("> parse"));
     let failure = Failure::Scene(vec![diagnostic(Severity::Error, "wrong")]);
     desk.worker(protocol::Event::Failed { generation: 1, failure });
-    assert!(desk.text().contains("✗ parse") && !desk.text().contains("> parse"), "{}", desk.text());
+    assert!(!desk.text().contains("parse"), "the stages of a broken scene tell nothing: {}", desk.text());
 }
 
 #[test]
 fn renders_are_counted_and_requests_that_change_nothing_are_not() {
     let mut desk = Desk::new();
     desk.finish(RED);
-    assert!(desk.text().contains("· render 1"), "{}", desk.text());
+    assert!(desk.text().contains("· run 1"), "{}", desk.text());
     desk.press('0');
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     desk.worker(done(2, Vec::new(), true));
-    assert!(desk.text().contains("unchanged · render 1"), "{}", desk.text());
+    assert!(desk.text().contains("unchanged · run 1"), "{}", desk.text());
     desk.press('r');
     desk.worker(done(3, Vec::new(), false));
-    assert!(desk.text().contains("· render 2"), "{}", desk.text());
+    assert!(desk.text().contains("· run 2"), "{}", desk.text());
 }
 
 #[test]
@@ -364,7 +364,7 @@ proptest! {
                 3 => { desk.worker(protocol::Event::Progress { generation, progress: progress(0.3, Some(9.0)) }); }
                 4 => {
                     let picture = plain_picture(picture.0, picture.1, BLUE);
-                    desk.event(Event::Picture { generation, picture, range: None });
+                    desk.event(Event::Picture { generation, picture, range: None, section: None });
                 }
                 5 => { desk.event(Event::Resize(window(rows, columns.min(80)))); }
                 6 => { desk.wait(300); }
@@ -397,4 +397,42 @@ fn warnings_are_there_while_the_picture_is_rendered() {
     assert!(!desk.text().contains("not used"), "the scene has none any more: {}", desk.text());
     desk.press('e');
     assert!(desk.text().contains("no errors and no warnings"), "{}", desk.text());
+}
+
+#[test]
+fn a_picture_that_could_not_be_written_is_not_called_done() {
+    let mut desk = Desk::new();
+    let generation = desk.state.generation;
+    desk.worker(protocol::Event::WriteFailed {
+        generation,
+        message: "cannot write a.png: disk full".to_owned(),
+    });
+    desk.worker(done(generation, Vec::new(), false));
+    let first = |desk: &mut Desk| desk.text().lines().next().map(str::to_owned).unwrap_or_default();
+    assert!(first(&mut desk).contains("! unwritten") && !desk.text().contains("✓ done"), "{}", desk.text());
+    desk.press('y');
+    assert!(desk.text().contains("not written"), "{}", desk.text());
+    desk.worker(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 });
+    assert!(first(&mut desk).contains("✓ done"), "{}", desk.text());
+}
+
+#[test]
+fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    assert!(desk.text().contains("0.81 % in all") && !desk.text().contains("a tile"), "{}", desk.text());
+    for (samples, words) in [(64, "0.5 % a tile "), (256, "0.5 % a tile ✓")] {
+        desk.state.effective.as_mut().expect("settings").error = 0.005;
+        desk.state.effective.as_mut().expect("settings").samples = samples;
+        assert!(desk.text().contains(words), "{words}: {}", desk.text());
+    }
+}
+
+#[test]
+fn the_folder_stands_before_the_name() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    assert!(desk.text().contains("scenes/cornell.toml  640×480"), "{}", desk.text());
+    desk.event(Event::Resize(window(40, 12)));
+    assert!(!desk.text().contains("scenes"), "{}", desk.text());
 }

@@ -19,6 +19,8 @@ const NEARER: f64 = 0.95;
 const WIDER: f64 = 1.05;
 /// Stops of a step of exposure.
 const STOPS: f32 = 0.25;
+/// The most that keys expose, and darken.
+const MOST_STOPS: f32 = 20.0;
 
 /// So many steps to the right and up.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
@@ -32,20 +34,34 @@ pub(super) fn turn(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
 
 /// So many steps nearer.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
-    moved(state, |pose| dollied(pose, libm::pow(NEARER, steps)))
+    let Some((view, own)) = state.viewpoint().zip(state.camera) else { return unknown(state) };
+    let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
+    if pose == view.pose {
+        let (end, part) = if steps > 0.0 { ("near", "a thousandth of") } else { ("far", "1000 times") };
+        return told(state, &format!("this is as {end} as keys go: {part} the scene's own distance"));
+    }
+    moved(state, |_| pose)
 }
 
 /// So many steps wider.
 pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some(view) = state.viewpoint() else { return unknown(state) };
-    state.toggles.camera.fov = Some(zoomed(&view, libm::pow(WIDER, steps)));
+    let fov = zoomed(&view, libm::pow(WIDER, steps));
+    if fov == view.fov {
+        return told(state, &format!("field of view {fov}°: keys go from 1° to 160°"));
+    }
+    state.toggles.camera.fov = Some(fov);
     step_of_camera(state)
 }
 
 /// So many steps brighter.
 pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
     let Some(effective) = &state.effective else { return unknown(state) };
-    let stops = state.toggles.exposure.unwrap_or(effective.exposure) + steps * STOPS;
+    let before = state.toggles.exposure.unwrap_or(effective.exposure);
+    let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
+    if stops == before {
+        return told(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
+    }
     state.toggles.exposure = Some(stops);
     let effects = step(state);
     say(state, format!("exposure {stops:+}"));
@@ -91,6 +107,9 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         (false, _) => format!("{name} has this camera already"),
     };
     let mut effects = Vec::new();
+    if let Some(since) = state.moved_since.filter(|_| is_new) {
+        state.history.kept_camera(since);
+    }
     if is_own && state.toggles.camera.is_any() {
         state.toggles.camera = CameraChange::default();
         effects = render(state, false);

@@ -1,6 +1,6 @@
 //! What a key does to the state.
 
-use super::{camera, history, overlay, places, pointer, render, resized_preview, say};
+use super::{camera, history, overlay, places, pointer, rectangle, render, resized_preview, say};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
@@ -16,8 +16,9 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
         return effects;
     }
     let Some(action) = keymap::action(key) else { return Vec::new() };
-    state.dirty |= state.message.take().is_some();
+    state.dirty |= state.message.take().is_some() | state.inspected.take().is_some();
     state.is_focusing &= action == Action::Focus;
+    state.is_marking &= action == Action::RectangleFirst;
     act(state, action)
 }
 
@@ -45,6 +46,8 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::KeepCamera => camera::keep(state),
         Action::Inspect => pointer::inspect(state),
         Action::Focus => pointer::focus(state),
+        Action::CloseUp => close_up(state),
+        Action::RectangleFirst => rectangle::press(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
         Action::Edit => vec![Effect::Edit(places::to_edit(state))],
         Action::BeforeAfter => history::before_and_after(state),
@@ -150,6 +153,21 @@ fn picture_alone(state: &mut State) -> Vec<Effect> {
         | PreviewKind::Pixels(_) => {}
     }
     state.is_alone = !state.is_alone;
+    state.dirty = true;
+    resized_preview(state)
+}
+
+/// The picture's own pixels around the crosshair, or all of it again.
+fn close_up(state: &mut State) -> Vec<Effect> {
+    if state.requested.is_none() {
+        return told(state, "no picture is shown: see --preview");
+    }
+    history::close(state, "");
+    state.close_up = if state.close_up.is_some() { None } else { Some(state.crosshair) };
+    match state.close_up {
+        Some(_) => say(state, "1:1: the picture's own pixels around the crosshair; x is back"),
+        None => state.message = None,
+    }
     state.dirty = true;
     resized_preview(state)
 }

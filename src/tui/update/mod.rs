@@ -7,6 +7,7 @@ mod keys;
 mod overlay;
 mod places;
 mod pointer;
+mod rectangle;
 mod worker;
 
 use std::time::{Duration, Instant};
@@ -55,19 +56,22 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
-        Event::Picture { generation, picture, range } => show(state, Shown { generation, picture, range }),
+        Event::Picture { generation, picture, range, section } => {
+            show(state, Shown { generation, picture, range, section })
+        }
         Event::Changed(Changed { noticed }) => {
             // It may be glimt's own save: what was said of that stays.
             const OWN: Duration = Duration::from_secs(1);
-            if state.kept.take().is_none_or(|kept| state.now > kept + OWN) {
-                state.message = None;
-            }
+            let is_own = state.kept.take().is_some_and(|kept| state.now <= kept + OWN);
             state.is_settled = false;
             history::record(state);
-            state.history.edited();
+            if !is_own {
+                (state.message, state.inspected) = (None, None);
+                state.history.edited();
+            }
             state.edits += 1;
             let effects = render(state, false);
-            state.edit = Some(state.generation);
+            state.edit = (!is_own).then_some(state.generation);
             state.change = Some(PendingChange { generation: state.generation, noticed });
             effects
         }
@@ -98,6 +102,8 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
     }
     state.picture = state.history.close().or_else(|| state.picture.take());
     state.generation += 1;
+    let is_moved = state.toggles.camera.is_any();
+    state.moved_since = is_moved.then_some(state.moved_since.unwrap_or(state.generation));
     state.requested = Layout::preview_size(state);
     state.resize_due = None;
     state.nudge = Nudge::default();
@@ -111,6 +117,7 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
         preview: state.requested,
         write: if state.is_written() { Writing::Try } else { Writing::No },
         force,
+        first: state.first,
     };
     let mut effects = Vec::new();
     if state.paused {
@@ -205,6 +212,6 @@ fn lost(state: &mut State, source: Source) -> Vec<Effect> {
 }
 
 fn say(state: &mut State, message: impl Into<String>) {
-    state.message = Some(message.into());
+    (state.message, state.inspected) = (Some(message.into()), None);
     state.dirty = true;
 }

@@ -8,7 +8,6 @@ use crate::pipeline::settings::View;
 use crate::tui::event::{Effect, KeyPress};
 use crate::tui::keymap::{self, Overlay};
 use crate::tui::state::State;
-use crate::tui::view::views::PAGE;
 use crate::tui::view::{diagnostics, help};
 
 /// None: nothing is open that the key means something to.
@@ -31,13 +30,11 @@ pub(super) fn act(state: &mut State, action: Overlay) -> bool {
     }
 }
 
-/// The view of a digit, counted among those near the current one.
+/// The view of a digit, while the list of them is open.
 fn chosen(state: &State, key: KeyPress) -> Option<View> {
     let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
     state.views.filter(|_| key.modifiers.is_empty())?;
-    let current = View::ALL.iter().position(|view| *view == state.view())?;
-    let number = digit.to_digit(10)? as usize - 1;
-    View::ALL.get(current / PAGE * PAGE + number).copied()
+    View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
 /// What was opened over all else.

@@ -1,7 +1,7 @@
 //! The mouse on the picture, and what is asked of a place there.
 
 use super::keys::told;
-use super::{camera, overlay, say};
+use super::{camera, overlay, rectangle, say};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
 use crate::scene::sanitize::visible;
@@ -21,10 +21,15 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
         MouseKind::Press => {
             let is_on_picture = Layout::of(state).preview.contains((mouse.column, mouse.row).into());
             let Mouse { column, row, .. } = mouse;
-            state.press = is_on_picture.then_some(Press { column, row, has_moved: false });
+            let from = spot_at(state, column, row);
+            state.press = is_on_picture.then_some(Press { column, row, has_moved: false, from });
             Vec::new()
         }
         MouseKind::Drag => drag(state, mouse),
+        MouseKind::Release if state.is_marking && state.press.take().is_some() => {
+            let spot = spot_at(state, mouse.column, mouse.row);
+            rectangle::release(state, spot)
+        }
         MouseKind::Release => match state.press.take() {
             Some(press) if !press.has_moved => click(state, mouse),
             Some(_) | None => Vec::new(),
@@ -47,12 +52,18 @@ fn is_on_pane(state: &State, mouse: Mouse) -> bool {
 /// The scene turns with the hand.
 fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     let Some(press) = state.press else { return Vec::new() };
+    if state.is_marking {
+        if let Some((from, to)) = press.from.zip(spot_at(state, mouse.column, mouse.row)) {
+            rectangle::drag(state, from, to);
+        }
+        return Vec::new();
+    }
     let cells = |now: u16, before: u16| f64::from(now) - f64::from(before);
     let (right, down) = (cells(mouse.column, press.column), cells(mouse.row, press.row));
     if right == 0.0 && down == 0.0 {
         return Vec::new();
     }
-    state.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true });
+    state.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true, ..press });
     let degrees = TURN_ACROSS / f64::from(Layout::of(state).preview.width.max(1));
     camera::turn(state, -right * degrees, down * f64::from(state.window.cell_aspect) * degrees)
 }
@@ -92,7 +103,7 @@ fn ask(state: &mut State, purpose: Purpose) -> Vec<Effect> {
 
 pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
     state.is_mouse_on = !state.is_mouse_on;
-    (state.press, state.is_focusing) = (None, false);
+    (state.press, state.is_focusing, state.is_marking) = (None, false, false);
     let words = if state.is_mouse_on {
         "mouse on: drag turns, the wheel goes nearer, a click says what is there"
     } else {
@@ -111,7 +122,9 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
     });
     match (state.asked, &picked.thing) {
         (Purpose::Inspect, _) => {
-            say(state, words(picked));
+            state.message = None;
+            state.inspected = Some(facts(picked));
+            state.dirty = true;
             Vec::new()
         }
         (Purpose::Focus, None) => told(state, "there is nothing to focus on"),
@@ -133,23 +146,26 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     effects
 }
 
-/// Shape, name, line, material, distance, place, colour, normal: what a narrow window cuts comes last.
-fn words(Picked { thing, color, pixel: [x, y] }: &Picked) -> String {
-    let light = color.map(|color| format!(" · L {}", numbers(color.map(f64::from))));
-    let light = light.unwrap_or_default();
-    let Some(thing) = thing else { return format!("nothing at pixel {x}, {y}{light}") };
+/// Shape and name, line, material, distance, place, colour, normal.
+fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
+    let light = color.map(|color| format!("L {}", numbers(color.map(f64::from))));
+    let Some(thing) = thing else {
+        return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
+    };
     let Thing { shape, name, path, line, material, position, normal, is_front, distance, .. } = thing;
     let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", visible(name)));
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
-    format!(
-        "{shape}{name} · {}:{line} · {} · {} away · {}{light} · n {}{back}",
-        visible(&file),
-        visible(material),
-        number(*distance),
-        numbers(*position),
-        numbers(normal.map(f64::from)),
-    )
+    let mut facts = vec![
+        format!("{shape}{name}"),
+        format!("{}:{line}", visible(&file)),
+        visible(material).into_owned(),
+        format!("{} away", number(*distance)),
+        format!("at {}", numbers(*position)),
+    ];
+    facts.extend(light);
+    facts.push(format!("n {}{back}", numbers(normal.map(f64::from))));
+    facts
 }
 
 fn numbers(all: [f64; 3]) -> String {
@@ -167,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_there_is_said_in_a_line() {
+    fn what_is_there_is_said_in_a_few_words_each() {
         let thing = Thing {
             shape: "sphere",
             name: Some("ball".to_owned()),
@@ -182,10 +198,17 @@ mod tests {
         };
         let picked = Picked { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
         assert_eq!(
-            words(&picked),
-            "sphere \"ball\" · still.toml:47 · glass crystal · 3.82 away · (0.214, 0.5, -33.1) · L (0.61, 1235, 0) · \
-             n (0, 1, 0)"
+            facts(&picked),
+            [
+                "sphere \"ball\"",
+                "still.toml:47",
+                "glass crystal",
+                "3.82 away",
+                "at (0.214, 0.5, -33.1)",
+                "L (0.61, 1235, 0)",
+                "n (0, 1, 0)"
+            ]
         );
-        assert_eq!(words(&Picked { thing: None, color: None, ..picked }), "nothing at pixel 3, 4");
+        assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
     }
 }

@@ -40,7 +40,10 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Preview { .. } | Event::Files { .. } | Event::CameraKept { .. } | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation } => wrote(state, Written { path, bytes, generation }),
         Event::WriteFailed { message, .. } => {
-            state.asked_to_write = false;
+            let is_by_hand = std::mem::take(&mut state.asked_to_write);
+            if !is_by_hand {
+                state.unwritten = Some("not written".to_owned());
+            }
             say(state, format!("error: {}", visible(&message)));
         }
         Event::Refused { conflicts, .. } => refused(state, conflicts),
@@ -89,6 +92,7 @@ fn started(state: &mut State) {
     state.assets.clear();
     state.progress = None;
     state.report = None;
+    state.unwritten = None;
     state.unchanged = false;
 }
 
@@ -113,6 +117,7 @@ fn wrote(state: &mut State, written: Written) {
     if std::mem::take(&mut state.asked_to_write) {
         say(state, format!("wrote {}", visible(&written.path.to_string_lossy())));
     }
+    state.unwritten = None;
     state.written.retain(|other| other.path != written.path);
     state.written.push(written);
 }
@@ -120,6 +125,7 @@ fn wrote(state: &mut State, written: Written) {
 /// What is new is shown at once; what a person has seen and closed stays closed.
 fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.asked_to_write = false;
+    state.unwritten = Some("not written: e says why".to_owned());
     say(state, "nothing is written (e shows why)");
     if !conflicts.iter().all(|conflict| state.warnings.contains(conflict)) {
         state.pane = Pane { open: true, scroll: 0 };

@@ -8,7 +8,7 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::stages::Line;
-use super::text::{Tone, counted, put, put_right, row};
+use super::text::{Tone, counted, put, put_right, row, wrapped};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::{self, Role};
 use crate::scene::sanitize::visible;
@@ -77,7 +77,7 @@ fn text(state: &State, area: Rect) -> Vec<Line> {
     let Some(problems) = &state.problems else { return reported(&state.warnings, width) };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
-        text.extend(wrapped(&format!("error: {}", visible(work)), width, Tone::Error));
+        text.extend(toned(&format!("error: {}", visible(work)), width, Tone::Error));
     }
     text.extend(reported(&problems.diagnostics, width));
     text
@@ -128,7 +128,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<Line> {
     let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();
     if !places.is_empty() {
         let text = format!("  = also in {}: {}", counted(places.len(), "place"), places.join(", "));
-        lines.extend(wrapped(&text, width, Tone::Plain));
+        lines.extend(toned(&text, width, Tone::Plain));
     }
     lines.push(Line::new());
     lines
@@ -141,25 +141,6 @@ fn place(one: &Diagnostic) -> Option<String> {
     Some(format!("{line}:{column}"))
 }
 
-/// Broken between words where that is possible.
-fn wrapped(text: &str, width: usize, tone: Tone) -> Vec<Line> {
-    let width = width.max(1);
-    let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
-    for word in text.split_inclusive(' ') {
-        let of_word = word.trim_end().chars().count();
-        if length > 0 && length + of_word > width {
-            lines.push(std::mem::take(&mut line));
-            length = 0;
-        }
-        for character in word.chars() {
-            if length >= width && character != ' ' {
-                lines.push(std::mem::take(&mut line));
-                length = 0;
-            }
-            line.push(character);
-            length += 1;
-        }
-    }
-    lines.push(line);
-    lines.into_iter().map(|line| vec![(line.trim_end().to_owned(), tone)]).collect()
+fn toned(text: &str, width: usize, tone: Tone) -> Vec<Line> {
+    wrapped(text, width).into_iter().map(|line| vec![(line, tone)]).collect()
 }

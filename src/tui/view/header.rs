@@ -6,19 +6,20 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::layout::Layout;
+use super::message;
 use super::text::{Tone, columns, counted, number, percent, put, put_right, rest, running, seconds};
-use super::under;
 use crate::choice::Choice;
 use crate::pipeline::protocol::Status;
 use crate::pipeline::settings::View;
 use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
+use crate::tui::history::ago;
 use crate::tui::keymap;
 use crate::tui::state::{Activity, State};
 
 /// The block of the state has this many columns, so that the name beside it stands still.
-const BLOCK: usize = 13;
+pub(super) const BLOCK: usize = 13;
 /// From this width on there is room for that.
 const WIDE: u16 = 60;
 /// A name of fewer columns says nothing.
@@ -29,10 +30,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let used = block(state, area, buffer);
     let mut room = rest(area, used + 1);
     // Where there is no other line for a message it takes all of this one.
-    if layout.keys.is_empty()
-        && let Some((message, tone)) = under::message(state)
-    {
-        put(buffer, room, &[(&message, tone)], state.depth);
+    if layout.keys.is_empty() && message::is_said(state, layout) {
         return;
     }
     if state.is_alone {
@@ -66,8 +64,10 @@ fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 /// A sign, a word and a colour, each of which tells it.
 pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
     match state.activity {
+        _ if state.history.is_open() => ("◂", "older", Tone::Warning),
         _ if state.paused => ("‖", "paused", Tone::Warning),
         Activity::Running { .. } => ("●", "rendering", Tone::Working),
+        Activity::Done if state.unwritten.is_some() => ("!", "unwritten", Tone::Error),
         Activity::Done => ("✓", "done", Tone::Good),
         Activity::Waiting => ("…", "waiting", Tone::Warning),
         Activity::Broken => ("✗", "broken", Tone::Error),
@@ -75,18 +75,21 @@ pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
     }
 }
 
-/// The file's name, the view, the picture's size, the file's folder.
+/// The file with its folder, the view, the picture's size.
 fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     let path = state.scene.to_string_lossy();
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (visible(folder), visible(file));
     let size = state.effective.as_ref().map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
-    let folder = if folder.is_empty() { String::new() } else { format!("  {folder}") };
-    let view = view(state);
+    let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
+    let view = close_up(state) + &view(state);
     let view = (&*view, Tone::Strong);
-    let mut pieces = vec![(&*file, Tone::Strong), view, (&*size, Tone::Faint), (&*folder, Tone::Faint)];
+    let mut pieces = vec![(&*folder, Tone::Faint), (&*file, Tone::Strong), view, (&*size, Tone::Faint)];
     // What does not fit is left out before the name is cut.
     let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| columns(text)).sum::<u16>();
+    if width(&pieces) > area.width {
+        pieces.remove(0);
+    }
     while pieces.len() > 1 && width(&pieces) > area.width {
         pieces.pop();
     }
@@ -105,8 +108,17 @@ fn view(state: &State) -> String {
     format!("  view {}{range}", state.view().name())
 }
 
+/// Whether the picture is shown pixel by pixel.
+fn close_up(state: &State) -> String {
+    let is_close = state.picture.as_ref().is_some_and(|shown| shown.section.is_some());
+    if is_close { "  1:1".to_owned() } else { String::new() }
+}
+
 /// How far it is, or what came of it.
 fn figures(state: &State) -> String {
+    if let Some((number, count, time)) = state.history.place() {
+        return format!("picture {number} of {count}, {}", ago(state.now.saturating_duration_since(time)));
+    }
     match (state.activity, &state.report, &state.progress) {
         (Activity::Running { .. }, _, Some(progress)) => {
             let done = format!("{} %", percent(progress.fraction));
@@ -120,9 +132,9 @@ fn figures(state: &State) -> String {
         (Activity::Running { .. }, _, None) => {
             at_work(state).map_or(String::new(), |name| format!("{name}…"))
         }
-        (Activity::Done, _, _) if state.unchanged => format!("unchanged · render {}", state.renders),
+        (Activity::Done, _, _) if state.unchanged => format!("unchanged · run {}", state.renders),
         (Activity::Done, Some(report), _) => {
-            format!("{} · render {}", seconds(report.seconds), state.renders)
+            format!("{} · run {}", seconds(report.seconds), state.renders)
         }
         (Activity::Waiting, _, _) => "for the file to be whole".to_owned(),
         (Activity::Broken, _, _) => errors(state),

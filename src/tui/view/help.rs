@@ -4,7 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::{Block, BorderType, Clear, Widget};
 
-use super::text::{Tone, columns, put, row};
+use super::text::{Tone, columns, put, row, wrapped};
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 use crate::tui::state::State;
 
@@ -14,6 +14,7 @@ const NOTES: &[(&str, &str)] = &[
     ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
     ("bold", "what the last edit or a key has changed"),
     ("render 1 s −.3", "the time of a stage, and against the last time"),
+    ("run 3", "renders that were finished so far"),
 ];
 
 /// In the middle of the screen.
@@ -22,10 +23,10 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let inner = inner(area);
     let (page, last) = extent(state);
     let first = state.help.scroll.min(last);
-    let entries: Vec<_> = entries().collect();
+    let lines = lines(inner.width);
     let mut title = " keys ".to_owned();
     if last > 0 {
-        title = format!(" keys {}–{} of {} · j k ", first + 1, first + page, entries.len());
+        title = format!(" keys {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
     if inner != area {
@@ -34,20 +35,42 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         let block = Block::bordered().border_type(BorderType::Rounded).border_style(border);
         block.title_style(title_style).title(title).render(area, buffer);
     }
-    let labels = widest(|(label, _)| label).min(inner.width / 3);
-    for (index, (label, help)) in (0..inner.height).zip(entries.iter().skip(first)) {
+    let labels = labels(inner.width);
+    for (index, (label, help)) in (0..inner.height).zip(lines.iter().skip(first)) {
         let line = row(inner, index);
-        let used = labels + 3;
         let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
         put(buffer, place, &[(label, Tone::Strong)], state.depth);
-        put(buffer, super::text::rest(line, used), &[(help, Tone::Plain)], state.depth);
+        put(buffer, super::text::rest(line, labels + BESIDE), &[(help, Tone::Plain)], state.depth);
     }
+}
+
+/// Columns beside the labels and what is said of them.
+const BESIDE: u16 = 3;
+
+/// Columns of the labels where there are so many in all.
+fn labels(width: u16) -> u16 {
+    const LEAST: u16 = 9;
+    widest(|(label, _)| label).min(LEAST.max(width / 3))
+}
+
+/// The entries, each in as many lines as it needs.
+fn lines(width: u16) -> Vec<(String, String)> {
+    let labels = labels(width);
+    let both = |(label, help)| {
+        let label = wrapped(label, usize::from(labels));
+        let help = wrapped(help, usize::from(width.saturating_sub(labels + BESIDE)));
+        let line = |of: &[String], index: usize| of.get(index).cloned().unwrap_or_default();
+        let count = label.len().max(help.len());
+        (0..count).map(|index| (line(&label, index), line(&help, index))).collect::<Vec<_>>()
+    };
+    entries().flat_map(both).collect()
 }
 
 /// Lines on a page of the help, and the furthest line that it can be scrolled to.
 pub(in crate::tui) fn extent(state: &State) -> (usize, usize) {
-    let page = usize::from(inner(area(state)).height).max(1);
-    (page, entries().count().saturating_sub(page))
+    let inner = inner(area(state));
+    let page = usize::from(inner.height).max(1);
+    (page, lines(inner.width).len().saturating_sub(page))
 }
 
 fn entries() -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -64,8 +87,10 @@ fn area(state: &State) -> Rect {
     let window = Rect::new(0, 0, state.window.columns, state.window.rows);
     // The line of keys tells how to scroll and to close.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
-    let lines = u16::try_from(entries().count()).unwrap_or(u16::MAX);
-    centred(above, widest(|(label, _)| label) + widest(|(_, help)| help) + 6, lines.saturating_add(2))
+    let width = widest(|(label, _)| label) + widest(|(_, help)| help) + BESIDE + 3;
+    let wide = centred(above, width, above.height);
+    let height = u16::try_from(lines(inner(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);
+    centred(above, width, height)
 }
 
 fn inner(area: Rect) -> Rect {

@@ -5,8 +5,8 @@ use ratatui::layout::Rect;
 
 use super::header::activity;
 use super::layout::Layout;
+use super::message;
 use super::text::{Tone, columns, put, rest};
-use super::under;
 use crate::choice::Choice;
 use crate::scene::description::Integrator;
 use crate::scene::report::summary;
@@ -48,10 +48,7 @@ const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.keys;
-    if layout.under.is_empty()
-        && let Some((message, tone)) = under::message(state)
-    {
-        put(buffer, area, &[(&message, tone)], state.depth);
+    if layout.under.is_empty() && message::is_said(state, layout) {
         return;
     }
     let ways = [Hint::of(Action::Quit), Hint::of(Action::ToggleHelp)];
@@ -148,6 +145,13 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     }
     if state.toggles.camera.is_any() {
         urgent.extend(named(Action::KeepCamera, "keep"));
+    }
+    if state.close_up.is_some() {
+        urgent.extend(named(Action::CloseUp, "back"));
+    }
+    if state.first.is_some() {
+        let first = named(Action::RectangleFirst, "rectangle first");
+        urgent.extend(first.map(|hint| Hint { tone: Tone::Strong, ..hint }));
     }
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
     let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };

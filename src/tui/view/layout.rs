@@ -54,8 +54,11 @@ impl Layout {
         let area = Self::of(state).preview;
         let across = state.pixels_across();
         let height = (f32::from(area.height) * state.window.cell_aspect * across as f32).round() as u32;
-        (area.width > 0 && height > 0)
-            .then_some(PreviewSize { width: u32::from(area.width) * across, height })
+        (area.width > 0 && height > 0).then_some(PreviewSize {
+            width: u32::from(area.width) * across,
+            height,
+            around: state.close_up,
+        })
     }
 
     /// `shape`: columns of the picture over its rows; none: no picture is shown.

@@ -5,6 +5,8 @@ mod header;
 pub(super) mod help;
 mod keys;
 pub(super) mod layout;
+mod marks;
+mod message;
 mod panel;
 pub(super) mod preview;
 pub(super) mod ramp;
@@ -26,6 +28,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     panel::draw(state, layout.panel, buffer);
     under::draw(state, &layout, buffer);
     keys::draw(state, &layout, buffer);
+    message::draw(state, &layout, buffer);
     if state.pane.open {
         diagnostics::draw(state, layout.pane, buffer);
     }

@@ -3,9 +3,10 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::layout::ENTRY_WIDTH;
+use super::layout::{ENTRY_WIDTH, Layout};
+use super::message;
 use super::stages::{self, Line};
-use super::text::{Tone, bytes, columns, gauge, percent, put, row, shortened};
+use super::text::{Tone, bytes, columns, gauge, percent, put, row, shortened, wrapped};
 use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::scene::report::summary;
@@ -41,8 +42,9 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 
 fn lines(state: &State, width: u16) -> Vec<Line> {
     let is_done = matches!(state.activity, Activity::Done);
-    let mut lines = Vec::new();
-    if !is_done {
+    let mut lines = inspected(state, width);
+    // The stages of a broken scene are of nothing that is to be seen.
+    if !is_done && !is_broken(state) {
         lines.extend(Stage::ALL.iter().map(|stage| stages::line(state, *stage, width)));
     }
     lines.extend(state.assets.iter().map(|asset| asset_line(state, asset, width)));
@@ -51,6 +53,26 @@ fn lines(state: &State, width: u16) -> Vec<Line> {
     }
     lines.extend(hint(state, width));
     lines
+}
+
+/// What was found at a place.
+fn inspected(state: &State, width: u16) -> Vec<Line> {
+    let facts = state.inspected.iter().filter(|_| message::is_in_panel(&Layout::of(state))).flatten();
+    let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
+    let mut lines: Vec<Line> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
+    if !lines.is_empty() {
+        lines.push(Line::new());
+    }
+    lines
+}
+
+/// Whether the scene as it is now cannot be read.
+fn is_broken(state: &State) -> bool {
+    let is_at_rest = match state.activity {
+        Activity::Waiting | Activity::Broken => true,
+        Activity::Running { .. } | Activity::Done | Activity::Cancelled => false,
+    };
+    is_at_rest && state.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
 
 fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
@@ -69,9 +91,10 @@ fn results(state: &State) -> Vec<Line> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
+    lines.extend(state.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
     let is_of_now = |written: &Written| state.is_written() || written.generation == state.generation;
     if !state.written.iter().any(is_of_now) && !state.is_written() {
-        lines.push(vec![("not written: w writes it".to_owned(), Tone::Faint)]);
+        lines.push(vec![("unwritten: w writes it".to_owned(), Tone::Faint)]);
     }
     for written in state.written.iter().filter(|written| is_of_now(written)) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
@@ -89,7 +112,13 @@ fn results(state: &State) -> Vec<Line> {
                 format!("{} to {}", samples.min, samples.max)
             },
         ));
-        lines.extend(report.image.error.map(|error| fact("noise", format!("{:.2} %", error * 100.0))));
+        lines.extend(report.image.error.map(|error| fact("noise", format!("{:.2} % in all", error * 100.0))));
+        lines.extend(state.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
+            // Tiles with as many samples as there may be are perhaps not there yet.
+            let is_reached = samples.max < it.samples;
+            let sign = if is_reached { " ✓" } else { "" };
+            fact("asked", format!("{} % a tile{sign}", f64::from((it.error * 1e4).round()) / 100.0))
+        }));
     }
     lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
     if !state.warnings.is_empty() {

@@ -7,6 +7,8 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 
 use super::layout::Layout;
+use super::marks;
+use super::message;
 use super::ramp::Ramp;
 use super::text::{Tone, put};
 use crate::film::Picture;
@@ -17,7 +19,7 @@ use crate::tui::color::{ColorDepth, Shades, XTERM};
 use crate::tui::graphics::Placement;
 use crate::tui::mosaic::{Grid, fit};
 use crate::tui::options::PreviewChoice;
-use crate::tui::state::{PreviewKind, State};
+use crate::tui::state::{PreviewKind, Shown, State};
 
 /// The picture of the state, or a word in its place.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
@@ -26,8 +28,9 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         Some(_) if is_in_pixels(state) => {}
         Some(shown) => {
             let kind = in_cells(state.preview, state.depth);
-            let placed = Placed::fit(&shown.picture, area, kind, state.window.cell_aspect);
+            let placed = Placed::of(state, shown, area, kind);
             placed.draw(&shown.picture, kind, Inks::of(state), buffer);
+            marks::draw(state, placed.cells, buffer);
         }
         None if state.problems.is_none() && area.height > 0 => {
             let text = "no picture yet";
@@ -42,12 +45,14 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The place of the picture that a cell shows.
 pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
-    let picture = &state.picture.as_ref()?.picture;
+    let shown = state.picture.as_ref()?;
     let area = Layout::of(state).preview;
-    let cells =
-        Placed::fit(picture, area, in_cells(state.preview, state.depth), state.window.cell_aspect).cells;
+    let cells = Placed::of(state, shown, area, in_cells(state.preview, state.depth)).cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
-    let spot = || Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
+    let spot = || {
+        let spot = Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
+        shown.section.map_or(spot, |section| section.place(spot))
+    };
     cells.contains((column, row).into()).then(spot)
 }
 
@@ -65,12 +70,13 @@ fn is_in_pixels(state: &State) -> bool {
         && !state.help.open
         && !state.pane.open
         && state.views.is_none()
+        && !message::is_over_picture(state)
 }
 
 /// Where the picture is drawn in pixels; none: it is drawn in cells.
 pub(in crate::tui) fn placement(state: &State, area: Rect) -> Option<Placement> {
     let shown = state.picture.as_ref().filter(|_| is_in_pixels(state))?;
-    let placed = Placed::fit(&shown.picture, area, state.preview, state.window.cell_aspect);
+    let placed = Placed::of(state, shown, area, state.preview);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
     (!cells.is_empty()).then_some(Placement { picture, cells, cell: state.window.cell_pixels })
 }
@@ -95,7 +101,7 @@ pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: 
     let kind = in_cells(PreviewKind::of(choice, depth), depth);
     let shades = Shades::new(depth, &XTERM);
     let inks = Inks { depth, shades: &shades, is_light: false };
-    Placed::fit(picture, area, kind, 2.0).draw(picture, kind, inks, &mut buffer);
+    Placed::fit(picture, area, kind, 2.0, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
     buffer
 }
 
@@ -113,14 +119,22 @@ struct Placed {
 }
 
 impl Placed {
+    /// Where the state's picture is drawn: as large as there is room for, or pixel by pixel.
+    fn of(state: &State, shown: &Shown, area: Rect, kind: PreviewKind) -> Self {
+        let across = kind.grid().map_or(1, Grid::columns);
+        let one_to_one = across as f32 / state.pixels_across() as f32;
+        let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
+        Self::fit(&shown.picture, area, kind, state.window.cell_aspect, most)
+    }
+
     /// The largest place in the middle of the area with the picture's aspect ratio. `cell_aspect` is the height
-    /// of a cell over its width.
-    fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32) -> Self {
+    /// of a cell over its width, `most` the most parts of a cell that a pixel is wide.
+    fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
         let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
         let room = (f32::from(area.width * across), f32::from(area.height * down));
         let size = (picture.width.max(1) as f32, picture.height.max(1) as f32 / pixel_aspect);
-        let scale = (room.0 / size.0).min(room.1 / size.1);
+        let scale = (room.0 / size.0).min(room.1 / size.1).min(most);
         let whole = |length: f32, room: f32| (length * scale).round().clamp(room.min(1.0), room) as u16;
         let (width, height) = (whole(size.0, room.0), whole(size.1, room.1));
         let (columns, rows) = (width.div_ceil(across), height.div_ceil(down));
@@ -264,7 +278,13 @@ mod tests {
     }
 
     fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> Placed {
-        Placed::fit(&picture(width, height, |_, _| [0; 3]), Rect::new(3, 1, area.0, area.1), kind, aspect)
+        Placed::fit(
+            &picture(width, height, |_, _| [0; 3]),
+            Rect::new(3, 1, area.0, area.1),
+            kind,
+            aspect,
+            f32::INFINITY,
+        )
     }
 
     #[test]
@@ -331,7 +351,7 @@ mod tests {
         let one = picture(2, 1, |_, _| [9, 8, 7]);
         let state = state(2, 3);
         let mut buffer = Buffer::empty(Rect::new(0, 0, 2, 3));
-        Placed::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0).draw(
+        Placed::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
             &one,
             PreviewKind::HalfBlock,
             Inks::of(&state),
@@ -349,7 +369,12 @@ mod tests {
             [(PreviewKind::Quadrant, "▌"), (PreviewKind::Sextant, "▌"), (PreviewKind::Octant, "▌")]
         {
             let mut buffer = Buffer::empty(Rect::new(0, 0, 4, 2));
-            Placed::fit(&sharp, buffer.area, kind, 2.0).draw(&sharp, kind, Inks::of(&state), &mut buffer);
+            Placed::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
+                &sharp,
+                kind,
+                Inks::of(&state),
+                &mut buffer,
+            );
             let cell = &buffer[(1, 1)];
             let colors = (cell.symbol(), cell.fg, cell.bg);
             assert_eq!(colors, (symbol, Color::Rgb(200, 20, 20), Color::Rgb(20, 20, 200)), "{kind:?}");

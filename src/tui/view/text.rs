@@ -123,6 +123,30 @@ pub(super) fn shortened(text: &str, room: u16) -> String {
     if room == 0 { short } else { format!("{}…", short.trim_end()) }
 }
 
+/// Broken between words where that is possible.
+pub(super) fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let width = width.max(1);
+    let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
+    for word in text.split_inclusive(' ') {
+        let of_word = word.trim_end().width();
+        if length > 0 && length + of_word > width {
+            lines.push(std::mem::take(&mut line));
+            length = 0;
+        }
+        for character in word.chars() {
+            let wide = character.width().unwrap_or(0);
+            if length + wide > width && character != ' ' {
+                lines.push(std::mem::take(&mut line));
+                length = 0;
+            }
+            line.push(character);
+            length += wide;
+        }
+    }
+    lines.push(line);
+    lines.into_iter().map(|line| line.trim_end().to_owned()).collect()
+}
+
 /// A duration in a few characters.
 pub(super) fn duration(time: Duration) -> String {
     seconds(time.as_secs_f64())

@@ -5,6 +5,7 @@ use ratatui::layout::Rect;
 
 use super::header::at_work;
 use super::layout::Layout;
+use super::message;
 use super::stages;
 use super::text::{Tone, bytes, columns, duration, gauge, put, put_right, rest, running};
 use crate::scene::sanitize::visible;
@@ -17,8 +18,7 @@ const LEAST_BAR: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
-    if let Some((message, tone)) = message(state) {
-        put(buffer, area, &[(&message, tone)], state.depth);
+    if message::is_said(state, layout) {
         return;
     }
     match state.activity {
@@ -35,13 +35,6 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         }
         Activity::Broken => {}
     }
-}
-
-/// What was said last, until the next key.
-pub(super) fn message(state: &State) -> Option<(String, Tone)> {
-    let message = state.message.as_ref()?;
-    let tone = if message.starts_with("error") { Tone::Error } else { Tone::Strong };
-    Some((visible(message).into_owned(), tone))
 }
 
 /// Of the loading asset or of the render.

@@ -12,8 +12,8 @@ use crate::tui::state::State;
 
 /// Columns of one view with its digit.
 const WIDTH: u16 = 16;
-/// Views that digits choose from at a time.
-pub(in crate::tui) const PAGE: usize = 9;
+/// Views that have a digit, always the same one.
+pub(in crate::tui) const DIGITS: usize = 9;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
@@ -35,8 +35,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 }
 
 fn line(state: &State, number: usize, current: usize, place: Rect, buffer: &mut Buffer) {
-    let is_near = number / PAGE == current / PAGE;
-    let digit = if is_near { (number % PAGE + 1).to_string() } else { " ".to_owned() };
+    let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
     let is_current = number == current;
     let sign = if is_current { "▸" } else { " " };
     let name = format!(" {:<11}", View::ALL[number].name());

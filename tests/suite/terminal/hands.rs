@@ -39,7 +39,11 @@ fn the_mouse_turns_goes_nearer_and_asks() {
     terminal.wait_for("back to the scene's own settings");
     terminal.press(&(press(20, 16) + &release(20, 16)));
     let line = SCENE.lines().position(|line| line == "[[quad]]").expect("a quad") + 1;
-    terminal.wait_for(&format!("quad · scene.toml:{line} · phong board · "));
+    let place = format!("scene.toml:{line}");
+    for words in ["quad", &place, "phong board", "away"] {
+        terminal.wait_for(words);
+    }
+    terminal.wait("the mark", |screen| screen.cell(15, 19).is_some_and(|cell| cell.contents() == "┼"));
 }
 
 #[test]
@@ -78,6 +82,8 @@ fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
     terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
     terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
     // What it wrote itself is no edit: the table of stages has what was kept.
+    // A key that does nothing more takes the message away, which stands in the place of the stages.
+    terminal.press("??");
     terminal.wait("nothing rendered anew", |screen| screen.contents().contains("reused"));
     folder.write("scene.toml", &kept.replace(RED, GREEN));
     terminal.wait_for_color("green");
@@ -169,4 +175,47 @@ fn pictures_of_before_are_looked_at_in_turns() {
     terminal.wait_for("this is the oldest picture");
     terminal.press("N");
     terminal.wait_for_color("green");
+}
+
+#[test]
+fn a_close_up_shows_the_picture_s_own_pixels() {
+    let folder = Folder::new();
+    folder.write(
+        "scene.toml",
+        &SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240"),
+    );
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let before = red(&terminal);
+    terminal.press("x");
+    terminal.wait_for("1:1");
+    // The middle of the board fills the area of the picture.
+    terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 100);
+    terminal.press("x");
+    terminal.wait("the picture as before", |screen| {
+        Colors::of(screen).red == before && !screen.contents().contains("1:1")
+    });
+}
+
+#[test]
+fn a_rectangle_is_rendered_first_and_the_picture_is_the_same() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("z");
+    terminal.wait_for("drag a rectangle");
+    terminal.press(&(press(5, 4) + &drag(12, 8) + &drag(20, 10)));
+    let corner = |column, row, symbol: &'static str| {
+        move |screen: &vt100::Screen| screen.cell(row, column).is_some_and(|cell| cell.contents() == symbol)
+    };
+    terminal.wait("a corner", corner(4, 3, "┌"));
+    terminal.wait("a corner", corner(19, 9, "┘"));
+    terminal.press(&release(20, 10));
+    terminal.wait_for("first from the next render on");
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 64"));
+    terminal.wait_for_color("green");
+    terminal.wait_for_render(2);
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
+    terminal.press("z");
+    terminal.wait_for("no part of the picture comes first any more");
 }

@@ -265,12 +265,13 @@ impl Terminal {
     /// Waits until this many renders are finished and no other is under way.
     #[track_caller]
     pub fn wait_for_render(&self, number: usize) {
-        let words = format!("· render {number}");
+        let words = format!("· run {number}");
         self.wait(&words, |screen| {
             let text = screen.contents();
             // Frames arrive in pieces, from the top: the bar below the picture is gone when all words are there.
             let is_whole = !text.contains(" samples · ");
-            let is_done = |line: &str| line.contains("✓ done") && line.trim_end().ends_with(&words);
+            let is_over = |line: &str| line.contains("✓ done") || line.contains("! unwritten");
+            let is_done = |line: &str| is_over(line) && line.trim_end().ends_with(&words);
             is_whole && text.lines().any(is_done)
         });
     }

@@ -67,6 +67,7 @@ fn a_view_is_chosen_from_the_list() {
     terminal.wait_for_render(1);
     terminal.press("v");
     terminal.wait_for("▸2 normal");
+    terminal.wait_for_render(2);
     terminal.press("6");
     terminal.wait_for("▸6 albedo");
     terminal.wait_for_render(3);

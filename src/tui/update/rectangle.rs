@@ -1,0 +1,67 @@
+//! A rectangle of the picture that is rendered before the rest.
+
+use super::keys::told;
+use super::{render, say};
+use crate::pipeline::protocol::{Section, Spot};
+use crate::tui::event::Effect;
+use crate::tui::state::State;
+
+/// Width and height of the one around a place.
+const SIDE: f64 = 1.0 / 3.0;
+
+/// The key: first it waits for a drag; asked again it takes what is around the crosshair; then there is none any more.
+pub(super) fn press(state: &mut State) -> Vec<Effect> {
+    if state.first.take().is_some() {
+        state.is_marking = false;
+        let effects = again(state);
+        say(state, "no part of the picture comes first any more");
+        return effects;
+    }
+    if state.is_mouse_on && !state.is_marking {
+        state.is_marking = true;
+        return told(
+            state,
+            "drag a rectangle: it is rendered first; z again takes what is around the crosshair",
+        );
+    }
+    take(state, around(state.crosshair))
+}
+
+/// The hand has come from one place to another.
+pub(super) fn drag(state: &mut State, from: Spot, to: Spot) {
+    state.first = Some(Section::between(from, to));
+    state.dirty = true;
+}
+
+/// The hand let go: what it marked, else what is around the place.
+pub(super) fn release(state: &mut State, spot: Option<Spot>) -> Vec<Effect> {
+    match (state.first, spot) {
+        (Some(marked), _) => take(state, marked),
+        (None, Some(spot)) => take(state, around(spot)),
+        (None, None) => Vec::new(),
+    }
+}
+
+fn around(spot: Spot) -> Section {
+    let start = |middle: f64| (middle - SIDE / 2.0).clamp(0.0, 1.0 - SIDE);
+    Section { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
+}
+
+fn take(state: &mut State, section: Section) -> Vec<Effect> {
+    state.is_marking = false;
+    state.first = Some(section);
+    let words = if state.is_running() {
+        "the rectangle is rendered first; z ends that"
+    } else {
+        "the rectangle is rendered first from the next render on; z ends that"
+    };
+    let effects = again(state);
+    say(state, words);
+    effects
+}
+
+/// The render under way, in another order: it keeps what it has.
+fn again(state: &mut State) -> Vec<Effect> {
+    state.dirty = true;
+    if state.is_running() && !state.paused { render(state, false) } else { Vec::new() }
+}
