@@ -1,13 +1,16 @@
 //! From a save or a key to the first changed cell of the picture, and how soon a render stops.
 //!
-//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [SCENE…]]` copies scenes and assets into a scratch folder, runs
+//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [camera] [SCENE…]]` copies scenes and assets into a scratch folder, runs
 //! glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints medians and maxima in
 //! milliseconds: from before the file is written, or the key pressed, until the terminal has read the first bytes
 //! that change the picture. `settled`: nothing is rendering when the file is saved; `busy`: the picture before it still is.
 //! Another build of the program may be named by `GLIMT`. `cancel`: from a newer request until the worker takes it up, whatever it was doing.
+//! `camera`: keys on the camera while the picture before is being rendered, on every bundled scene: the first changed cell, and how
+//! many pictures a second are seen while a key is held.
 
 #![allow(clippy::print_stdout)]
 
+mod camera;
 mod cancel;
 mod scenes;
 mod terminal;
@@ -30,7 +33,7 @@ const PAUSE: Duration = Duration::from_millis(300);
 
 fn main() -> Outcome<()> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|one| !one.starts_with('-')).collect();
-    let modes = ["settled", "busy", "cancel"];
+    let modes = ["settled", "busy", "cancel", "camera"];
     let all_modes = !arguments.iter().any(|one| modes.contains(&one.as_str()));
     let all_scenes = !arguments.iter().any(|one| !modes.contains(&one.as_str()));
     let is_wanted = |mode: &str| all_modes || arguments.iter().any(|one| one == mode);
@@ -49,6 +52,15 @@ fn main() -> Outcome<()> {
         println!("cancel: until the worker takes the next request up, ms, median (most)");
         for scene in &scenes {
             println!("{:<14} {}", scene.name, figures(cancel::times(&copies.scene(scene))?));
+        }
+    }
+    if is_wanted("camera") {
+        println!("camera: from a key to the first changed cell, ms, median (most)");
+        for path in copies.all()? {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            if all_scenes || arguments.contains(&name) {
+                println!("{name:<14} {}", camera::row(copies.folder(), &path)?);
+            }
         }
     }
     Ok(())

@@ -140,6 +140,15 @@ impl Copies {
         self.folder.path()
     }
 
+    /// All bundled scenes, by name.
+    pub fn all(&self) -> Outcome<Vec<PathBuf>> {
+        let entries = fs::read_dir(self.folder.path().join("scenes"))?.collect::<Result<Vec<_>, _>>()?;
+        let mut paths: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
+        paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
+        paths.sort();
+        Ok(paths)
+    }
+
     pub fn scene(&self, scene: &Scene) -> PathBuf {
         self.folder.path().join("scenes").join(scene.name).with_extension("toml")
     }

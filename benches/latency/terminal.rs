@@ -101,6 +101,22 @@ impl Terminal {
         Err(format!("the picture does not change\n{}", self.screen.screen().contents()).into())
     }
 
+    /// How often bytes enough for a picture came after a pause.
+    pub fn bursts(&mut self) -> usize {
+        const LEAST: usize = 300;
+        const GAP: Duration = Duration::from_millis(8);
+        let chunks = std::mem::take(&mut *lock(&self.chunks));
+        let mut bursts: Vec<(Instant, usize)> = Vec::new();
+        for (time, bytes) in &chunks {
+            self.screen.process(bytes);
+            match bursts.last_mut() {
+                Some((last, size)) if *time < *last + GAP => (*last, *size) = (*time, *size + bytes.len()),
+                Some(_) | None => bursts.push((*time, bytes.len())),
+            }
+        }
+        bursts.iter().filter(|(_, size)| *size >= LEAST).count()
+    }
+
     fn catch_up(&mut self) {
         for (_, bytes) in std::mem::take(&mut *lock(&self.chunks)) {
             self.screen.process(&bytes);

@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use glimt::film::Picture;
 use glimt::math::Vec3;
 use glimt::math::color::srgb8_to_linear;
-use glimt::tui::{ColorDepth, PreviewChoice, filled, shown};
+use glimt::tui::{ColorDepth, PreviewChoice, filled, in_xterm, shown};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -194,7 +194,11 @@ impl Plane {
             let place = y % CELL.1 / (CELL.1 / 12) * 2 + x % CELL.0 / (CELL.0 / 2);
             let symbol = cell.symbol().chars().next().unwrap_or(' ');
             let is_ink = filled(symbol).is_some_and(|filled| filled[place]);
-            srgb8_to_linear(if is_ink { rgb(cell.fg, INK) } else { rgb(cell.bg, GROUND) })
+            srgb8_to_linear(if is_ink {
+                in_xterm(cell.fg).unwrap_or(INK)
+            } else {
+                in_xterm(cell.bg).unwrap_or(GROUND)
+            })
         };
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
@@ -258,56 +262,4 @@ fn oklab(linear: Vec3) -> Vec3 {
         ],
         Vec3::from_array(cones.to_array().map(f32::cbrt)),
     )
-}
-
-/// As xterm shows it.
-fn rgb(color: Color, own: [u8; 3]) -> [u8; 3] {
-    let named = |index: usize| {
-        const XTERM: [[u8; 3]; 16] = [
-            [0, 0, 0],
-            [205, 0, 0],
-            [0, 205, 0],
-            [205, 205, 0],
-            [0, 0, 238],
-            [205, 0, 205],
-            [0, 205, 205],
-            [229, 229, 229],
-            [127, 127, 127],
-            [255, 0, 0],
-            [0, 255, 0],
-            [255, 255, 0],
-            [92, 92, 255],
-            [255, 0, 255],
-            [0, 255, 255],
-            [255, 255, 255],
-        ];
-        XTERM[index]
-    };
-    match color {
-        Color::Reset => own,
-        Color::Rgb(r, g, b) => [r, g, b],
-        Color::Indexed(index @ 0..16) => named(usize::from(index)),
-        Color::Indexed(index @ 16..232) => {
-            let level = |step: usize| [0, 95, 135, 175, 215, 255][step % 6];
-            let i = usize::from(index) - 16;
-            [level(i / 36), level(i / 6), level(i)]
-        }
-        Color::Indexed(index) => [8 + 10 * (index - 232); 3],
-        Color::Black => named(0),
-        Color::Red => named(1),
-        Color::Green => named(2),
-        Color::Yellow => named(3),
-        Color::Blue => named(4),
-        Color::Magenta => named(5),
-        Color::Cyan => named(6),
-        Color::Gray => named(7),
-        Color::DarkGray => named(8),
-        Color::LightRed => named(9),
-        Color::LightGreen => named(10),
-        Color::LightYellow => named(11),
-        Color::LightBlue => named(12),
-        Color::LightMagenta => named(13),
-        Color::LightCyan => named(14),
-        Color::White => named(15),
-    }
 }

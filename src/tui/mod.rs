@@ -35,7 +35,7 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
-pub use color::{ColorChoice, ColorDepth};
+pub use color::{ColorChoice, ColorDepth, in_xterm};
 pub use mosaic::filled;
 pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};
 pub use run::run;

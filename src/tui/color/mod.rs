@@ -9,6 +9,7 @@ mod shades;
 use ratatui::style::Color;
 
 pub(super) use self::oklab::oklab;
+pub use self::palette::in_xterm;
 pub(super) use self::palette::{Ansi, XTERM, ansi, fixed, nearest_256};
 pub(super) use self::pattern::coarse;
 pub(super) use self::shades::Shades;

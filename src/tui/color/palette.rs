@@ -1,5 +1,7 @@
 //! The colours of the palettes: 16 of the terminal's own, and xterm's cube and greys.
 
+use ratatui::style::Color;
+
 /// The levels of a channel in the 6×6×6 cube.
 pub(in crate::tui) const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
 
@@ -68,6 +70,32 @@ pub(in crate::tui) fn fixed(index: u8) -> Option<[u8; 3]> {
     }
 }
 
+/// What a colour looks like in xterm as it comes; none: the terminal's own.
+pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
+    let ansi = match color {
+        Color::Reset => return None,
+        Color::Rgb(r, g, b) => return Some([r, g, b]),
+        Color::Indexed(index) => return fixed(index).or_else(|| XTERM.get(usize::from(index)).copied()),
+        Color::Black => 0,
+        Color::Red => 1,
+        Color::Green => 2,
+        Color::Yellow => 3,
+        Color::Blue => 4,
+        Color::Magenta => 5,
+        Color::Cyan => 6,
+        Color::Gray => 7,
+        Color::DarkGray => 8,
+        Color::LightRed => 9,
+        Color::LightGreen => 10,
+        Color::LightYellow => 11,
+        Color::LightBlue => 12,
+        Color::LightMagenta => 13,
+        Color::LightCyan => 14,
+        Color::White => 15,
+    };
+    Some(XTERM[ansi])
+}
+
 /// The nearer of the nearest colour of the cube (16 to 231) and the nearest grey (232 to 255).
 pub(in crate::tui) fn nearest_256(rgb: [u8; 3]) -> u8 {
     let steps = rgb.map(nearest_level);
@@ -121,6 +149,8 @@ mod tests {
             assert!(fixed(index).is_some_and(|fixed| difference(fixed, rgb) <= 36), "{rgb:?}");
         }
         assert_eq!(fixed(15), None);
+        let shown = [Color::Indexed(9), Color::LightRed, Color::Indexed(67), Color::Reset].map(in_xterm);
+        assert_eq!(shown, [Some([255, 0, 0]), Some([255, 0, 0]), Some([95, 135, 175]), None]);
     }
 
     #[test]
