@@ -238,8 +238,8 @@ impl Ui {
     /// Everything that has happened, or the next thing that does.
     fn wait(&mut self) -> Option<End> {
         let now = Instant::now();
-        let wake = [next_wake(&self.state, self.next_frame), self.display.wake(now)];
-        let first = match (self.postponed.pop_front(), wake.into_iter().flatten().min()) {
+        let wake = next_wake(&self.state, self.next_frame).into_iter().chain(self.display.wake(now)).min();
+        let first = match (self.postponed.pop_front(), wake) {
             (Some(event), _) => Ok(event),
             (None, Some(wake)) => self.events.recv_timeout(wake.saturating_duration_since(now)),
             (None, None) => self.events.recv().map_err(RecvTimeoutError::from),
@@ -336,13 +336,13 @@ impl Ui {
 
     /// Whether the newest picture stays as it is.
     fn is_still(&self) -> bool {
-        !self.state.is_running() || self.state.paused
+        self.state.paused || !self.state.is_running() && view::under::goes_on(&self.state).is_none()
     }
 
     fn take_preview(&mut self) -> Option<End> {
         self.drawn.is_old = false;
-        let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let LatestPreview { generation, picture, range, section } = latest?;
+        let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take()?;
+        let LatestPreview { generation, picture, range, section } = latest;
         self.apply(Event::Picture { generation, picture, range, section })
     }
 

@@ -4,6 +4,7 @@
 mod outputs;
 #[cfg(test)]
 mod tests;
+mod unfinished;
 
 use std::cell::Cell;
 use std::collections::HashSet;
@@ -13,6 +14,7 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use self::unfinished::Unfinished;
 use super::cache::{Memo, Pool};
 use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
@@ -80,6 +82,8 @@ pub(super) struct Engine {
     /// What the current film is rendered by.
     plan: Option<Plan>,
     at_hand: Option<AtHand>,
+    /// The picture whose render was stopped, until another one is begun.
+    unfinished: Option<Unfinished>,
     /// Pixels of first pictures that are traced in a second, as the last one was.
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
@@ -112,6 +116,7 @@ pub(super) struct Meanwhile<'a> {
 }
 
 /// Everything that is ready to be rendered.
+#[derive(Clone)]
 struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
@@ -140,6 +145,7 @@ impl Engine {
             written: Written::default(),
             plan: None,
             at_hand: None,
+            unfinished: None,
             coarse_rate: Cell::new(None),
             pool: None,
             assets: Vec::new(),
@@ -173,7 +179,10 @@ impl Engine {
             self.write_report(report, &findings, sink);
         }
         self.say_files(&findings, sink);
-        self.sweep(outcome.is_ok());
+        // What was read to the end stays for whoever comes next, even if the render was stopped.
+        let is_read = self.unfinished.as_ref().is_some_and(|it| it.request.generation == generation);
+        self.sweep(outcome.is_ok() || is_read);
+        let is_broken = matches!(outcome, Err(Stop::Failed(Failure::Scene(_))));
         sink.send(match outcome {
             Ok(report) => {
                 let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
@@ -185,6 +194,9 @@ impl Engine {
             Err(Stop::Cancelled) => Event::Cancelled { generation },
             Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
         });
+        if is_broken {
+            self.go_on(request, sink, meanwhile);
+        }
     }
 
     /// Show the picture as it is at another size, outside of a request.
@@ -231,7 +243,10 @@ impl Engine {
             settings: plan.settings,
         };
         self.at_hand = Some(at_hand);
+        let unfinished = Unfinished { request: request.clone(), ready: ready.clone(), photons: photons_key };
+        self.unfinished = Some(unfinished);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons_key, sink, meanwhile))?;
+        self.unfinished = None;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
         let is_written = table

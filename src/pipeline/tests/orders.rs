@@ -206,6 +206,36 @@ fn another_size_of_the_preview_interrupts_nothing() {
     until_wide(&bench, 36);
 }
 
+#[test]
+fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is_kept() {
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 400"), slow);
+    (bench.writing, bench.preview) =
+        (Writing::Try, Some(PreviewSize { width: 12, height: 12, around: None }));
+    let first = bench.send();
+    while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
+    bench.edit("width = 40", "width = = 40");
+    let broken = bench.send();
+    assert!(matches!(bench.until_end(first).last(), Some(Event::Cancelled { .. })));
+    assert!(matches!(bench.until_end(broken).last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
+    // It goes on to its end under the newest number and is written.
+    let mut is_seen = false;
+    loop {
+        match bench.next() {
+            Event::Written { generation, .. } => {
+                assert_eq!(generation, broken);
+                break;
+            }
+            Event::Preview { generation } => is_seen |= generation == broken,
+            Event::Progress { .. } => {}
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(is_seen && samples_on_disk(&bench).starts_with("400"), "{}", samples_on_disk(&bench));
+    bench.edit("width = = 40", "width = 40");
+    let report = bench.done().0;
+    assert_statuses(&report, "rrrrrsrr");
+}
+
 /// Many tiles, so that orders come during the first pass.
 fn wide() -> String {
     SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")

@@ -12,7 +12,7 @@ pub(super) mod preview;
 pub(super) mod ramp;
 mod stages;
 mod text;
-mod under;
+pub(super) mod under;
 pub(super) mod views;
 
 use ratatui::buffer::Buffer;

@@ -7,7 +7,8 @@ use super::header::at_work;
 use super::layout::Layout;
 use super::message;
 use super::stages;
-use super::text::{Tone, bytes, columns, duration, gauge, put, put_right, rest, running};
+use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, rest, running};
+use crate::pipeline::protocol::RenderProgress;
 use crate::scene::sanitize::visible;
 use crate::tui::state::{Activity, PreviewKind, State};
 
@@ -25,6 +26,10 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         Activity::Running { .. } => bar(state, layout, buffer),
         Activity::Done => summary(state, layout, buffer),
         Activity::Waiting | Activity::Cancelled => {}
+        Activity::Broken if let Some(progress) = goes_on(state) => {
+            let words = format!("the last good scene is rendered on: {} %", percent(progress.fraction));
+            put(buffer, area, &[(&words, Tone::Faint)], state.depth);
+        }
         Activity::Broken if state.picture.is_some() => {
             put(
                 buffer,
@@ -35,6 +40,12 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         }
         Activity::Broken => {}
     }
+}
+
+/// How far the last good scene is, which is rendered on while the file is broken.
+pub(in crate::tui) fn goes_on(state: &State) -> Option<&RenderProgress> {
+    let is_broken = matches!(state.activity, Activity::Broken | Activity::Waiting);
+    state.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
 /// Of the loading asset or of the render.
