@@ -14,6 +14,7 @@ use crate::integrators::RenderSettings;
 use crate::math::DVec2;
 use crate::output::{OutputError, write};
 use crate::scene::{Loaded, text_now};
+use crate::system::{file, in_words};
 use crate::world::World;
 
 /// What is asked for.
@@ -106,6 +107,11 @@ impl AtHand {
         let text = loaded.text_with_camera(camera)?;
         let is_new = text != loaded.source.text();
         if is_new {
+            let metadata =
+                file::kind(&path).map(|(_, metadata)| metadata).map_err(|error| in_words(&error))?;
+            if let Some(why) = file::why_keep(&metadata) {
+                return Err(format!("{} {why}: the camera is not written into it", path.display()));
+            }
             let refused = || OutputError::Refused { reason: changed() };
             let may_replace = |_: &std::path::Path| is_as_read().then_some(()).ok_or_else(refused);
             let guard = write::Guard { is_kept: &|path| inputs.contain(path), may_replace: &may_replace };

@@ -73,7 +73,7 @@ impl Edits<'_> {
                         self.replace(&element, wanted);
                     }
                 }
-                _ => self.replaced.push((found.value.span(), array(wanted))),
+                Some(_) | None => self.replaced.push((found.value.span(), array(wanted))),
             },
             None if Some(wanted) != default => self.added.push(format!("{name} = {}", array(wanted))),
             None => {}
@@ -84,7 +84,12 @@ impl Edits<'_> {
     fn replace(&mut self, found: &Value<'_>, wanted: f64) {
         let is_same = match found.item() {
             Item::Integer { digits, radix: 10 } | Item::Float(digits) => digits.parse() == Ok(wanted),
-            _ => false,
+            Item::Integer { .. }
+            | Item::String(_)
+            | Item::Boolean(_)
+            | Item::Datetime
+            | Item::Array(_)
+            | Item::Table(_) => false,
         };
         if !is_same {
             self.replaced.push((found.span(), number(wanted)));

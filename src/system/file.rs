@@ -2,6 +2,7 @@
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 /// What a name leads to.
@@ -45,6 +46,16 @@ impl Kind {
 pub fn kind(path: &Path) -> io::Result<(Kind, Metadata)> {
     let metadata = fs::metadata(path)?;
     Ok((Kind::of(path, &metadata), metadata))
+}
+
+/// Why a person would not want another file to take the place of this one, if anything speaks against it. Permissions count
+/// also for root, whom they do not stop.
+pub fn why_keep(metadata: &Metadata) -> Option<&'static str> {
+    match () {
+        () if metadata.nlink() > 1 => Some("has other names (hard links), which would keep the old text"),
+        () if metadata.permissions().readonly() => Some("is read-only"),
+        () => None,
+    }
 }
 
 /// Opens a file for reading if it is a regular one; else says what it is. Nothing that would block is opened, and a

@@ -160,6 +160,30 @@ fn a_kept_camera_follows_links_and_keeps_permissions() {
 }
 
 #[test]
+fn a_file_that_would_lose_something_keeps_its_camera() {
+    let harm: [(&str, fn(&Bench)); 2] = [
+        ("has other names", |bench| {
+            fs::hard_link(bench.path("scene.toml"), bench.path("other.toml")).expect("another name");
+        }),
+        ("is read-only", |bench| {
+            let path = bench.path("scene.toml");
+            let mut permissions = fs::metadata(&path).expect("a file").permissions();
+            permissions.set_readonly(true);
+            fs::set_permissions(path, permissions).expect("permitted");
+        }),
+    ];
+    for (why, harm) in harm {
+        let mut bench = Bench::new(SCENE);
+        harm(&bench);
+        bench.overrides.camera = moved();
+        let camera = camera(&mut bench);
+        let refusal = keep(&mut bench, camera).expect_err(why);
+        assert!(refusal.contains(why), "{refusal}");
+        assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), SCENE);
+    }
+}
+
+#[test]
 fn what_the_call_sets_stays_before_the_file() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.sets = vec!["camera.fov=20".to_owned()];

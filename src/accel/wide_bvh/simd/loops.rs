@@ -32,7 +32,7 @@ impl Instructions {
             // SAFETY: as above.
             Self::Avx512 => unsafe { avx512(work) },
             #[cfg(not(target_arch = "x86_64"))]
-            _ => work.run(PlainFolds),
+            Self::Avx2 | Self::Avx512 => work.run(PlainFolds),
         }
     }
 }
