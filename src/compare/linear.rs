@@ -4,11 +4,10 @@ use rayon::prelude::*;
 
 use super::Pair;
 use crate::math::Vec3;
+use crate::math::color::RELMSE_LEAST;
 
 /// Of the pixels, one in so many is left out of the trimmed mean.
 const DROPPED_ONE_IN: usize = 1000;
-/// Keeps what is relative to a black reference finite.
-const LEAST: f64 = 0.01;
 
 pub(super) struct Linear {
     pub(super) rmse: f64,
@@ -72,7 +71,7 @@ fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
 /// Mean over the channels of (a − b)²/(b² + 0.01).
 fn relative(a: Vec3, b: Vec3) -> f64 {
     let (a, b) = (a.as_dvec3(), b.as_dvec3());
-    ((a - b) * (a - b) / (b * b + LEAST)).element_sum() / 3.0
+    ((a - b) * (a - b) / (b * b + RELMSE_LEAST)).element_sum() / 3.0
 }
 
 /// Mean of [`relative`] without the largest values.

@@ -8,6 +8,7 @@
 
 mod curves;
 mod noise;
+mod part;
 mod preview;
 mod quantity;
 mod resample;
@@ -17,11 +18,12 @@ pub mod stretch;
 mod sums;
 pub mod tone;
 
-pub use noise::{HalfNoise, samples_to};
+pub use noise::{HalfNoise, RATE_POWER, samples_to};
+pub use part::{Part, Pixels};
 pub use preview::Previewer;
 pub use quantity::Quantity;
 pub use srgb::linear_to_srgb8;
-pub use sums::{Film, FilmError, SampleStats, TILE_SIZE};
+pub use sums::{CELL_SIZE, CELLS, Film, FilmError, SampleStats, TILE_SIZE};
 
 use crate::math::Vec3;
 
@@ -65,14 +67,14 @@ fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     Some((start, u32::try_from(length).ok()?))
 }
 
-/// What an integrator made of a tile: `samples` radiances for each pixel of `rect`, pixel after pixel in rows.
+/// What an integrator made of a tile: `samples` radiances for each pixel, one after the other in rows.
 #[derive(Clone, Debug)]
 pub struct TileSamples {
     /// The pixels.
-    pub rect: Rect,
+    pub pixels: Pixels,
     /// Samples for each.
     pub samples: u32,
-    /// `rect.area() · samples` radiances, placed as the reconstruction filter weighs.
+    /// `pixels.count() · samples` radiances, placed as the reconstruction filter weighs.
     pub radiance: Vec<Vec3>,
     /// Which of them lie where the filter is negative; none where it is so nowhere.
     pub negative: Option<NegativeLobes>,

@@ -1,8 +1,8 @@
 //! How far a film is from the picture of endless samples, judged by its own samples.
 
-use super::Film;
+use super::{CELLS, Film, Part, Pixels};
 use crate::math::DVec3;
-use crate::math::color::LUMINANCE_WEIGHTS;
+use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
 
 /// Relative luminance in double precision, so that sums of its squares and squares of its sums agree.
 pub(super) fn luminance(radiance: DVec3) -> f64 {
@@ -20,8 +20,10 @@ pub(super) fn luminance(radiance: DVec3) -> f64 {
 pub(super) struct Steps {
     /// Luminance of each pixel at the last power of two of its samples.
     last: Vec<f64>,
-    /// Sums over the pixels of even and of odd rows of the squared steps to 2, 4, 8, … samples.
-    squares: Vec<[f64; 2]>,
+    /// Sums over the pixels of both halves of each cell of the squared steps to 2, 4, 8, … samples.
+    squares: Vec<[[f64; 2]; CELLS]>,
+    /// The same, each over luminance² + [`RELMSE_LEAST`].
+    relative: Vec<[[f64; 2]; CELLS]>,
     /// The last step of each pixel.
     recent: Vec<f32>,
 }
@@ -33,7 +35,7 @@ impl Steps {
         last.try_reserve_exact(area).ok()?;
         let mut recent = Vec::new();
         recent.try_reserve_exact(area).ok()?;
-        Some(Self { last, squares: Vec::new(), recent })
+        Some(Self { last, squares: Vec::new(), relative: Vec::new(), recent })
     }
 
     /// For so many pixels; cannot fail where the memory was reserved.
@@ -47,13 +49,15 @@ impl Steps {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
-    /// A pixel of a half of the tile has a power of two of samples, which make this luminance.
-    pub(super) fn note(&mut self, (pixel, half): (usize, usize), count: u32, luminance: f64) {
+    /// A pixel of a half of a cell has a power of two of samples, which make this luminance.
+    pub(super) fn note(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
         let level = count.trailing_zeros() as usize;
         if level > 0 {
-            self.squares.resize(self.squares.len().max(level), [0.0; 2]);
+            self.squares.resize(self.squares.len().max(level), [[0.0; 2]; CELLS]);
             let step = luminance - self.last[pixel];
-            self.squares[level - 1][half] += step * step;
+            self.squares[level - 1][cell][half] += step * step;
+            self.relative.resize(self.squares.len(), [[0.0; 2]; CELLS]);
+            self.relative[level - 1][cell][half] += step * step / (luminance * luminance + RELMSE_LEAST);
             self.recent[pixel] = step as f32;
         }
         self.last[pixel] = luminance;
@@ -65,13 +69,16 @@ impl Steps {
 /// by earlier steps does worse, as few bright pixels may decide it.
 const RATE: f64 = 2.7;
 
+/// The variance is taken to fall with this power of the samples: the binary logarithm of [`RATE`].
+pub const RATE_POWER: f64 = 1.432_959_407_276_106_2;
+
 /// The variance of means of `count` samples, by the sums of squared steps of one half to 2, 4, … of them: that of the last step and
 /// what the one before foretells of it together, as each has a spread.
-fn variance(steps: &[[f64; 2]], half: usize, count: u32) -> Option<f64> {
+fn variance(steps: &[[[f64; 2]; CELLS]], (cell, half): (usize, usize), count: u32) -> Option<f64> {
     let level = count.checked_ilog2()? as usize;
-    let last = steps.get(level.checked_sub(1)?)?[half];
+    let last = steps.get(level.checked_sub(1)?)?[cell][half];
     let step = match level.checked_sub(2) {
-        Some(before) => 0.5 * (last + steps[before][half] / RATE),
+        Some(before) => 0.5 * (last + steps[before][cell][half] / RATE),
         None => last,
     };
     Some(pixel_variance(step, count))
@@ -79,12 +86,10 @@ fn variance(steps: &[[f64; 2]], half: usize, count: u32) -> Option<f64> {
 
 /// Samples that bring the standard error of means of `count` samples to a part of itself, as far as its rate is known.
 pub fn samples_to(part: f64, count: u32) -> u32 {
-    // The variance falls with this power of the samples.
-    let power = libm::log2(RATE);
-    (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
+    (f64::from(count) * libm::pow(part, -2.0 / RATE_POWER)).ceil() as u32
 }
 
-/// How much noise there is in the even or the odd rows of a tile.
+/// How much noise there is in a half of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfNoise {
     /// Mean variance of the pixels' luminance.
@@ -115,10 +120,11 @@ impl Film {
             if self.tile(tile).counts.is_empty() {
                 return None;
             }
-            for half in 0..2 {
-                let pixels = self.half_pixels(tile, half).count() as f64;
+            let halves = (CELLS * tile..CELLS * (tile + 1)).flat_map(|cell| [(cell, 0), (cell, 1)]);
+            for (cell, half) in halves {
+                let pixels = self.half_pixel_count(cell, half) as f64;
                 if pixels > 0.0 {
-                    let HalfNoise { variance, mean, .. } = self.half_noise(tile, half)?;
+                    let HalfNoise { variance, mean, .. } = self.half_noise(cell, half)?;
                     variances += variance * pixels;
                     means += mean * pixels;
                 }
@@ -131,10 +137,9 @@ impl Film {
         Some(relative).filter(|relative| relative.is_finite())
     }
 
-    /// The noise in the even rows of a tile, counted from its own first, or in the odd ones; none where a pixel has fewer than two
-    /// samples, and where there are no such rows.
+    /// The noise in a half of a cell; none where a pixel has fewer than two samples, and where there are no pixels in it.
     pub fn half_noise(&self, number: usize, half: usize) -> Option<HalfNoise> {
-        let tile = self.tile(number);
+        let tile = self.tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
         for pixel in self.half_pixels(number, half) {
             sum += luminance(tile.mean(pixel)?);
@@ -142,15 +147,34 @@ impl Film {
             pixels += 1;
         }
         let pixels = Some(f64::from(pixels)).filter(|pixels| *pixels > 0.0)?;
-        let variance = variance(&tile.steps.squares, half, samples)? / pixels;
+        let variance = variance(&tile.steps.squares, (number % CELLS, half), samples)? / pixels;
         Some(HalfNoise { variance, mean: sum / pixels, samples })
     }
 
-    /// Places of the pixels of the even or the odd rows of a tile.
-    fn half_pixels(&self, tile: usize, half: usize) -> impl Iterator<Item = usize> {
-        let (columns, rows) =
-            self.tile_rect(tile).map_or((0, 0), |rect| (rect.width as usize, rect.height as usize));
-        (half..rows).step_by(2).flat_map(move |row| row * columns..(row + 1) * columns)
+    /// The error of a half of a cell as it was after the first `count` samples of each of its pixels, a power of two: the mean over the
+    /// pixels of the variance of their luminance over luminance² + [`RELMSE_LEAST`]. None for fewer than two samples, for more than
+    /// there are, and where there are no pixels.
+    pub fn half_error(&self, number: usize, half: usize, count: u32) -> Option<f64> {
+        let tile = self.tile(number / CELLS);
+        let pixels = self.half_pixel_count(number, half);
+        let sum = variance(&tile.steps.relative, (number % CELLS, half), count)?;
+        (pixels > 0).then(|| sum / pixels as f64)
+    }
+
+    /// How many pixels a half of a cell has.
+    pub fn half_pixel_count(&self, cell: usize, half: usize) -> usize {
+        self.cell_rect(cell).map_or(0, |rect| Part::Half(half).count(rect.area()))
+    }
+
+    /// Places, in its tile, of the pixels of a half of a cell.
+    fn half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
+        let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
+        let part = Part::Half(half);
+        tile.zip(rect).into_iter().flat_map(move |(tile, rect)| {
+            let place = move |number| Pixels { rect, part }.place(number);
+            let index = move |(x, y): (u32, u32)| ((y - tile.y) * tile.width + x - tile.x) as usize;
+            (0..part.count(rect.area()) as u32).map(move |number| index(place(number)))
+        })
     }
 
     /// Mean luminance of the picture; none where a pixel has no sample.
@@ -184,7 +208,7 @@ mod tests {
             let radiance = values.iter().map(|&value| Vec3::splat(value)).collect();
             film.add(
                 x / TILE_SIZE as usize,
-                &TileSamples { rect, samples: values.len() as u32, radiance, negative: None },
+                &TileSamples { pixels: rect.into(), samples: values.len() as u32, radiance, negative: None },
             );
         }
         film

@@ -188,7 +188,12 @@ mod tests {
                     let rect = Rect { x, y, width: 1, height: 1 };
                     film.add(
                         tile,
-                        &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(value)], negative: None },
+                        &TileSamples {
+                            pixels: rect.into(),
+                            samples: 1,
+                            radiance: vec![Vec3::splat(value)],
+                            negative: None,
+                        },
                     );
                 }
             }
@@ -255,8 +260,12 @@ mod tests {
         };
         assert_eq!(picture(&first), preview(&first, 9, 5, None));
         let rect = first.tile_rect(1).expect("a tile");
-        let samples =
-            TileSamples { rect, samples: 2, radiance: vec![Vec3::Y; rect.area() * 2], negative: None };
+        let samples = TileSamples {
+            pixels: rect.into(),
+            samples: 2,
+            radiance: vec![Vec3::Y; rect.area() * 2],
+            negative: None,
+        };
         first.add(1, &samples);
         let changed = picture(&first);
         assert_eq!(changed, preview(&first, 9, 5, None));
@@ -273,7 +282,12 @@ mod tests {
             let value = Vec3::splat(tile as f32);
             film.add(
                 tile,
-                &TileSamples { rect, samples: 1, radiance: vec![value; rect.area()], negative: None },
+                &TileSamples {
+                    pixels: rect.into(),
+                    samples: 1,
+                    radiance: vec![value; rect.area()],
+                    negative: None,
+                },
             );
         }
         film
@@ -310,7 +324,12 @@ mod tests {
         let rect = film.tile_rect(0).expect("a tile");
         film.add(
             0,
-            &TileSamples { rect, samples: 1, radiance: vec![Vec3::splat(1e6); rect.area()], negative: None },
+            &TileSamples {
+                pixels: rect.into(),
+                samples: 1,
+                radiance: vec![Vec3::splat(1e6); rect.area()],
+                negative: None,
+            },
         );
         for _ in 0..slices {
             previewer.update(&film, Some(past));

@@ -54,7 +54,7 @@ mod tests {
         for tile in (0..film.tile_count()).filter(|tile| tile % 2 == 0) {
             let rect = film.tile_rect(tile).expect("a tile");
             let radiance = (0..rect.area()).map(|i| Vec3::splat((tile * 10_000 + i) as f32)).collect();
-            film.add(tile, &TileSamples { rect, samples: 1, radiance, negative: None });
+            film.add(tile, &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None });
         }
         let base = RadianceImage { width: 2, height: 1, pixels: vec![Vec3::X, Vec3::Y] };
         let rect = Rect { x: 20, y: 11, width: 60, height: 50 };

@@ -4,11 +4,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::noise::{Steps, luminance};
+use super::part::Part;
 use super::{Quantity, RadianceImage, Rect, TileSamples};
 use crate::math::{DVec3, Vec3};
 
 /// Pixels along a tile's side: 1024 pixels of 40 bytes stay in a core's second-level cache.
 pub const TILE_SIZE: u32 = 32;
+
+/// Pixels along the side of a cell of a tile. Cells have as many samples as their own noise asks for: the smaller they are, the fewer
+/// pixels share the samples of an edge.
+pub const CELL_SIZE: u32 = 16;
+
+const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;
+
+/// Cells of a tile, in rows.
+pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
 
 /// Why there is no film.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -111,11 +121,11 @@ impl Tile {
         self.steps.fill(area);
     }
 
-    /// Add samples of one pixel of a half of the tile in their order; how many of them are not finite. `is_negative` tells them apart where the
+    /// Add samples of one pixel of a half of a cell in their order; how many of them are not finite. `is_negative` tells them apart where the
     /// filter has negative lobes of this weight.
     fn add(
         &mut self,
-        (index, half): (usize, usize),
+        (index, cell, half): (usize, usize, usize),
         radiances: &[Vec3],
         lobes: Option<(f64, &[bool])>,
     ) -> u64 {
@@ -137,7 +147,7 @@ impl Tile {
             if part.len() == left
                 && let Some(mean) = self.mean(index)
             {
-                self.steps.note((index, half), self.counts[index], luminance(mean));
+                self.steps.note((index, cell, half), self.counts[index], luminance(mean));
             }
         }
         non_finite
@@ -235,6 +245,16 @@ impl Film {
         (tile < self.tiles.len()).then(|| tile_rect(self.crop, tile))
     }
 
+    /// Cells of the crop, of which each tile has [`CELLS`]; those of its last tiles may be without pixels.
+    pub fn cell_count(&self) -> usize {
+        CELLS * self.tiles.len()
+    }
+
+    /// The pixels of a cell, in the whole picture; none where it has none.
+    pub fn cell_rect(&self, cell: usize) -> Option<Rect> {
+        cell_rect(self.tile_rect(cell / CELLS)?, cell % CELLS)
+    }
+
     /// Every tile once, from the middle of the crop outwards in rings; sorted when it is first asked for.
     pub fn tile_order(&self) -> &[usize] {
         self.order.get_or_init(|| rings(self.crop))
@@ -250,7 +270,7 @@ impl Film {
     /// black and in [`Film::non_finite_samples`]. Pixels outside of the tile are left out.
     pub fn add(&self, tile: usize, samples: &TileSamples) {
         let Some(rect) = self.tile_rect(tile) else { return };
-        if samples.samples == 0 || samples.rect.width == 0 {
+        if samples.samples == 0 || samples.pixels.rect.width == 0 {
             return;
         }
         let mut non_finite = 0;
@@ -259,12 +279,13 @@ impl Film {
         tile.fill(rect.area());
         let count = samples.samples as usize;
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
-            let (x, y) = (i as u32 % samples.rect.width, i as u32 / samples.rect.width);
-            let Some(index) = index_in(rect, samples.rect.x + x, samples.rect.y + y) else { continue };
+            let (x, y) = samples.pixels.place(i as u32);
+            let Some(index) = index_in(rect, x, y) else { continue };
+            let (cell, inside) = cell_at(rect, x, y);
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
-            let half = index / rect.width as usize % 2;
-            non_finite += tile.add((index, half), pixel, lobes);
+            let half = index_in(inside, x, y).map_or(0, |index| Part::half_of(index as u32, inside));
+            non_finite += tile.add((index, cell, half), pixel, lobes);
         }
         tile.revision += 1;
         drop(guard);
@@ -350,6 +371,19 @@ fn lock(tile: &Mutex<Tile>) -> MutexGuard<'_, Tile> {
 fn index_in(rect: Rect, x: u32, y: u32) -> Option<usize> {
     let (x, y) = (x.checked_sub(rect.x)?, y.checked_sub(rect.y)?);
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
+}
+
+/// The cell of a tile that a pixel of it is in, and its pixels.
+fn cell_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
+    let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
+    let cell = row as usize * CELLS_ACROSS + column as usize;
+    (cell, cell_rect(tile, cell).unwrap_or(tile))
+}
+
+fn cell_rect(tile: Rect, cell: usize) -> Option<Rect> {
+    let (column, row) = ((cell % CELLS_ACROSS) as u32, (cell / CELLS_ACROSS) as u32);
+    let (x, y) = (tile.x + column * CELL_SIZE, tile.y + row * CELL_SIZE);
+    Rect { x, y, width: CELL_SIZE, height: CELL_SIZE }.intersection(&tile)
 }
 
 fn tile_grid(crop: Rect) -> (usize, usize) {

@@ -14,7 +14,7 @@ fn samples(rect: Rect, first: u32, count: u32) -> TileSamples {
         (first..first + count).map(move |sample| value(x, y, sample))
     };
     TileSamples {
-        rect,
+        pixels: rect.into(),
         samples: count,
         radiance: (0..rect.area() as u32).flat_map(pixel).collect(),
         negative: None,
@@ -102,7 +102,7 @@ fn the_mean_of_each_pixel_and_how_many() {
         let rect = Rect { x, y: 1, width: 1, height: 1 };
         film.add(
             (x / 32) as usize,
-            &TileSamples { rect, samples: values.len() as u32, radiance, negative: None },
+            &TileSamples { pixels: rect.into(), samples: values.len() as u32, radiance, negative: None },
         );
     };
     add(3, &[1.0, 2.0, 6.0]);
@@ -125,7 +125,7 @@ fn what_is_not_finite_is_black_and_counted() {
         Vec3::new(-f32::NAN, 1.0, 1.0),
         Vec3::new(1.0, 1.0, f32::INFINITY),
     ];
-    film.add(0, &TileSamples { rect: film.crop(), samples: 4, radiance, negative: None });
+    film.add(0, &TileSamples { pixels: film.crop().into(), samples: 4, radiance, negative: None });
     assert_eq!(film.non_finite_samples(), 3);
     assert_eq!(film.radiance().pixels, [Vec3::ONE]);
     assert_eq!(pixel_samples(&film, 0, 0), 4);
@@ -135,10 +135,19 @@ fn what_is_not_finite_is_black_and_counted() {
 fn samples_that_do_not_fit_the_tile_do_no_harm() {
     let film = Film::new(33, 1, None).expect("a film");
     let wide = Rect { x: 30, y: 0, width: 9, height: 3 };
-    film.add(1, &TileSamples { rect: wide, samples: 1, radiance: vec![Vec3::ONE; 20], negative: None });
-    film.add(0, &TileSamples { rect: wide, samples: 2, radiance: vec![Vec3::ONE; 3], negative: None });
-    film.add(7, &TileSamples { rect: wide, samples: 1, radiance: vec![Vec3::ONE; 27], negative: None });
-    film.add(0, &TileSamples { rect: wide, samples: 0, radiance: Vec::new(), negative: None });
+    film.add(
+        1,
+        &TileSamples { pixels: wide.into(), samples: 1, radiance: vec![Vec3::ONE; 20], negative: None },
+    );
+    film.add(
+        0,
+        &TileSamples { pixels: wide.into(), samples: 2, radiance: vec![Vec3::ONE; 3], negative: None },
+    );
+    film.add(
+        7,
+        &TileSamples { pixels: wide.into(), samples: 1, radiance: vec![Vec3::ONE; 27], negative: None },
+    );
+    film.add(0, &TileSamples { pixels: wide.into(), samples: 0, radiance: Vec::new(), negative: None });
     assert_eq!([29, 30, 31, 32].map(|x| pixel_samples(&film, x, 0)), [0, 2, 0, 1]);
 }
 
@@ -172,7 +181,10 @@ fn snapshots_while_threads_add() {
                         for tile in (worker..film.tile_count()).step_by(3) {
                             let rect = film.tile_rect(tile).expect("a tile");
                             let radiance = vec![Vec3::splat(2.0); rect.area()];
-                            film.add(tile, &TileSamples { rect, samples: 1, radiance, negative: None });
+                            film.add(
+                                tile,
+                                &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None },
+                            );
                             assert!(film.samples().max <= pass + 9);
                         }
                     }

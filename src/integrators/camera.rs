@@ -142,7 +142,7 @@ mod tests {
     fn rows_of_places_go_on_over_samples_and_pixels() {
         let tile = Rect { x: 5, y: 7, width: 3, height: 40 };
         for samples in [3..4, 0..5, 100..116, 7..40] {
-            let block = SampleBlock { tile, samples };
+            let block = SampleBlock { pixels: tile.into(), samples };
             for first in [0, 1, 2, 15, 33] {
                 let (xs, ys, samples) = block.places(first);
                 for lane in 0..PACKET {

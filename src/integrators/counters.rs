@@ -17,6 +17,21 @@ pub struct RayCounters {
     pub texture_lookups: u64,
 }
 
+impl RayCounters {
+    /// All rays.
+    pub fn all(&self) -> u64 {
+        let Self {
+            camera_rays,
+            shadow_rays,
+            reflected_rays,
+            refracted_rays,
+            scattered_rays,
+            texture_lookups: _,
+        } = self;
+        camera_rays + shadow_rays + reflected_rays + refracted_rays + scattered_rays
+    }
+}
+
 impl std::ops::AddAssign for RayCounters {
     fn add_assign(&mut self, other: Self) {
         self.camera_rays += other.camera_rays;

@@ -37,7 +37,7 @@ mod wave;
 use std::ops::Range;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{NegativeLobes, Rect, TileSamples};
+use crate::film::{NegativeLobes, Pixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
@@ -60,11 +60,11 @@ const BATCH_SIZE: usize = 1024;
 pub fn render_tile(
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: impl Into<Pixels>,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    render_tile_by(None, world, settings, tile, samples, token)
+    render_tile_by(None, world, settings, pixels, samples, token)
 }
 
 /// The same with photons, of which there are the maps of the samples; without, nothing is gathered.
@@ -75,11 +75,11 @@ pub fn render_tile_by(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: impl Into<Pixels>,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    let block = SampleBlock { tile, samples };
+    let block = SampleBlock { pixels: pixels.into(), samples };
     let weight = settings.render.filter.negative_weight();
     let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
     let mut radiance = vec![Vec3::ZERO; block.len()];
@@ -111,7 +111,7 @@ pub fn render_tile_by(
     queues.leave();
     let negative = weight.map(|weight| NegativeLobes { weight, is_negative });
     let samples = block.samples.len() as u32;
-    Ok((TileSamples { rect: block.tile, samples, radiance, negative }, counters))
+    Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))
 }
 
 /// Mark the slots from `first` on whose bits are set.

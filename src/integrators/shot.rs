@@ -1,12 +1,13 @@
 //! What all rays of a tile have in common.
 
+use std::array;
 use std::ops::Range;
 
 use super::RenderSettings;
 use super::photons::PhotonMaps;
 use super::view::Measure;
 use crate::control::CancelToken;
-use crate::film::Rect;
+use crate::film::{Part, Pixels};
 use crate::lights::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::{Integrator, Shadows};
@@ -66,7 +67,7 @@ impl<'a> Shot<'a> {
 /// The samples of a tile. A slot is the place of a sample among them: all of the first pixel, all of the next.
 pub struct SampleBlock {
     /// The pixels.
-    pub tile: Rect,
+    pub pixels: Pixels,
     /// Numbers of the samples of each.
     pub samples: Range<u32>,
 }
@@ -74,27 +75,29 @@ pub struct SampleBlock {
 impl SampleBlock {
     /// Samples in all.
     pub fn len(&self) -> usize {
-        self.tile.area() * self.samples.len()
+        self.pixels.count() * self.samples.len()
     }
 
     /// Pixel and sample number of a slot.
     pub fn place(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
-        let (x, y) = (pixel % self.tile.width, pixel / self.tile.width);
-        (self.tile.x + x, self.tile.y + y, self.samples.start + sample)
+        let (x, y) = self.pixels.place(pixel);
+        (x, y, self.samples.start + sample)
     }
 
     /// Columns, rows and sample numbers of slots; any where there is none.
     #[inline(always)]
     pub fn places_of(&self, slots: &[u32; PACKET]) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
-        let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(self.tile.width));
+        let Pixels { rect, part } = self.pixels;
+        let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
         for lane in 0..PACKET {
             let pixel = by_samples.quotient(slots[lane]);
-            let y = by_width.quotient(pixel);
-            xs[lane] = self.tile.x.wrapping_add(pixel.wrapping_sub(y.wrapping_mul(self.tile.width)));
-            ys[lane] = self.tile.y.wrapping_add(y);
+            let index = part.index(pixel, rect);
+            let y = by_width.quotient(index);
+            xs[lane] = rect.x.wrapping_add(index.wrapping_sub(y.wrapping_mul(rect.width)));
+            ys[lane] = rect.y.wrapping_add(y);
             let first = pixel.wrapping_mul(self.samples.len() as u32);
             samples[lane] = self.samples.start.wrapping_add(slots[lane].wrapping_sub(first));
         }
@@ -112,13 +115,17 @@ impl SampleBlock {
             }
             return ([x; PACKET], [y; PACKET], samples);
         }
+        if self.pixels.part != Part::All {
+            return self.places_of(&array::from_fn(|lane| first + lane as u32));
+        }
+        let rect = self.pixels.rect;
         for lane in 0..PACKET {
             (xs[lane], ys[lane], samples[lane]) = (x, y, sample);
             sample += 1;
             if sample == self.samples.end {
                 (x, sample) = (x + 1, self.samples.start);
-                if x == self.tile.x + self.tile.width {
-                    (x, y) = (self.tile.x, y + 1);
+                if x == rect.x + rect.width {
+                    (x, y) = (rect.x, y + 1);
                 }
             }
         }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use rayon::ThreadPool;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Rect, TileSamples};
+use crate::film::{Pixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_by};
 use crate::world::World;
 
@@ -16,7 +16,7 @@ use crate::world::World;
 pub(super) type Kernel = fn(
     &World,
     &RenderSettings,
-    Rect,
+    Pixels,
     Range<u32>,
     &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled>;
@@ -40,65 +40,28 @@ pub(super) struct Tracer<'a> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Job {
     pub(super) tile: usize,
-    pub(super) rect: Rect,
-    pub(super) rows: Rows,
+    pub(super) pixels: Pixels,
     pub(super) samples: Range<u32>,
 }
 
-/// Rows of a tile, counted from its own first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Rows {
-    All,
-    /// The even ones, or the odd ones.
-    Half(usize),
-}
-
-impl Rows {
-    /// How many pixels of a rectangle they are.
-    pub(super) fn pixels(self, rect: Rect) -> u64 {
-        let rows = match self {
-            Self::All => rect.height as usize,
-            Self::Half(half) => (rect.height as usize + 1 - half) / 2,
-        };
-        u64::from(rect.width) * rows as u64
-    }
-}
-
 impl Job {
-    /// How many there are.
-    pub(super) fn pixels(&self) -> u64 {
-        self.rows.pixels(self.rect)
-    }
-
-    /// The rectangles to be rendered.
-    fn rects(&self) -> Vec<Rect> {
-        match self.rows {
-            Rows::All => vec![self.rect],
-            Rows::Half(half) => {
-                let row = |y| Rect { y: self.rect.y + y, height: 1, ..self.rect };
-                (half as u32..self.rect.height).step_by(2).map(row).collect()
-            }
-        }
+    /// How many pixels there are.
+    pub(super) fn pixel_count(&self) -> u64 {
+        self.pixels.count() as u64
     }
 }
 
 impl Tracer<'_> {
-    fn trace(&self, job: &Job) -> Result<(Vec<TileSamples>, RayCounters), Cancelled> {
+    fn trace(&self, job: &Job) -> Result<(TileSamples, RayCounters), Cancelled> {
         let Self { kernel, world, settings, token, photons, .. } = *self;
-        let (mut pieces, mut all) = (Vec::new(), RayCounters::default());
-        for rect in job.rects() {
-            let samples = job.samples.clone();
-            let (piece, rays) = match photons {
-                Some(_) => render_tile_by(photons, world, settings, rect, samples, token),
-                None => kernel(world, settings, rect, samples, token),
-            }?;
-            pieces.push(piece);
-            all += rays;
+        let samples = job.samples.clone();
+        match photons {
+            Some(_) => render_tile_by(photons, world, settings, job.pixels, samples, token),
+            None => kernel(world, settings, job.pixels, samples, token),
         }
-        Ok((pieces, all))
     }
 
-    /// Do the jobs. `keep` takes the samples of every job that is finished, in pieces, on the thread that made them, in whose cache
+    /// Do the jobs. `keep` takes the samples of every job that is finished on the thread that made them, in whose cache
     /// they are; `each` is then told on this one, in the order in which they end, and every now and then nothing; it says whether
     /// to go on. Jobs that have begun are finished.
     ///
@@ -107,7 +70,7 @@ impl Tracer<'_> {
     pub(super) fn run<K: Send>(
         &self,
         jobs: &[Job],
-        keep: impl Fn(&Job, Vec<TileSamples>) -> K + Sync,
+        keep: impl Fn(&Job, TileSamples) -> K + Sync,
         mut each: impl FnMut(Option<(&Job, K, RayCounters)>) -> bool,
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));

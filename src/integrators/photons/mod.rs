@@ -234,7 +234,7 @@ impl Photons {
             let start = number % at_once * count;
             let samples = start + first..start + (first + CHUNK).min(count);
             let tile = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
-            let block = SampleBlock { tile, samples };
+            let block = SampleBlock { pixels: tile.into(), samples };
             let shot = Shot { pixel_spread: 0.0, ..Shot::new(world, &settings, &block, token) };
             let (share, most_depth) = (1.0 / count as f32, self.most_depth);
             let shots = Shooting { shot: &shot, emission, glasses, share, most_depth }.shoot()?;

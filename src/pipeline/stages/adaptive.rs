@@ -1,8 +1,8 @@
 //! Which parts of a picture have enough samples.
 //!
 //! To stop by the same samples that the picture is the mean of would make it too dark: what is rare and bright ends no sampling
-//! where it was not met yet, and goes on where it was. So the even rows of a tile stop by the noise of its odd rows, and these by
-//! that of the even ones, whose samples are others; the noise of both is much the same. A little of the bias is left, as a half
+//! where it was not met yet, and goes on where it was. So one half of a cell, which has every other pixel, stops by the noise of the
+//! other half, whose samples are others; the noise of both is much the same. A little of the bias is left, as a half
 //! that has stopped tells the other no more: a tenth of it, which is a thirtieth of the noise where that is worst.
 
 use crate::film::{Film, HalfNoise, samples_to};
@@ -16,7 +16,7 @@ const AIM: f64 = 0.82;
 /// The least brightness that noise is held against, as a part of the picture's.
 const LEAST_BRIGHTNESS: f64 = 0.01;
 
-/// Samples that the halves of each tile are to have.
+/// Samples that the halves of each cell are to have.
 #[derive(Debug)]
 pub(super) struct Goals {
     /// What is decided; [`u32::MAX`] before.
@@ -28,20 +28,20 @@ pub(super) struct Goals {
 }
 
 impl Goals {
-    /// For so many tiles, of which nothing is known.
-    pub(super) fn none(tiles: usize) -> Self {
-        let open = vec![[u32::MAX; 2]; tiles];
+    /// For so many cells, of which nothing is known.
+    pub(super) fn none(cells: usize) -> Self {
+        let open = vec![[u32::MAX; 2]; cells];
         Self { decided: open.clone(), expected: open, brightness: None }
     }
 
-    /// Samples that a half of a tile is to have at most.
-    pub(super) fn of(&self, tile: usize, half: usize) -> u32 {
-        self.decided[tile][half]
+    /// Samples that a half of a cell is to have at most.
+    pub(super) fn of(&self, cell: usize, half: usize) -> u32 {
+        self.decided[cell][half]
     }
 
     /// Samples that it is expected to get; [`u32::MAX`] where nothing is known.
-    pub(super) fn expected(&self, tile: usize, half: usize) -> u32 {
-        self.expected[tile][half]
+    pub(super) fn expected(&self, cell: usize, half: usize) -> u32 {
+        self.expected[cell][half]
     }
 
     /// Whether any half gets fewer samples than these.
@@ -60,21 +60,21 @@ impl Goals {
         }
         let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
         self.brightness = Some(brightness);
-        for (tile, done) in done.iter().enumerate() {
-            if (0..2).all(|half| self.decided[tile][half] < u32::MAX || done[half] != samples) {
+        for (cell, done) in done.iter().enumerate() {
+            if (0..2).all(|half| self.decided[cell][half] < u32::MAX || done[half] != samples) {
                 continue;
             }
-            let [even, odd] = [0, 1].map(|half| film.half_noise(tile, half));
-            // A tile of one row has no other half.
+            let [even, odd] = [0, 1].map(|half| film.half_noise(cell, half));
+            // A cell of one pixel has no other half.
             let of_others = [odd.or(even), even.or(odd)];
-            let was_decided = self.decided[tile].map(|goal| goal < u32::MAX);
+            let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
                 let wanted = wanted(&noise, brightness, error);
-                self.expected[tile][half] = wanted.max(done[half]);
+                self.expected[cell][half] = wanted.max(done[half]);
                 // Where the other half has no more samples to come, nothing more will be known.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
-                    self.decided[tile][half] = wanted.max(done[half]);
+                    self.decided[cell][half] = wanted.max(done[half]);
                 }
             }
         }
@@ -94,33 +94,33 @@ fn wanted(noise: &HalfNoise, brightness: f64, error: f64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Rect, TileSamples};
+    use crate::film::{CELLS, Part, Pixels, Rect, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// A film of one tile of two rows, whose pixels have samples of a mean and a spread each.
-    fn film(rows: [(f32, f32); 2], samples: u32) -> Film {
+    /// A film of one tile, whose halves have samples of a mean and a spread each.
+    fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");
         let mut next = unit(3);
-        for (y, (mean, spread)) in (0..).zip(rows) {
-            let rect = Rect { x: 0, y, width: COLUMNS, height: 1 };
+        for (half, (mean, spread)) in halves.into_iter().enumerate() {
+            let pixels = Pixels { rect: film.crop(), part: Part::Half(half) };
             let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
             let radiance = (0..COLUMNS * samples).map(sample).collect();
-            film.add(0, &TileSamples { rect, samples, radiance, negative: None });
+            film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
         }
         film
     }
 
-    fn judged(rows: [(f32, f32); 2], samples: u32, error: f64) -> Goals {
+    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> Goals {
         let mut goals = Goals::none(1);
-        goals.judge(&film(rows, samples), &[[samples; 2]], samples, error);
+        goals.judge(&film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
 
     #[test]
     fn each_half_stops_by_the_noise_of_the_other() {
-        // The even rows are smooth, the odd ones are not.
+        // The first half is smooth, the other one is not.
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(goals.of(0, 1), 16, "the other half has no noise");
         assert_eq!(goals.of(0, 0), u32::MAX);
@@ -151,11 +151,14 @@ mod tests {
         for (tile, mean) in [(0, 1.0), (1, 1e-6)] {
             let rect = Rect { x: 32 * tile, y: 0, width: 32, height: 2 };
             let radiance = (0..64 * 16).map(|_| Vec3::splat(mean * 2.0 * next())).collect();
-            film.add(tile as usize, &TileSamples { rect, samples: 16, radiance, negative: None });
+            film.add(
+                tile as usize,
+                &TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None },
+            );
         }
-        let mut goals = Goals::none(2);
-        goals.judge(&film, &[[16; 2]; 2], 16, 0.01);
-        assert_eq!((goals.of(0, 0), goals.of(1, 0)), (u32::MAX, 16));
+        let mut goals = Goals::none(2 * CELLS);
+        goals.judge(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
+        assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
     }
 
     /// The mean of a tile whose samples are rarely bright, 1 in the long run, and which stops by its noise; or where each half stops
@@ -168,12 +171,10 @@ mod tests {
             for half in 0..2 {
                 let goal = goals.of(0, if by_own { 1 - half } else { half }).min(target);
                 let samples = goal.saturating_sub(done[0][half]);
-                for y in (half as u32..4).step_by(2).filter(|_| samples > 0) {
-                    let rect = Rect { x: 0, y, width: 4, height: 1 };
-                    let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
-                    let radiance = (0..4 * samples).map(sample).collect();
-                    film.add(0, &TileSamples { rect, samples, radiance, negative: None });
-                }
+                let pixels = Pixels { rect: film.crop(), part: Part::Half(half) };
+                let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
+                let radiance = (0..8 * samples).map(sample).collect();
+                film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
                 done[0][half] += samples;
             }
             goals.judge(&film, &done, target, 0.6);

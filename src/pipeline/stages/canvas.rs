@@ -1,11 +1,13 @@
 //! A film with what it is of, and how far it is.
 
+use std::cmp::Reverse;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::super::plan::Plan;
-use super::super::trace::{Job, Rows};
+use super::super::trace::Job;
 use super::adaptive::Goals;
-use crate::film::{Film, FilmError, Previewer, RadianceImage, Rect};
+use crate::film::{CELLS, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
 use crate::scene::fingerprint::Key;
 
 /// A film that is being rendered, or that was.
@@ -13,8 +15,10 @@ use crate::scene::fingerprint::Key;
 pub(in crate::pipeline) struct Canvas {
     pub(in crate::pipeline) key: Key,
     pub(in crate::pipeline) film: Arc<Film>,
-    /// Samples that the even and the odd rows of each tile have.
+    /// Samples that both halves of each cell have; no more are to come for those without pixels.
     pub(super) done: Vec<[u32; 2]>,
+    /// Rays of each cell.
+    pub(super) rays: Vec<u64>,
     /// Samples that they are to have at most.
     pub(super) goals: Goals,
     /// A first picture at the size of the preview, shown where there are no samples yet.
@@ -35,10 +39,14 @@ impl Canvas {
     pub(super) fn new(key: Key, plan: &Plan, most_bytes: u64) -> Result<Self, FilmError> {
         let film =
             Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?;
-        let (done, goals) = (vec![[0; 2]; film.tile_count()], Goals::none(film.tile_count()));
+        let film_cells = film.cell_count();
+        let goals = Goals::none(film_cells);
+        let none = |cell| if film.cell_rect(cell).is_some() { [0; 2] } else { [u32::MAX; 2] };
+        let done = (0..film.cell_count()).map(none).collect();
         Ok(Self {
             key,
             film: Arc::new(film),
+            rays: vec![0; film_cells],
             done,
             goals,
             base: None,
@@ -56,13 +64,13 @@ impl Canvas {
     /// The same of the tiles of a part; none: of all.
     pub(super) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
         self.halves()
-            .filter(|(tile, _)| self.is_in(part, *tile))
+            .filter(|(cell, _)| self.is_in(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
     }
 
     /// Whether no pixel has more samples than these.
     pub(super) fn has_at_most(&self, samples: u32) -> bool {
-        self.done.as_flattened().iter().all(|done| *done <= samples)
+        self.halves().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
     /// Samples that every pixel has which is to have more, up to some.
@@ -76,28 +84,29 @@ impl Canvas {
             let done = self.done[tile][half];
             (done < self.goals.of(tile, half).min(most)).then_some(done)
         };
-        self.halves().filter(|(tile, _)| self.is_in(part, *tile)).filter_map(of).min().unwrap_or(most)
+        self.halves().filter(|(cell, _)| self.is_in(part, *cell)).filter_map(of).min().unwrap_or(most)
     }
 
-    /// Whether a tile has pixels in a part.
-    fn is_in(&self, part: Option<Rect>, tile: usize) -> bool {
+    /// Whether the tile of a cell has pixels in a part.
+    fn is_in(&self, part: Option<Rect>, cell: usize) -> bool {
         part.is_none_or(|part| {
-            self.film.tile_rect(tile).is_some_and(|rect| rect.intersection(&part).is_some())
+            self.film.tile_rect(cell / CELLS).is_some_and(|rect| rect.intersection(&part).is_some())
         })
     }
 
     /// Whether there are samples.
     pub(super) fn is_begun(&self) -> bool {
-        self.done.as_flattened().iter().any(|done| *done > 0)
+        self.halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
     /// Whether no pixel is without a sample, so that the picture may take the place of another one.
     pub(in crate::pipeline) fn is_covered(&self) -> bool {
-        self.done.as_flattened().iter().all(|done| *done > 0)
+        self.halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
 
     fn halves(&self) -> impl Iterator<Item = (usize, usize)> {
-        (0..self.done.len()).flat_map(|tile| [(tile, 0), (tile, 1)])
+        let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
+        halves.filter(|(cell, half)| self.film.half_pixel_count(*cell, *half) > 0)
     }
 
     /// Bytes that it takes.
@@ -107,31 +116,52 @@ impl Canvas {
         self.film.memory_bytes() + done + base + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// What brings every tile of a part (none: of all) to this many samples, or to those that it is to have: the tiles that lack
-    /// some, in the film's order.
-    pub(super) fn jobs(&self, part: Option<Rect>, target: u32) -> Vec<Job> {
+    /// What brings the halves of every cell of the tiles of a part (none: of all) to as many samples, or to those that they are to have: whole tiles, where all of them lack
+    /// the same, in the film's order.
+    pub(super) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<Job> {
+        let missing = |cell: usize, half: usize| {
+            self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))
+        };
         let mut jobs = Vec::new();
-        for &tile in self.film.tile_order().iter().filter(|tile| self.is_in(part, **tile)) {
-            let Some(rect) = self.film.tile_rect(tile) else { continue };
-            let [even, odd] = [0, 1].map(|half| self.done[tile][half]..self.goals.of(tile, half).min(target));
-            if even == odd {
-                jobs.push(Job { tile, rect, rows: Rows::All, samples: even });
-            } else {
-                let of = |(half, samples)| Job { tile, rect, rows: Rows::Half(half), samples };
-                jobs.extend([(0, even), (1, odd)].map(of));
+        for &tile in self.film.tile_order().iter().filter(|tile| self.is_in(part, CELLS * **tile)) {
+            let cells = (CELLS * tile..CELLS * (tile + 1))
+                .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
+            let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
+            let cells: Vec<(Rect, [Range<u32>; 2])> = cells.collect();
+            let job = |pixels, samples: &Range<u32>| Job { tile, pixels, samples: samples.clone() };
+            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(common(&cells)) {
+                jobs.push(job(rect.into(), samples));
+                continue;
+            }
+            for (rect, halves) in cells {
+                match &halves {
+                    [first, other] if first == other => jobs.push(job(rect.into(), first)),
+                    halves => jobs.extend(
+                        (0..2).map(|half| job(Pixels { rect, part: Part::Half(half) }, &halves[half])),
+                    ),
+                }
             }
         }
         jobs.retain(|job| !job.samples.is_empty());
+        // The longest first, so that all threads end at about the same time.
+        jobs.sort_by_key(|job| Reverse(job.samples.len()));
         jobs
     }
 
-    /// Note that a job is done; pixels times samples that it was.
-    pub(super) fn note(&mut self, job: &Job) -> u64 {
-        match job.rows {
-            Rows::All => self.done[job.tile] = [job.samples.end; 2],
-            Rows::Half(half) => self.done[job.tile][half] = job.samples.end,
+    /// Note that a job is done, and the rays that it took; pixels times samples that it was.
+    pub(super) fn note(&mut self, job: &Job, rays: u64) -> u64 {
+        for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
+            let rect = self.film.cell_rect(cell);
+            if rect.is_some_and(|rect| rect.intersection(&job.pixels.rect) == Some(rect)) {
+                self.rays[cell] +=
+                    rays * rect.map_or(0, |rect| rect.area() as u64) / job.pixels.rect.area() as u64;
+                match job.pixels.part {
+                    Part::All => self.done[cell] = [job.samples.end; 2],
+                    Part::Half(half) => self.done[cell][half] = job.samples.end,
+                }
+            }
         }
-        job.pixels() * job.samples.len() as u64
+        job.pixel_count() * job.samples.len() as u64
     }
 
     /// Decide which tiles have enough samples, of those that have this power of two of them.
@@ -150,10 +180,15 @@ impl Canvas {
     }
 
     fn units_of(&self, samples_of: impl Fn(usize, usize) -> u32) -> u64 {
-        let units = |(tile, half): (usize, usize)| {
-            let pixels = |rect| Rows::Half(half).pixels(rect);
-            self.film.tile_rect(tile).map_or(0, pixels) * u64::from(samples_of(tile, half))
+        let units = |(cell, half): (usize, usize)| {
+            self.film.half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
         };
         self.halves().map(units).sum()
     }
+}
+
+/// What all halves of all cells lack, if it is the same.
+fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
+    let (_, [first, _]) = cells.first()?;
+    cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
 }

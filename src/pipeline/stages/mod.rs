@@ -11,6 +11,7 @@ pub(super) mod parse;
 pub(super) mod photons;
 pub(super) mod preview;
 pub(super) mod render;
+mod spread;
 pub(super) mod textures;
 pub(super) mod world;
 pub(super) mod write;

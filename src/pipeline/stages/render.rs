@@ -13,14 +13,15 @@ use super::super::pace::{Clock, Pace};
 use super::super::plan::Plan;
 use super::super::protocol::{PreviewSize, RenderProgress, Section};
 use super::super::sink::Sink;
-use super::super::trace::{Job, Rows, Tracer, next_pass};
+use super::super::trace::{Job, Tracer, next_pass};
 use super::adaptive::LEAST;
 use super::canvas::Canvas;
 use super::films::Films;
 use super::photons::{PhotonStore, Sending};
 use super::preview::Screen;
+use super::spread::next_round;
 use super::{Staged, Stop};
-use crate::film::{RadianceImage, Rect, TileSamples};
+use crate::film::{RadianceImage, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
@@ -110,6 +111,8 @@ struct Painter<'a> {
     pace: Pace,
     fraction: f64,
     units: u64,
+    /// Of an earlier render.
+    units_before: u64,
     total_units: u64,
     rays: RayCounters,
     /// Whether some pixels have no sample yet: until they have, nothing but a cancel ends the render.
@@ -133,6 +136,7 @@ impl<'a> Painter<'a> {
             pace: Pace::new(units, total_units),
             fraction: 0.0,
             units,
+            units_before: units,
             total_units,
             rays: RayCounters::default(),
             is_over_time: false,
@@ -180,6 +184,10 @@ impl<'a> Painter<'a> {
     fn passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
         let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
         while !self.canvas.is_complete_in(part, samples) && !self.is_over_time {
+            if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
+                self.round(&goals)?;
+                continue;
+            }
             let target = next_pass(self.canvas.samples_in(part, samples), samples);
             self.pass(part, target)?;
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
@@ -193,7 +201,7 @@ impl<'a> Painter<'a> {
 
     /// All tiles of a part that have fewer samples than `target`.
     fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
-        let Some(photons) = self.rendering.photons else { return self.pass_by(part, target, None) };
+        let Some(photons) = self.rendering.photons else { return self.pass_by(part, |_, _| target, None) };
         while !self.canvas.is_complete_in(part, target) && !self.is_over_time {
             let samples = self.canvas.samples_in(part, target);
             let end = target.min(samples.saturating_add(photons.at_once()));
@@ -206,7 +214,7 @@ impl<'a> Painter<'a> {
             if self.is_over_time {
                 break;
             }
-            self.pass_by(part, end, Some(&maps))?;
+            self.pass_by(part, |_, _| end, Some(&maps))?;
         }
         Ok(())
     }
@@ -218,15 +226,53 @@ impl<'a> Painter<'a> {
         Ok(photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?)
     }
 
-    fn pass_by(&mut self, part: Option<Rect>, target: u32, photons: Option<&PhotonMaps>) -> Result<(), Stop> {
+    /// Samples that the halves of each tile are to have next, where there is a budget of time: some where they lower the error most.
+    /// Photons cost as much for the samples of one tile as for those of all, and an error asked for tells by itself where samples go.
+    fn next_round(&self) -> Option<Vec<[u32; 2]>> {
+        let Rendering { plan, photons, .. } = *self.rendering;
+        let Render { samples, error, .. } = plan.settings.render;
+        if plan.time_seconds.is_none() || photons.is_some() || error > 0.0 {
+            return None;
+        }
+        next_round(&self.canvas.film, &self.canvas.done, &self.canvas.rays, samples)
+    }
+
+    /// Bring the halves of all tiles to these samples, in steps that are short.
+    fn round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
+        const STEP: Duration = Duration::from_millis(30);
+        /// Pixels of half a tile.
+        const PIXELS: f64 = (TILE_SIZE * TILE_SIZE / 2) as f64;
+        let seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
+        let threads = self.rendering.tracer.pool.current_num_threads() as f64;
+        let rate = (self.units - self.units_before) as f64 / seconds / threads;
+        let most = ((rate * STEP.as_secs_f64() / PIXELS) as u32).max(16);
+        while !self.is_over_time {
+            let done = self.canvas.done.clone();
+            if done == goals {
+                break;
+            }
+            self.pass_by(
+                None,
+                |cell, half| goals[cell][half].min(done[cell][half].saturating_add(most)),
+                None,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn pass_by(
+        &mut self,
+        part: Option<Rect>,
+        target: impl Fn(usize, usize) -> u32,
+        photons: Option<&PhotonMaps>,
+    ) -> Result<(), Stop> {
         let jobs = self.canvas.jobs(part, target);
         let tracer = Tracer { photons, ..self.rendering.tracer };
         let film = Arc::clone(&self.canvas.film);
-        let keep =
-            |job: &Job, pieces: Vec<TileSamples>| pieces.iter().for_each(|piece| film.add(job.tile, piece));
+        let keep = |job: &Job, samples: TileSamples| film.add(job.tile, &samples);
         tracer.run(&jobs, keep, |result| {
             if let Some((job, (), rays)) = result {
-                self.units += self.canvas.note(job);
+                self.units += self.canvas.note(job, rays.all());
                 self.rays += rays;
             }
             self.tick();
@@ -344,10 +390,10 @@ impl<'a> Painter<'a> {
         let begin = Instant::now();
         tracer.run(
             &coarse_jobs(rect),
-            |_, pieces| pieces,
+            |_, piece| piece,
             |result| {
-                for piece in result.into_iter().flat_map(|(_, pieces, _)| pieces) {
-                    base.put(piece.rect, &piece.radiance);
+                if let Some((_, piece, _)) = result {
+                    base.put(piece.pixels.rect, &piece.radiance);
                 }
                 true
             },
@@ -378,7 +424,7 @@ fn coarse_jobs(rect: Rect) -> Vec<Job> {
     let starts = |start: u32, length: u32| (start..start + length).step_by(side as usize);
     let piece = |(x, y)| Rect { x, y, width: side, height: side }.intersection(&rect);
     let places = starts(rect.y, rect.height).flat_map(|y| starts(rect.x, rect.width).map(move |x| (x, y)));
-    let job = |(tile, rect)| Job { tile, rect, rows: Rows::All, samples: 0..1 };
+    let job = |(tile, rect): (usize, Rect)| Job { tile, pixels: rect.into(), samples: 0..1 };
     places.filter_map(piece).enumerate().map(job).collect()
 }
 
@@ -404,8 +450,8 @@ mod tests {
         let rect = Rect { x: 3, y: 5, width: 40, height: 17 };
         let mut seen = vec![0; 64 * 64];
         for job in coarse_jobs(rect) {
-            for y in job.rect.y..job.rect.y + job.rect.height {
-                for x in job.rect.x..job.rect.x + job.rect.width {
+            for y in job.pixels.rect.y..job.pixels.rect.y + job.pixels.rect.height {
+                for x in job.pixels.rect.x..job.pixels.rect.x + job.pixels.rect.width {
                     seen[(y * 64 + x) as usize] += 1;
                 }
             }

@@ -70,3 +70,34 @@ fn it_has_the_same_bits_whatever_the_threads_and_the_way_there() {
     pictures.push(bench.picture());
     assert!(pictures.iter().all(|picture| *picture == pictures[0]));
 }
+
+#[test]
+fn a_budget_of_time_puts_samples_where_they_lower_the_error_most() {
+    let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
+    bench.overrides.samples = Some(1 << 20);
+    let samples = [0.2, 0.8, 3.2, 12.8, 51.2].into_iter().find_map(|seconds| {
+        bench.overrides.time_seconds = Some(seconds);
+        let samples = bench.done().0.image.samples;
+        (samples.mean > 100.0).then_some(samples)
+    });
+    let samples = samples.expect("a machine that renders");
+    assert!(samples.min >= 4 && samples.max >= 8 * samples.min, "{samples:?}");
+}
+
+#[test]
+fn a_budget_of_time_that_suffices_changes_nothing() {
+    let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
+    bench.overrides.samples = Some(100);
+    bench.done();
+    let expected = bench.picture();
+    for threads in [1, 2, 7] {
+        let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
+        bench.overrides.samples = Some(100);
+        bench.overrides.threads = Some(threads);
+        bench.overrides.time_seconds = Some(1e4);
+        let report = bench.done().0;
+        assert!(report.image.complete);
+        assert_eq!((report.image.samples.min, report.image.samples.max), (100, 100));
+        assert_eq!(bench.picture(), expected);
+    }
+}

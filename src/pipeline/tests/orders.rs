@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::*;
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Rect, TileSamples};
+use crate::film::{Pixels, Rect, TileSamples};
 use crate::integrators::{RayCounters, RenderSettings};
 use crate::pipeline::engine::Means;
 use crate::pipeline::settings::View;
@@ -16,7 +16,7 @@ use crate::world::World;
 fn endless(
     _: &World,
     _: &RenderSettings,
-    _: Rect,
+    _: Pixels,
     _: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -76,12 +76,12 @@ static BREAKS: AtomicBool = AtomicBool::new(true);
 fn breaks_once(
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: Pixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     assert!(!BREAKS.swap(false, Ordering::SeqCst), "a tile broke");
-    KERNEL(world, settings, tile, samples, token)
+    KERNEL(world, settings, pixels, samples, token)
 }
 
 #[test]
@@ -97,12 +97,12 @@ static TILES: AtomicUsize = AtomicUsize::new(0);
 fn breaks_first(
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: Pixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile broke");
-    slow(world, settings, tile, samples, token)
+    slow(world, settings, pixels, samples, token)
 }
 
 #[test]
@@ -169,12 +169,12 @@ fn a_close_up_has_the_picture_s_own_pixels() {
 fn slow(
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: Pixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     std::thread::sleep(Duration::from_millis(2));
-    KERNEL(world, settings, tile, samples, token)
+    KERNEL(world, settings, pixels, samples, token)
 }
 
 #[test]
@@ -355,13 +355,13 @@ static HELD: AtomicBool = AtomicBool::new(false);
 fn held_between_passes(
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: Pixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     token.check()?;
     let first = samples.start == 0;
-    let done = KERNEL(world, settings, tile, samples, &CancelToken::new());
+    let done = KERNEL(world, settings, pixels, samples, &CancelToken::new());
     if first {
         // Long enough for every tile of the pass to be begun.
         std::thread::sleep(Duration::from_millis(50));

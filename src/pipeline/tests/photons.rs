@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Rect, TileSamples};
+use crate::film::{Pixels, TileSamples};
 use crate::integrators::{RayCounters, RenderSettings};
 use crate::world::World;
 
@@ -47,12 +47,12 @@ static WITHOUT: AtomicBool = AtomicBool::new(false);
 fn without(
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: Pixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     WITHOUT.store(true, Ordering::SeqCst);
-    KERNEL(world, settings, tile, samples, token)
+    KERNEL(world, settings, pixels, samples, token)
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Rect, TileSamples};
+use crate::film::{Pixels, TileSamples};
 use crate::integrators::{RayCounters, RenderSettings};
 use crate::output::FileIdentity;
 use crate::world::World;
@@ -107,7 +107,7 @@ static IS_LINKED: AtomicBool = AtomicBool::new(false);
 fn relinks(
     world: &World,
     settings: &RenderSettings,
-    tile: Rect,
+    pixels: Pixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -117,7 +117,7 @@ fn relinks(
         fs::remove_file(link).expect("removed");
         symlink("skin.ppm", link).expect("a link");
     }
-    KERNEL(world, settings, tile, samples, token)
+    KERNEL(world, settings, pixels, samples, token)
 }
 
 #[test]

@@ -1,0 +1,155 @@
+#!/usr/bin/env python3
+"""Samples where the noise is, beside the same number everywhere: seconds to the same relMSE.
+
+    python3 benches/adaptive/run.py [SCENE...] [--samples N] [--error E] [--seeds N] [--side PIXELS] [--glimt BINARY]
+
+Each scene is rendered with N samples everywhere, and in turns with `--time S`, for several parts S of the seconds that these took;
+the seconds at which it has the same relMSE are taken between two of them. With `--error E` it is rendered with that error asked for
+in place of a time, and the number of samples that is as good is looked for. A reference with many samples is rendered first. By
+itself: all bundled scenes, 256 samples, 3 seeds, 256 pixels along the longer side.
+"""
+
+import argparse
+import json
+import math
+import statistics
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+REFERENCE_TIMES = 32
+MOST = 65536
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", type=Path)
+    parser.add_argument("--samples", type=int, default=256)
+    parser.add_argument("--error", type=float)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--side", type=int, default=256)
+    parser.add_argument("--glimt", default=str(ROOT / "target" / "release" / "glimt"))
+    return parser.parse_args()
+
+
+class Render:
+    """Renders of one scene at one size, and what they are held against."""
+
+    def __init__(self, glimt, scene, side, folder):
+        with scene.open("rb") as file:
+            own = tomllib.load(file).get("render", {})
+        width, height = own.get("width", 640), own.get("height", 480)
+        scale = side / max(width, height)
+        size = [max(1, round(width * scale)), max(1, round(height * scale))]
+        self.call = [glimt, str(scene), "--once", "--progress", "none", "--width", str(size[0]), "--height", str(size[1])]
+        self.glimt = glimt
+        self.folder = Path(folder)
+        self.reference = self.folder / "reference.exr"
+
+    def run(self, name, options):
+        """Seconds of sampling and the mean number of samples."""
+        report = self.folder / "report.json"
+        command = [*self.call, "-o", str(self.folder / name), "--report", str(report), *map(str, options)]
+        subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+        told = json.loads(report.read_text())
+        seconds = sum(stage["seconds"] for stage in told["stages"] if stage["name"] in ("render", "photons"))
+        return seconds, told["image"]["samples"]["mean"]
+
+    def error(self):
+        command = [self.glimt, "compare", "--json", str(self.folder / "picture.exr"), str(self.reference)]
+        return json.loads(subprocess.run(command, check=True, capture_output=True).stdout)["relmse"]
+
+    def adaptive(self, error, seed):
+        seconds, samples = self.run("picture.exr", ["--error", error, "--samples", MOST, "--seed", seed])
+        return seconds, samples, self.error()
+
+    def fixed(self, samples, seed):
+        seconds, _ = self.run("picture.exr", ["--error", 0, "--samples", samples, "--seed", seed])
+        return seconds, self.error()
+
+
+def log_between(x, low, high):
+    """The second number where the first is x, along the line through two points on log axes."""
+    (x0, y0), (x1, y1) = low, high
+    if x0 == x1:
+        return math.sqrt(y0 * y1)
+    return y0 * (y1 / y0) ** (math.log(x / x0) / math.log(x1 / x0))
+
+
+def in_time(render, samples, seeds):
+    """Medians of the seconds of both, the samples of both, their ratio and the relMSE that they share."""
+    render.run("reference.exr", ["--error", 0, "--samples", REFERENCE_TIMES * samples, "--seed", 999])
+    parts = [0.3, 0.45, 0.65, 0.9, 1.1]
+    fixed, runs = [], {part: [] for part in parts}
+    for seed in range(1, seeds + 1):
+        fixed.append(render.fixed(samples, seed))
+        for part in parts:
+            budget = ["--time", max(0.001, part * fixed[-1][0]), "--samples", MOST, "--seed", seed]
+            seconds, mean = render.run("picture.exr", ["--error", 0, *budget])
+            runs[part].append((seconds / fixed[-1][0], render.error(), mean))
+    goal = statistics.fmean(run[1] for run in fixed)
+    points = [[statistics.fmean(run[1] for run in runs[part]), *(statistics.median(run[k] for run in runs[part]) for k in (0, 2))] for part in parts]
+    above = [k for k in range(len(parts) - 1) if points[k + 1][0] < goal]
+    k = above[0] if above else len(parts) - 2
+    ratio = log_between(goal, (points[k][0], points[k][1]), (points[k + 1][0], points[k + 1][1]))
+    mean = log_between(goal, (points[k][0], points[k][2]), (points[k + 1][0], points[k + 1][2]))
+    seconds = statistics.median(run[0] for run in fixed)
+    return ratio * seconds, seconds, ratio, mean, samples, goal
+
+
+def compared(render, error, seeds):
+    """Medians of the seconds of both, the samples of both, and the relMSE that they share."""
+    _, samples = render.run("picture.exr", ["--error", error, "--samples", MOST])
+    render.run("reference.exr", ["--error", 0, "--samples", min(MOST, max(1024, round(REFERENCE_TIMES * samples))), "--seed", 999])
+    tried = {}
+
+    def mean_of_fixed(count):
+        if count not in tried:
+            runs = [render.fixed(count, seed) for seed in range(1, seeds + 1)]
+            tried[count] = [statistics.fmean(run[1] for run in runs), [run[0] for run in runs]]
+        return tried[count]
+
+    runs = [render.adaptive(error, seed) for seed in range(1, seeds + 1)]
+    goal = statistics.fmean(run[2] for run in runs)
+    count = max(1, round(samples))
+    for _ in range(4):
+        reached = mean_of_fixed(count)[0]
+        if abs(reached / goal - 1) < 0.02:
+            break
+        count = max(1, round(count * reached / goal))
+    low, high = max(1, math.floor(count * 0.8)), math.ceil(count * 1.25)
+    mean_of_fixed(low), mean_of_fixed(high)
+    # In turns, as the machine may change its pace.
+    ratios = []
+    for seed in range(1, seeds + 1):
+        own = render.adaptive(error, seed)[0]
+        around = [(tried[n][0], render.fixed(n, seed)[0]) for n in (low, high)]
+        ratios.append((own, log_between(goal, *around)))
+    fixed_samples = log_between(goal, (tried[low][0], low), (tried[high][0], high))
+    own, fixed = (statistics.median(column) for column in zip(*ratios))
+    ratio = statistics.median(one / other for one, other in ratios)
+    return own, fixed, ratio, statistics.fmean(run[1] for run in runs), fixed_samples, goal
+
+
+def main():
+    asked = arguments()
+    scenes = asked.scenes or sorted((ROOT / "scenes").glob("*.toml"))
+    print(f"{'--time' if asked.error is None else f'error = {asked.error}'}, {asked.side} pixels, {asked.seeds} seeds")
+    print(f"{'':18} {'seconds':>9} {'samples':>9} {'fixed, s':>9} {'samples':>9} {'relMSE':>10} {'ratio':>7}")
+    for scene in scenes:
+        with tempfile.TemporaryDirectory() as folder:
+            render = Render(asked.glimt, scene, asked.side, folder)
+            if asked.error is None:
+                figures = in_time(render, asked.samples, asked.seeds)
+            else:
+                figures = compared(render, asked.error, asked.seeds)
+            own, fixed, ratio, samples, fixed_samples, goal = figures
+        print(f"{scene.stem:18} {own:9.3f} {samples:9.1f} {fixed:9.3f} {fixed_samples:9.1f} {goal:10.2e} {ratio:7.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+//! Halves of a cell that look alike: what one tells of its noise is true of the other too.
+
+use super::Rect;
+
+/// Some pixels of a rectangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pixels {
+    /// Where they are.
+    pub rect: Rect,
+    /// Which of those there.
+    pub part: Part,
+}
+
+impl From<Rect> for Pixels {
+    fn from(rect: Rect) -> Self {
+        Self { rect, part: Part::All }
+    }
+}
+
+impl Pixels {
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.part.count(self.rect.area())
+    }
+
+    /// Column and row in the picture of the pixel of a number.
+    pub fn place(&self, number: u32) -> (u32, u32) {
+        let index = self.part.index(number, self.rect);
+        (self.rect.x + index % self.rect.width, self.rect.y + index / self.rect.width)
+    }
+}
+
+/// All pixels of a rectangle, or half of them: one of every two neighbours in its rows, in turns the left and the right one, so
+/// that no edge, level, upright or aslant, lies in one half alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Every pixel.
+    All,
+    /// The first half, 0, or the other one, 1.
+    Half(usize),
+}
+
+impl Part {
+    /// How many of `area` pixels.
+    pub fn count(self, area: usize) -> usize {
+        match self {
+            Self::All => area,
+            Self::Half(half) => (area + 1 - half) / 2,
+        }
+    }
+
+    /// The place in the rectangle, row after row, of the pixel of a number.
+    #[inline(always)]
+    pub fn index(self, number: u32, rect: Rect) -> u32 {
+        match self {
+            Self::All => number,
+            // Of an odd number of pixels the last one is in the first half.
+            Self::Half(half) => {
+                (2 * number + (swaps(number, rect.width) ^ half as u32)).min(rect.area() as u32 - 1)
+            }
+        }
+    }
+
+    /// The half that a place in a rectangle is in.
+    pub fn half_of(index: u32, rect: Rect) -> usize {
+        let area = rect.area() as u32;
+        let is_alone = index + 1 == area && area % 2 == 1;
+        if is_alone { 0 } else { ((index & 1) ^ swaps(index / 2, rect.width)) as usize }
+    }
+}
+
+/// Whether the right one of a pair of neighbours is in the first half: every two rows it is the other one.
+#[inline(always)]
+fn swaps(pair: u32, width: u32) -> u32 {
+    pair / width & 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_have_every_pixel_once() {
+        for (width, height) in [(32, 32), (1, 1), (1, 7), (31, 32), (5, 5), (17, 30), (32, 1)] {
+            let rect = Rect { x: 3, y: 8, width, height };
+            let mut seen = vec![0; rect.area()];
+            for half in 0..2 {
+                let pixels = Pixels { rect, part: Part::Half(half) };
+                for number in 0..pixels.count() as u32 {
+                    let (x, y) = pixels.place(number);
+                    let index = (y - 8) * width + x - 3;
+                    assert_eq!(Part::half_of(index, rect), half, "{x} {y} of {rect:?}");
+                    seen[index as usize] += 1;
+                }
+            }
+            assert!(seen.iter().all(|times| *times == 1), "{rect:?}");
+        }
+    }
+
+    #[test]
+    fn lines_lie_in_both_halves() {
+        let rect = Rect { x: 0, y: 0, width: 8, height: 8 };
+        let half = |x: u32, y: u32| Part::half_of(y * 8 + x, rect);
+        let lines: [fn(u32, u32) -> (u32, u32); 4] = [
+            |line, at| (at, line),
+            |line, at| (line, at),
+            |line, at| (at, (at + line) % 8),
+            |line, at| (at, (line + 7 - at) % 8),
+        ];
+        for (i, place) in lines.into_iter().enumerate() {
+            for line in 0..8 {
+                let first = (0..8).map(|at| place(line, at)).filter(|&(x, y)| half(x, y) == 0).count();
+                assert_eq!(first, 4, "line {line} of kind {i}");
+            }
+        }
+    }
+}
