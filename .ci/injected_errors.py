@@ -28,6 +28,7 @@ pub fn injected(fault: &str) -> bool {
 GLOBAL = "closed_forms::global::"
 MANY = "closed_forms::many_lights::"
 PHOTONS = "closed_forms::photons::"
+CAUSTICS = "closed_forms::caustics::"
 
 # Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
 FAULTS = [
@@ -82,6 +83,8 @@ FAULTS = [
      "indirect", PHOTONS + "photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass"),
     ("photons that were not looked up not made up for", "integrators/photons/gather.rs", "sum += ⟦brought(row, i, (map, &look), measure) / chance⟧;",
      "brought(row, i, (map, &look), measure)", PHOTONS + "photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass"),
+    ("1 % too much light in a caustic", "integrators/photons/shoot.rs", "throughput: ⟦emitted.flux * shooting.share⟧,",
+     "emitted.flux * (1.01 * shooting.share)", CAUSTICS + "a_lamp_inside_glass_throws_the_light_that_paths_find"),
     ("photons leave smooth meshes as light does", "integrators/photons/shoot.rs",
      "let counts = ⟦row.landed(i, -rays[i].ray.direction)⟧;", "1.0",
      PHOTONS + "smooth_meshes_throw_back_what_photons_bring_as_paths_see_it"),
