@@ -94,11 +94,18 @@ class Subject:
         )
         return error
 
+    def noted(self, by, samples, seed, options):
+        """A render, noted on stderr: the last ones take minutes each."""
+        seconds, picture = self.render(samples, seed, options)
+        of = f"{self.rel_mse(picture):.3e} {self.brightness(picture):.5f}"
+        print(f"{self.scene.name} {by} {samples} seed {seed}: {seconds:.2f} {of}", file=sys.stderr, flush=True)
+        return seconds, picture
+
     def rows(self, by, counts, seeds, options=()):
         """Rows of ever more samples."""
         errors = {}
         for samples in counts:
-            runs = [self.render(samples, seed, options) for seed in range(seeds)]
+            runs = [self.noted(by, samples, seed, options) for seed in range(seeds)]
             before = next(((n, errors[n]) for n in reversed(errors)), None)
             seconds, pictures = zip(*runs)
             means = [self.brightness(picture) for picture in pictures]
@@ -124,6 +131,15 @@ def mitsuba(subject, samples=256):
     print(f"{subject.scene.name:12}Mitsuba needs {statistics.median(seconds) * error / GOAL:.1f} s to {GOAL}", flush=True)
 
 
+def last_slope(subject, errors):
+    """How the error falls over the last decade of passes, or nearly."""
+    last = max(errors)
+    first = max(1, last // 8)
+    if first < last:
+        slope = math.log(errors[last] / errors[first]) / math.log(last / first)
+        print(f"{subject.scene.name:12}slope from {first} to {last} passes {slope:+.2f}", flush=True)
+
+
 def powers(most):
     """1, 2, 4, … samples."""
     return [1 << k for k in range(most.bit_length()) if 1 << k <= most]
@@ -143,17 +159,13 @@ def main():
     by_paths = ["--integrator", "path"]
     if "caustic" in asked.names:
         subject = Subject(asked.glimt, CAUSTIC, square, asked.reference, True)
-        errors = subject.rows("photons", powers(asked.most), asked.seeds)
+        last_slope(subject, subject.rows("photons", powers(asked.most), asked.seeds))
         subject.rows("path", [256], 3, by_paths)
         mitsuba(subject)
-        last = asked.most
-        if last >= 16:
-            slope = math.log(errors[last] / errors[last // 8]) / math.log(8)
-            print(f"{subject.scene.name:12}slope from {last // 8} to {last} passes {slope:+.2f}")
     if "box" in asked.names:
         box = Scene(name="box", anchor=None, boxes=BLOCKS, max_depth=DEPTH, **BOX)
         subject = Subject(asked.glimt, box, square, asked.reference, False)
-        subject.rows("photons", powers(asked.most), asked.seeds)
+        last_slope(subject, subject.rows("photons", powers(asked.most), asked.seeds))
         subject.rows("path", [64, 256], asked.seeds, by_paths)
     if "large" in asked.names:
         settings = ["render.max_depth=30", "photons.bounces=30"]

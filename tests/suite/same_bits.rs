@@ -142,3 +142,29 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
     assert!(tried.contains(&Instructions::Portable.max(Instructions::Avx512.available())), "tried {tried:?}");
     assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
 }
+
+#[test]
+fn a_known_picture_with_photons_has_its_bits_by_all_threads_and_instructions() {
+    const KNOWN: u64 = 0x2b11_c876_ebd8_e18f;
+    let desk = Desk::new();
+    let text = EVERYTHING.replace("FILTER", "box").replace("INTEGRATOR", "whitted");
+    desk.write("all.toml", &format!("{text}[photons]\nenabled = true\ncount = 5000\n"));
+    let mut wrong = Vec::new();
+    for (name, instructions) in
+        [("portable", Instructions::Portable), ("avx2", Instructions::Avx2), ("avx512", Instructions::Avx512)]
+    {
+        if instructions.available() != instructions {
+            continue;
+        }
+        for threads in [1, 2, 7] {
+            let mut process = desk.glimt(&format!("all.toml --once -o all.exr --threads {threads}"));
+            let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
+            assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+            let found = hash(&desk, "all.exr");
+            if found != KNOWN {
+                wrong.push(format!("{name}, {threads} threads: {found:#018x}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
+}

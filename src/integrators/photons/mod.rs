@@ -18,6 +18,9 @@
 //! mirrors and glass, after a D, counts nothing. Light that comes from a caustic by one more surface arrives nearly everywhere, from
 //! a small place that paths hardly ever find: hence the photons that are thrown back. Scatterings of the eye's path, the vertex at which photons are
 //! gathered among them, and those of the photon are at most `max_depth` together.
+//!
+//! Kernels that hang over an edge of a surface lose what is beyond it: in a strip of width W along the edge 8r/15πW of the light, in the
+//! mean over the passes with their r, which goes to 0.
 
 pub(super) mod gather;
 mod map;

@@ -63,3 +63,15 @@ fn the_first_coarse_picture_has_photons() {
     assert!(bench.until_end(of).iter().any(|event| matches!(event, Event::Preview { .. })));
     assert!(!WITHOUT.load(Ordering::SeqCst));
 }
+
+#[test]
+fn maps_are_kept_while_there_is_room() {
+    const MOST: u64 = 128 << 20;
+    let mut bench = Bench::new(&wrapped(1_000_000).replace("samples = 4", "samples = 8"));
+    let report = bench.done().0.photons.expect("they are on");
+    assert_eq!(report.passes, 8);
+    let of_pass = report.used_memory_bytes;
+    assert!(8 * of_pass > MOST, "{of_pass} bytes a pass: all have room");
+    let kept = report.kept_memory_bytes;
+    assert!(kept <= MOST && kept + of_pass > MOST, "{kept} bytes kept of passes of {of_pass}");
+}

@@ -1,6 +1,7 @@
 //! The tracer against closed forms: each comment derives the right answer.
 
 mod camera;
+mod caustics;
 mod direct;
 mod distant;
 mod facets;

@@ -11,8 +11,9 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Falloff, Shape};
 
 use super::distant::sun;
+use super::glass::boxes;
 use super::global::{assert_near, by_paths};
-use super::scenes::{AS_IT_IS, Build, emitter, glass, matte, mirror, phong, scene};
+use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, phong, scene};
 use super::{mean_and_error, v};
 
 /// A box of quads with their fronts inside.
@@ -299,15 +300,38 @@ fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };
     let at_once = render(&all, whole, 0..4);
-    // A pass at a time, with its map alone.
-    for number in 0..4 {
-        let one = PhotonMaps { first: number, passes: vec![all.passes[number as usize].clone()] };
-        let own: Vec<_> = at_once.iter().skip(number as usize).step_by(4).copied().collect();
-        assert_eq!(render(&one, whole, number..number + 1), own, "pass {number}");
+    // Parts of the samples, with maps of their own alone.
+    for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
+        for part in cuts.windows(2) {
+            let samples = part[0]..part[1];
+            let (photons, _) =
+                Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
+            let maps = photons.maps(&world, &settings, samples.clone(), &token).expect("nobody cancels");
+            let own: Vec<_> = at_once
+                .chunks(4)
+                .flat_map(|pixel| &pixel[samples.start as usize..samples.end as usize])
+                .copied()
+                .collect();
+            assert_eq!(render(&maps, whole, samples.clone()), own, "samples {samples:?}");
+        }
     }
     // Rows of pixels alone.
     for y in 0..16 {
         let row = render(&all, Rect { x: 0, y, width: 16, height: 1 }, 0..4);
         assert_eq!(row, at_once[64 * y as usize..][..64], "row {y}");
     }
+}
+
+#[test]
+fn meshes_whose_files_say_that_they_are_of_glass_are_aimed_at() {
+    // The mesh fills about a hundredth of what its lamp sees.
+    let mesh = boxes(&[(DVec3::ZERO, 0.4, 0)]);
+    let build = room(|| matte(0.5))
+        .own_mesh(mesh, vec![file_material(9, 1.5)])
+        .point_light(v(0.9, 0.9, 0.9), 1.0, Falloff::Square)
+        .photons(1000, 0.1);
+    let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
+    let of_photons = settings.photons.expect("photons are on");
+    let (_, pass) = Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
+    assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

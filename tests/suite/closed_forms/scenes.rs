@@ -8,7 +8,7 @@ use glimt::assets::{FileMaterial, LoadedMesh};
 use glimt::control::{CancelToken, unwatched};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::{self, PhotonSettings, RenderSettings, View, render_tile_by};
+use glimt::integrators::{self, PhotonMaps, PhotonSettings, RenderSettings, View, render_tile_by};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
@@ -268,14 +268,29 @@ impl Build {
 
 /// Mean of the samples of each pixel.
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
+    tile_by(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
+}
+
+/// The maps of so many samples; none where no photons are gathered.
+pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
-    let maps = settings.heeded().photons.filter(|_| settings.gathers()).map(|of_photons| {
+    settings.heeded().photons.filter(|_| settings.gathers()).map(|of_photons| {
         let photons = integrators::Photons::new(world, settings, of_photons, &unwatched, &token);
         let (photons, _) = photons.expect("nobody cancels");
         photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")
-    });
-    let (tile, _) =
-        render_tile_by(maps.as_ref(), world, settings, rect, 0..samples, &token).expect("nobody cancels");
+    })
+}
+
+/// [`tile`] by maps that are there.
+pub fn tile_by(
+    maps: Option<&PhotonMaps>,
+    world: &World,
+    settings: &RenderSettings,
+    rect: Rect,
+    samples: u32,
+) -> Vec<DVec3> {
+    let token = CancelToken::new();
+    let (tile, _) = render_tile_by(maps, world, settings, rect, 0..samples, &token).expect("nobody cancels");
     let sums = tile.radiance.chunks(samples as usize);
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }
