@@ -5,6 +5,7 @@ mod json;
 mod plain;
 
 use super::args::Progress;
+pub(super) use self::bars::style;
 use super::console::Console;
 use crate::pipeline::protocol::Event;
 pub(super) use crate::pipeline::words::seconds;

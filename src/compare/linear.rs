@@ -8,7 +8,7 @@ use crate::math::Vec3;
 /// Of the pixels, one in so many is left out of the trimmed mean.
 const DROPPED_ONE_IN: usize = 1000;
 /// Keeps what is relative to a black reference finite.
-const LEAST: f64 = 0.01;
+pub(super) const LEAST: f64 = 0.01;
 
 pub(super) struct Linear {
     pub(super) rmse: f64,

@@ -19,6 +19,7 @@ use super::inputs::Inputs;
 use super::plan::{Plan, cores, plan, warnings};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
+use super::session::{Rendered, Unrendered};
 use super::settings::Overrides;
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel, needed};
@@ -39,6 +40,7 @@ use super::targets::{NamedBy, conflicts};
 use super::trace::{Kernel, Tracer};
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
+use crate::film::Quantity;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
@@ -150,6 +152,12 @@ impl Engine {
 
     /// Do what is asked for and say what came of it.
     pub(super) fn request(&mut self, request: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
+        let outcome = self.outcome(request, sink, meanwhile);
+        sink.send(outcome);
+    }
+
+    /// Do what is asked for; gives the event that ends it.
+    fn outcome(&mut self, request: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) -> Event {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
@@ -174,7 +182,7 @@ impl Engine {
         }
         self.say_files(&findings, sink);
         self.sweep(outcome.is_ok());
-        sink.send(match outcome {
+        match outcome {
             Ok(report) => {
                 let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
                 let is_same = shown(self) == before;
@@ -184,7 +192,34 @@ impl Engine {
             }
             Err(Stop::Cancelled) => Event::Cancelled { generation },
             Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
-        });
+        }
+    }
+
+    /// Do what is asked for; gives the picture as well, and what it is made of.
+    ///
+    /// # Errors
+    /// As the event that ends a request tells them.
+    pub(super) fn rendered(
+        &mut self,
+        request: &Request,
+        sink: &Sink,
+        meanwhile: &Meanwhile<'_>,
+    ) -> Result<Rendered, Unrendered> {
+        match self.outcome(request, sink, meanwhile) {
+            Event::Done { report, warnings, .. } => {
+                let canvas = self.films.current();
+                let Some(canvas) = canvas else { return Err(Unrendered::Failed(Failure::Work("the film is gone".to_owned()))) };
+                let image = canvas.film.image(Quantity::Radiance);
+                Ok(Rendered { image, report, warnings, key: canvas.key })
+            }
+            Event::Failed { failure, .. } => Err(Unrendered::Failed(failure)),
+            _ => Err(Unrendered::Cancelled),
+        }
+    }
+
+    /// Whether a path leads to a file that the last request read.
+    pub(super) fn reads(&self, path: &Path) -> bool {
+        self.inputs.contain(path)
     }
 
     /// Show the picture as it is at another size, outside of a request.
