@@ -56,7 +56,8 @@ pub fn changes(then: &Results, now: &Results) -> Vec<Change> {
 
 fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quantity) -> Option<Change> {
     let pairs = now.steps.iter().filter_map(|step| Some((twin(step, &then.steps)?, step)));
-    let differences: Vec<(f64, f64, f64)> = pairs.filter_map(|(old, new)| difference(old, new, quantity)).collect();
+    let differences: Vec<(f64, f64, f64)> =
+        pairs.filter_map(|(old, new)| difference(old, new, quantity)).collect();
     let count = differences.len() as f64;
     let mean = differences.iter().map(|(difference, ..)| difference).sum::<f64>() / count;
     let variances = || differences.iter().map(|(_, error, freedom)| (error * error, freedom));
@@ -109,12 +110,16 @@ fn difference(then: &Step, now: &Step, quantity: Quantity) -> Option<(f64, f64, 
 /// The lines that say it.
 pub fn lines(changes: &[Change], name: &str) -> Vec<String> {
     if changes.is_empty() {
-        return vec![format!("nothing of {name} can be compared: no scene, size, method and step is in both")];
+        return vec![format!(
+            "nothing of {name} can be compared: no scene, size, method and step is in both"
+        )];
     }
     let mut lines = vec![format!("against {name}, with 95 % confidence:")];
     lines.extend(changes.iter().map(line));
     let sure = (1.0 - FALSE_ALARMS) * 100.0;
-    lines.push(format!("not noise: less probable by chance than leaves {sure:.0} % confidence over all lines."));
+    lines.push(format!(
+        "not noise: less probable by chance than leaves {sure:.0} % confidence over all lines."
+    ));
     lines
 }
 
@@ -136,7 +141,11 @@ fn line(change: &Change) -> String {
 }
 
 fn chance(probability: f64) -> String {
-    if probability < 1e-6 { "(by chance < 1e-6)".to_owned() } else { format!("(by chance {probability:.0e})") }
+    if probability < 1e-6 {
+        "(by chance < 1e-6)".to_owned()
+    } else {
+        format!("(by chance {probability:.0e})")
+    }
 }
 
 #[cfg(test)]
@@ -158,7 +167,9 @@ mod tests {
     fn the_same_is_the_same() {
         let found = changes(&results(), &results());
         assert_eq!(found.len(), 2 * 2 * 2);
-        assert!(found.iter().all(|change| !change.is_real && change.factor == 1.0 && change.by_chance == 1.0));
+        assert!(
+            found.iter().all(|change| !change.is_real && change.factor == 1.0 && change.by_chance == 1.0)
+        );
         assert!(lines(&found, "old.json")[1].ends_with("time × 1.000 (1.000 to 1.000): the same"));
     }
 
@@ -167,11 +178,20 @@ mod tests {
         let slower = with(|picture, _| picture.seconds *= 1.5);
         let found = changes(&results(), &slower);
         let of = |quantity| found.iter().filter(move |change| change.quantity == quantity);
-        assert!(of(Quantity::Seconds).all(|change| change.is_real && (change.factor - 1.5).abs() < 1e-9), "{found:?}");
-        assert!(of(Quantity::Seconds).all(|change| change.interval[0] > 1.3 && change.interval[1] < 1.7), "{found:?}");
+        assert!(
+            of(Quantity::Seconds).all(|change| change.is_real && (change.factor - 1.5).abs() < 1e-9),
+            "{found:?}"
+        );
+        assert!(
+            of(Quantity::Seconds).all(|change| change.interval[0] > 1.3 && change.interval[1] < 1.7),
+            "{found:?}"
+        );
         assert!(of(Quantity::Error).all(|change| !change.is_real));
         let said = lines(&found, "old.json").join("\n");
-        assert!(said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (by chance"), "{said}");
+        assert!(
+            said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (by chance"),
+            "{said}"
+        );
         let noise = with(|picture, number| picture.seconds *= [1.05, 0.97, 0.99][number]);
         assert!(changes(&results(), &noise).iter().all(|change| !change.is_real));
     }
@@ -183,6 +203,9 @@ mod tests {
         other.scenes[1].methods[0].name = "other".to_owned();
         other.scenes[1].methods[1].steps.truncate(1);
         assert_eq!(changes(&other, &results()).len(), 2);
-        assert_eq!(lines(&[], "x.json"), ["nothing of x.json can be compared: no scene, size, method and step is in both"]);
+        assert_eq!(
+            lines(&[], "x.json"),
+            ["nothing of x.json can be compared: no scene, size, method and step is in both"]
+        );
     }
 }

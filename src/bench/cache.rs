@@ -20,6 +20,21 @@ pub fn folder() -> Option<PathBuf> {
     Some(caches.join("glimt").join("references"))
 }
 
+/// The scene that `glimt new` writes, as a file in this folder.
+///
+/// # Errors
+/// The folder cannot be made or the file not be written.
+pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
+    make(folder)?;
+    let path = folder.join("starter.toml");
+    write::atomic(&path, crate::scene::starter().as_bytes())?;
+    Ok(path)
+}
+
+fn make(folder: &Path) -> Result<(), OutputError> {
+    fs::create_dir_all(folder).map_err(|source| OutputError::File { path: folder.to_owned(), source })
+}
+
 /// Two references with what they cost.
 #[derive(Clone, Debug)]
 pub(super) struct Stored {
@@ -56,7 +71,8 @@ pub(super) fn load(folder: &Path, key: &Key) -> Option<Stored> {
     let Head { width, height, cost } = serde_json::from_slice(&content[..end]).ok()?;
     let (floats, _) = content[end + 1..].as_chunks();
     let values: Vec<f32> = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-    let pixels: Vec<Vec3> = values.as_chunks().0.iter().map(|pixel: &[f32; 3]| Vec3::from_array(*pixel)).collect();
+    let pixels: Vec<Vec3> =
+        values.as_chunks().0.iter().map(|pixel: &[f32; 3]| Vec3::from_array(*pixel)).collect();
     let count = width as usize * height as usize;
     if count == 0 || pixels.len() != 2 * count {
         return None;
@@ -72,7 +88,7 @@ pub(super) fn load(folder: &Path, key: &Key) -> Option<Stored> {
 /// The folder cannot be made or the file not be written.
 pub(super) fn store(folder: &Path, key: &Key, stored: &Stored) -> Result<(), OutputError> {
     let path = file(folder, key);
-    fs::create_dir_all(folder).map_err(|source| OutputError::File { path: folder.to_owned(), source })?;
+    make(folder)?;
     let (a, b) = (stored.pair.a(), stored.pair.b());
     let head = Head { width: a.width, height: a.height, cost: stored.cost };
     let mut bytes = serde_json::to_vec(&head)
@@ -99,7 +115,8 @@ mod tests {
     use super::*;
 
     fn stored() -> Stored {
-        let image = |value| RadianceImage { width: 3, height: 2, pixels: vec![Vec3::new(value, -0.5, 1e-30); 6] };
+        let image =
+            |value| RadianceImage { width: 3, height: 2, pixels: vec![Vec3::new(value, -0.5, 1e-30); 6] };
         let pair = Pair::new([Path::new("a"), Path::new("b")], image(1.0), image(2.0)).expect("a pair");
         Stored { pair, cost: Cost { samples: 12.5, seconds: 3.25 } }
     }

@@ -53,7 +53,9 @@ pub fn methods(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
 fn usual(scene: &Scene) -> Vec<Way> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
-    let of = |(integrator, photons)| way(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel);
+    let of = |(integrator, photons)| {
+        way(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
+    };
     ways.into_iter().map(of).collect()
 }
 
@@ -156,7 +158,8 @@ mod tests {
                 "whitted shadows hard"
             ]
         );
-        let accels = Toggles { accels: vec![Accel::Bvh, Accel::KdTree], clamps: vec![2.5], ..Toggles::default() };
+        let accels =
+            Toggles { accels: vec![Accel::Bvh, Accel::KdTree], clamps: vec![2.5], ..Toggles::default() };
         assert_eq!(self::names("", &accels), ["whitted clamp 2.5 bvh", "whitted clamp 2.5 kdtree"]);
     }
 
@@ -165,6 +168,9 @@ mod tests {
         let toggles = Toggles { integrators: vec![Integrator::Whitted], ..Toggles::default() };
         let method = methods(&scene("[render]\nclamp = 3\n[photons]\nenabled = true\n"), &toggles).remove(0);
         let overrides = &method.overrides;
-        assert_eq!((overrides.photons, overrides.shadows, overrides.clamp), (Some(true), Some(Shadows::Soft), Some(3.0)));
+        assert_eq!(
+            (overrides.photons, overrides.shadows, overrides.clamp),
+            (Some(true), Some(Shadows::Soft), Some(3.0))
+        );
     }
 }

@@ -7,6 +7,7 @@ pub mod baseline;
 mod bias;
 pub mod cache;
 pub mod csv;
+mod measure;
 mod methods;
 mod order;
 mod pace;

@@ -98,7 +98,8 @@ mod tests {
 
     #[test]
     fn time_is_shared_among_scenes_references_and_methods() {
-        let near = |value: f64, expected: f64| assert!((value - expected).abs() < 1.0, "{value}, not {expected}");
+        let near =
+            |value: f64, expected: f64| assert!((value - expected).abs() < 1.0, "{value}, not {expected}");
         let mut pace = Pace::new(1000.0, 2);
         pace.begin_scene(4);
         near(pace.of_references(), 300.0);

@@ -49,12 +49,28 @@ mod tests {
     fn it_is_xml_with_every_scene_method_and_axis() {
         let svg = svg(&results()).expect("a plot");
         let texts = texts(&svg);
-        for word in ["a.toml, 128×96", "b & <c>.toml, 128×96", "path, slope −1.00", "seconds of rendering", "relMSE", "10⁻²", "0.1"] {
+        for word in [
+            "a.toml, 128×96",
+            "b & <c>.toml, 128×96",
+            "path, slope −1.00",
+            "seconds of rendering",
+            "relMSE",
+            "10⁻²",
+            "0.1",
+        ] {
             assert!(texts.iter().any(|text| text == word), "{word} in {texts:?}");
         }
-        assert!(texts.iter().any(|text| text.starts_with("whitted, slope −0.") && text.ends_with("BIAS 1.0e-2")), "{texts:?}");
+        assert!(
+            texts.iter().any(|text| text.starts_with("whitted, slope −0.") && text.ends_with("BIAS 1.0e-2")),
+            "{texts:?}"
+        );
         let document = roxmltree::Document::parse(&svg).expect("XML");
-        let lines = |color: &str| document.descendants().filter(|node| node.has_tag_name("polyline") && node.attribute("stroke") == Some(color)).count();
+        let lines = |color: &str| {
+            document
+                .descendants()
+                .filter(|node| node.has_tag_name("polyline") && node.attribute("stroke") == Some(color))
+                .count()
+        };
         assert!(lines("#0072B2") >= 2 && lines("#D55E00") >= 2, "a line for each method in each panel");
         let root = document.root_element();
         assert_eq!((root.attribute("width"), root.attribute("height")), (Some("1280"), Some("480")));

@@ -110,8 +110,9 @@ impl Maker<'_> {
             seconds: first.report.seconds + second.report.seconds,
         };
         let names = ["the first reference", "the second reference"].map(Path::new);
-        let pair = Pair::new(names, first.image, second.image)
-            .map_err(|errors| Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")))?;
+        let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
+            Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        })?;
         let stored = Stored { pair, cost };
         let unkept = self.cache.and_then(|folder| cache::store(folder, key, &stored).err());
         Ok(reference(stored, false, first.warnings, unkept.map(|error| error.to_string())))
@@ -131,7 +132,12 @@ impl Maker<'_> {
     }
 }
 
-fn reference(stored: Stored, is_cached: bool, warnings: Vec<Diagnostic>, unkept: Option<String>) -> Reference {
+fn reference(
+    stored: Stored,
+    is_cached: bool,
+    warnings: Vec<Diagnostic>,
+    unkept: Option<String>,
+) -> Reference {
     let Stored { pair, cost } = stored;
     let two = TwoReferences::new(pair);
     let result = ReferenceResult {

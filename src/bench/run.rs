@@ -1,16 +1,15 @@
 //! Scene after scene, method after method, step after step, seed after seed.
 
-use super::bias::bias;
-use super::methods::{Method, methods};
+use std::path::Path;
+
+use super::measure::Measure;
+use super::methods::methods;
 use super::order::{News, Order, ReferenceOrder, Steps, Trouble};
 use super::pace::Pace;
 use super::reference::{Amount, Maker, Reference, SEEDS, given};
-use super::results::{MethodResult, Picture, Results, SceneResult, Step};
-use super::statistics::median;
-use crate::compare::TwoReferences;
+use super::results::{Results, SceneResult};
 use crate::control::CancelToken;
-use crate::film::RadianceImage;
-use crate::pipeline::protocol::{Failure, Report, Stage};
+use crate::pipeline::protocol::Failure;
 use crate::pipeline::session::Session;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
@@ -19,10 +18,6 @@ use crate::scene::description::Scene;
 
 /// Pixels on the longer side where nothing else is said.
 const LONG_SIDE: u32 = 128;
-/// The most that a ladder without given steps climbs to.
-const MOST_SAMPLES: u32 = 1 << 16;
-/// From step to step of it.
-const FACTOR: u32 = 4;
 
 /// Measure what the order asks for.
 ///
@@ -31,7 +26,8 @@ const FACTOR: u32 = 4;
 pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Results, Trouble> {
     check_seeds(order)?;
     let mut pace = Pace::new(order.within, order.scenes.len());
-    let mut results = Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
+    let mut results =
+        Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
     for path in &order.scenes {
         let scene = Run { order, path, token, tell }.scene(&mut pace, &mut results.threads)?;
         results.scenes.push(scene);
@@ -74,10 +70,10 @@ fn check_seeds(order: &Order) -> Result<(), Trouble> {
 }
 
 /// What a scene is measured with.
-struct Run<'a> {
-    order: &'a Order,
-    path: &'a std::path::Path,
-    token: &'a CancelToken,
+pub(super) struct Run<'a> {
+    pub(super) order: &'a Order,
+    pub(super) path: &'a Path,
+    pub(super) token: &'a CancelToken,
     tell: &'a dyn Fn(News),
 }
 
@@ -113,14 +109,11 @@ impl Run<'_> {
             Some(reference) => (reference.two.pair().a().width, reference.two.pair().a().height),
             None => size(scene, (order.width, order.height)),
         };
-        let common = Overrides {
-            width: Some(width),
-            height: Some(height),
-            error: Some(0.0),
-            ..order.common.clone()
-        };
+        let common =
+            Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
         self.begins("reading", None);
-        let maker = Maker { scene: self.path, common: &common, token: self.token, cache: order.cache.as_deref() };
+        let maker =
+            Maker { scene: self.path, common: &common, token: self.token, cache: order.cache.as_deref() };
         let mut session = Session::default();
         let key = maker.key(&mut session)?;
         self.check_targets(&session)?;
@@ -169,12 +162,12 @@ impl Run<'_> {
         self.done(&format!("references of {width}×{height} pixels {made}, relMSE {:.1e} each", result.noise));
     }
 
-    fn begins(&self, what: &str, left: Option<f64>) {
+    pub(super) fn begins(&self, what: &str, left: Option<f64>) {
         let what = format!("{}: {what}", self.path.display());
         (self.tell)(News::Begins { what, left });
     }
 
-    fn done(&self, what: &str) {
+    pub(super) fn done(&self, what: &str) {
         (self.tell)(News::Done(format!("{}: {what}", self.path.display())));
     }
 }
@@ -189,162 +182,33 @@ impl Steps {
     }
 }
 
-/// One step that is to be made.
-#[derive(Clone, Copy)]
-struct Aim {
-    index: u32,
-    samples: u32,
-    budget: Option<f64>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// A method on a scene.
-struct Measure<'a> {
-    run: &'a Run<'a>,
-    common: &'a Overrides,
-    method: &'a Method,
-    two: &'a TwoReferences,
-}
-
-impl Measure<'_> {
-    fn measure(&self, pace: &Pace, threads: &mut usize) -> Result<MethodResult, Trouble> {
-        let mut session = Session::default();
-        // What is made once is made here, and the first picture that counts finds warm caches.
-        let begin = Aim { index: 0, samples: 1, budget: None };
-        let first = self.render(&mut session, SEEDS[0], begin)?;
-        *threads = first.1.settings.threads;
-        let mut steps: Vec<Step> = Vec::new();
-        let mut took = Vec::new();
-        while let Some(aim) = self.next(&steps, &took, pace) {
-            let before = pace.of_method();
-            steps.push(self.step(&mut session, aim, pace, &took)?);
-            took.push(pace.of_method() - before);
-        }
-        Ok(MethodResult::new(self.method.name.clone(), setup(&first.1), steps))
-    }
-
-    /// What comes after these steps, which took so many seconds each.
-    fn next(&self, steps: &[Step], took: &[f64], pace: &Pace) -> Option<Aim> {
-        let index = steps.len() as u32;
-        match &self.run.order.steps {
-            Steps::Samples(list) => {
-                list.get(steps.len()).map(|&samples| Aim { index, samples, budget: None })
-            }
-            Steps::Seconds(list) => {
-                let aim = |&seconds| Aim { index, samples: u32::MAX, budget: Some(seconds) };
-                list.get(steps.len()).map(aim)
-            }
-            Steps::Climb => {
-                let samples = FACTOR.checked_pow(index).filter(|samples| *samples <= MOST_SAMPLES)?;
-                let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(FACTOR));
-                let has_time = pace.of_method() + expected <= pace.allowance();
-                (index == 0 || has_time).then_some(Aim { index, samples, budget: None })
-            }
-        }
-    }
-
-    fn step(&self, session: &mut Session, aim: Aim, pace: &Pace, took: &[f64]) -> Result<Step, Trouble> {
-        let seeds = self.run.order.seeds;
-        let (mut pictures, mut images): (Vec<Picture>, Vec<RadianceImage>) = Default::default();
-        for number in 0..seeds {
-            let seed = self.run.order.seed + aim.index * seeds + number;
-            self.say_picture(aim, number, pace, took, &pictures);
-            let (image, report) = self.render(session, seed, aim)?;
-            let relmse = self.two.error(&image);
-            if !relmse.is_finite() {
-                let name = &self.method.name;
-                return Err(Trouble::Failed(Failure::Work(format!("{name}: the error of seed {seed} is not finite"))));
-            }
-            pictures.push(Picture { seed, samples: report.image.samples.mean, seconds: rendering(&report), relmse });
-            images.push(image);
-        }
-        let step = summary(aim, pictures, &images, self.two);
-        let (seconds, samples) = (words::seconds(step.seconds), step.samples);
-        self.run.done(&format!("{}, {samples:.0} samples: {seconds}, relMSE {:.2e}", self.method.name, step.relmse));
-        Ok(step)
-    }
-
-    fn say_picture(&self, aim: Aim, number: u32, pace: &Pace, took: &[f64], pictures: &[Picture]) {
-        let order = self.run.order;
-        let amount = match aim.budget {
-            Some(seconds) => words::seconds(seconds),
-            None => format!("{} samples", aim.samples),
+    #[test]
+    fn pictures_have_the_aspect_of_the_scene() {
+        let of = |width, height, asked| {
+            let mut scene =
+                Scene::clone(&scene::load(Path::new("scenes/cornell.toml"), &[]).expect("a scene").scene);
+            (scene.render.width, scene.render.height) = (width, height);
+            size(&scene, asked)
         };
-        let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, order.seeds);
-        // Of one picture of this step, by those before it or by the step before.
-        let each = match (pictures, took.last()) {
-            ([.., last], _) => Some(last.seconds),
-            ([], Some(step)) => Some(self.growth(aim) * step / f64::from(order.seeds)),
-            ([], None) => None,
-        };
-        let to_come = f64::from(order.seeds - number);
-        let left = each.map(|each| pace.left(each * (to_come + f64::from(order.seeds) * self.later(aim)), false));
-        self.run.begins(&what, left);
+        assert_eq!(of(640, 480, (None, None)), (128, 96));
+        assert_eq!(of(480, 640, (None, None)), (96, 128));
+        assert_eq!(of(64, 32, (None, None)), (64, 32), "none is larger than its scene");
+        assert_eq!(of(65536, 1, (None, None)), (128, 1));
+        assert_eq!(of(640, 480, (Some(40), None)), (40, 30));
+        assert_eq!(of(640, 480, (None, Some(30))), (40, 30));
+        assert_eq!(of(640, 480, (Some(7), Some(9))), (7, 9));
     }
 
-    /// How much longer a step takes than the one before.
-    fn growth(&self, aim: Aim) -> f64 {
-        let index = aim.index as usize;
-        match &self.run.order.steps {
-            Steps::Climb => f64::from(FACTOR),
-            Steps::Samples(list) => f64::from(list[index]) / f64::from(list[index - 1]),
-            Steps::Seconds(list) => list[index] / list[index - 1],
-        }
+    #[test]
+    fn no_picture_has_the_seed_of_a_reference() {
+        let order = |seed| Order { seed, seeds: 6, ..Order::default() };
+        assert!(check_seeds(&order(1)).is_ok());
+        assert!(check_seeds(&order(u32::MAX - 6 * 64 - 2)).is_ok());
+        let Err(Trouble::Call(message)) = check_seeds(&order(u32::MAX - 6 * 64)) else { panic!("refused") };
+        assert!(message.contains("choose a smaller --seed"), "{message}");
     }
-
-    /// The steps after this one, in times of it.
-    fn later(&self, aim: Aim) -> f64 {
-        let index = aim.index as usize;
-        match &self.run.order.steps {
-            Steps::Climb => 0.0,
-            Steps::Samples(list) => {
-                let sum: f64 = list[index + 1..].iter().map(|samples| f64::from(*samples)).sum();
-                sum / f64::from(list[index])
-            }
-            Steps::Seconds(list) => list[index + 1..].iter().sum::<f64>() / list[index],
-        }
-    }
-
-    fn render(&self, session: &mut Session, seed: u32, aim: Aim) -> Result<(RadianceImage, Box<Report>), Trouble> {
-        let Overrides { integrator, photons, shadows, clamp, accel, .. } = self.method.overrides.clone();
-        let overrides = Overrides {
-            integrator,
-            photons,
-            shadows,
-            clamp,
-            accel,
-            seed: Some(seed),
-            samples: Some(aim.samples),
-            time_seconds: aim.budget,
-            ..self.common.clone()
-        };
-        let rendered = session.render(self.run.path, &overrides, self.run.token)?;
-        Ok((rendered.image, rendered.report))
-    }
-}
-
-fn summary(aim: Aim, pictures: Vec<Picture>, images: &[RadianceImage], two: &TwoReferences) -> Step {
-    let of = |value: fn(&Picture) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
-    let errors = of(|picture| picture.relmse);
-    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = errors.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    Step {
-        samples: median(&of(|picture| picture.samples)),
-        budget: aim.budget,
-        seconds: median(&of(|picture| picture.seconds)),
-        relmse: median(&errors),
-        spread: [least, most],
-        uncertainty: images.first().map_or(0.0, |image| two.uncertainty(image)),
-        bias: bias(two, images),
-        pictures,
-    }
-}
-
-/// Seconds of what every picture takes: its photons and its rays.
-fn rendering(report: &Report) -> f64 {
-    [Stage::Photons, Stage::Render].map(|stage| report.stages[stage as usize].seconds).iter().sum()
-}
-
-/// Seconds of what is done once: all before.
-fn setup(report: &Report) -> f64 {
-    report.stages[..Stage::Photons as usize].iter().map(|stage| stage.seconds).sum()
 }

@@ -96,9 +96,12 @@ mod tests {
     /// Tables of Student's t: one-sided.
     #[test]
     fn student_is_as_in_tables() {
-        for (freedom, probability, t) in
-            [(1.0, 0.05, 6.313_752), (5.0, 0.001, 5.893_430), (10.0, 0.025, 2.228_139), (100.0, 0.01, 2.364_217)]
-        {
+        for (freedom, probability, t) in [
+            (1.0, 0.05, 6.313_752),
+            (5.0, 0.001, 5.893_430),
+            (10.0, 0.025, 2.228_139),
+            (100.0, 0.01, 2.364_217),
+        ] {
             assert!((above(t, freedom) / probability - 1.0).abs() < 1e-5, "{freedom}: {}", above(t, freedom));
             assert!((quantile(probability, freedom) - t).abs() < 1e-4, "{}", quantile(probability, freedom));
         }

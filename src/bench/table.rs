@@ -7,8 +7,8 @@ use crate::pipeline::words;
 /// The lines.
 pub fn table(results: &Results) -> Vec<String> {
     let mut lines: Vec<String> = results.scenes.iter().flat_map(of_scene).collect();
-    lines.push("seconds and relMSE are medians over the seeds, with the least and the greatest relMSE;".to_owned());
-    lines.push("a product of the two that stays the same is the noise of random samples.".to_owned());
+    lines.push("seconds and relMSE: medians over the seeds; least, greatest: of relMSE; their".to_owned());
+    lines.push("product stays the same where random samples make the error.".to_owned());
     lines
 }
 
@@ -30,14 +30,14 @@ fn of_scene(scene: &SceneResult) -> Vec<String> {
     lines.push(String::new());
     for method in &scene.methods {
         lines.push(format!("{}: {}", method.name, speed(method)));
-        lines.push(format!("  {}", verdict(method)));
+        lines.extend(times(method).into_iter().chain([verdict(method)]).map(|line| format!("  {line}")));
     }
     lines.push(String::new());
     lines
 }
 
 fn references(reference: &ReferenceResult, scene: &SceneResult) -> String {
-    let noise = format!("relMSE of each {}", error(reference.noise));
+    let noise = format!("noise {}", error(reference.noise));
     let Some(samples) = reference.samples else {
         return match reference.files.as_slice() {
             [one] => format!("reference: {one}, alone: its own noise is read as error"),
@@ -74,16 +74,25 @@ pub(super) fn error(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }
 
-/// Set-up, slope and the times to the usual errors.
 fn speed(method: &MethodResult) -> String {
-    let mut parts = vec![format!("set-up {}", words::seconds(method.setup_seconds))];
-    parts.extend(method.slope.map(|slope| format!("slope {}", signed(slope))));
+    let slope = method.slope.map_or(String::new(), |slope| format!(", slope {}", signed(slope)));
+    format!("set-up {}{slope}", words::seconds(method.setup_seconds))
+}
+
+/// When it reaches the usual errors.
+fn times(method: &MethodResult) -> Option<String> {
     let times = TARGETS.iter().zip(method.time_to).filter_map(|(target, time)| Some((target, time?)));
-    parts.extend(times.map(|(target, TimeTo { seconds, is_measured })| {
+    let parts = times.map(|(target, TimeTo { seconds, is_measured })| {
         let about = if is_measured { "" } else { "about " };
         format!("{target:.0e} in {about}{}", words::seconds(seconds))
-    }));
-    parts.join(", ")
+    });
+    let parts: Vec<String> = parts.collect();
+    (!parts.is_empty()).then(|| format!("relMSE {}", parts.join(", ")))
+}
+
+/// `1 sample`
+pub(super) fn samples(samples: f64) -> String {
+    format!("{} sample{}", count(samples), if samples == 1.0 { "" } else { "s" })
 }
 
 /// `−0.98 ± 0.02`
@@ -94,7 +103,7 @@ pub(super) fn signed(Slope { value, error }: Slope) -> String {
 
 /// What is known of its bias.
 fn verdict(method: &MethodResult) -> String {
-    let at = method.steps.last().map_or(String::new(), |step| format!(" at {} samples", count(step.samples)));
+    let at = method.steps.last().map_or(String::new(), |step| format!(" at {}", samples(step.samples)));
     let percent = |share: f64| format!("{:.0} % of the error", share * 100.0);
     match method.verdict {
         Verdict::Unknown => "too few seeds to tell a bias".to_owned(),
@@ -103,7 +112,8 @@ fn verdict(method: &MethodResult) -> String {
             format!("a bias that falls with the samples: {}, {}{at}", error(size), percent(share))
         }
         Verdict::Stays { size, share } => {
-            let last = method.last_slope.map_or(String::new(), |slope| format!(", last slope {}", signed(slope)));
+            let last =
+                method.last_slope.map_or(String::new(), |slope| format!(", last slope {}", signed(slope)));
             format!("BIAS: {}, {}{at}{last}", error(size), percent(share))
         }
     }
@@ -119,12 +129,17 @@ mod tests {
         let lines = table(&results());
         assert!(lines.iter().all(|line| line.chars().count() <= 80), "{}", lines.join("\n"));
         assert_eq!(lines[0], "a.toml, 128×96 pixels, 3 seeds");
-        assert_eq!(lines[1], "references: path, 2 × 4096 samples (64 × the most), relMSE of each 1.00e-5");
+        assert_eq!(lines[1], "references: path, 2 × 4096 samples (64 × the most), noise 1.00e-5");
         assert_eq!(lines[3], "method   samples   seconds     relMSE     least  greatest s × relMSE");
         assert_eq!(lines[4], "path           1     10 ms    2.00e-1   1.80e-1   2.20e-1    2.00e-3");
-        assert_eq!(lines[13], "path: set-up 3.0 ms, slope −1.00 ± 0.00, 1e-2 in 200 ms, 1e-3 in about 2.00 s, 1e-4 in about 20.0 s");
-        assert!(lines[14].starts_with("  no bias found: it is below 1.00e-8 at 64 samples"), "{}", lines[14]);
-        assert!(lines[16].starts_with("  BIAS: 1.00e-2, 97 % of the error at 64 samples, last slope −0.0"), "{}", lines[16]);
+        assert_eq!(lines[13], "path: set-up 3.0 ms, slope −1.00 ± 0.00");
+        assert_eq!(lines[14], "  relMSE 1e-2 in 200 ms, 1e-3 in about 2.00 s, 1e-4 in about 20.0 s");
+        assert_eq!(lines[15], "  no bias found: it is below 1.00e-8 at 64 samples");
+        assert!(
+            lines[17].starts_with("  BIAS: 1.00e-2, 97 % of the error at 64 samples, last slope −0.0"),
+            "{}",
+            lines[17]
+        );
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! `glimt bench`: what time buys, as a table, as CSV, as JSON, as a plot.
 
+mod chart;
 mod outputs;
 mod progress;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -18,10 +19,8 @@ use crate::bench::baseline::{changes, lines};
 use crate::bench::table::table;
 use crate::bench::{self, News, Order, ReferenceOrder, Results, Steps, Toggles, Trouble, cache};
 use crate::control::CancelToken;
-use crate::output::write;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
-use crate::scene::starter;
 
 /// Between two looks for a signal.
 const TICK: Duration = Duration::from_millis(50);
@@ -47,6 +46,7 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     said.end();
     let results = results.map_err(|trouble| troubled(&trouble, &ended, &said, console))?;
     table(&results).iter().for_each(|line| console.answer(line));
+    chart::show(&results, console);
     if let Some((name, then)) = &baseline {
         lines(&changes(then, &results), name).iter().for_each(|line| console.answer(line));
     }
@@ -55,9 +55,11 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     Ok(ended.by().map_or(Exit::DONE, Exit::signal))
 }
 
+/// The thread that measures.
+type Work = JoinHandle<Result<Results, Trouble>>;
+
 /// The work on a thread of its own, and what it says.
-#[allow(clippy::type_complexity)] // a thread that gives what `bench::run` gives
-fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, JoinHandle<Result<Results, Trouble>>)> {
+fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, Work)> {
     let (sender, news) = mpsc::channel();
     let tell = move |one: News| {
         // A front end that is gone need not be told.
@@ -87,7 +89,7 @@ fn broken() -> Trouble {
 fn troubled(trouble: &Trouble, ended: &Ended, said: &Said, console: &Console) -> Exit {
     if let Some(number) = ended.by() {
         if let Some(signal) = signals::name(number) {
-            said.failed("cancelled", &format!("ended by {signal}: nothing was written; finished references are kept"));
+            said.cancelled(&format!("ended by {signal}: nothing was written; finished references are kept"));
         }
         return Exit::signal(number);
     }
@@ -116,7 +118,11 @@ fn troubled(trouble: &Trouble, ended: &Ended, said: &Said, console: &Console) ->
 /// From what was typed to what it means.
 fn order(args: &BenchArgs, console: &Console) -> Result<Order, Exit> {
     let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::folder) };
-    let scenes = if args.scenes.is_empty() { vec![own_scene(console)?] } else { args.scenes.clone() };
+    let scenes = if args.scenes.is_empty() {
+        vec![own_scene(folder.as_deref(), console)?]
+    } else {
+        args.scenes.clone()
+    };
     if let Some((_, twice)) = (0..).zip(&scenes).find(|(index, scene)| scenes[..*index].contains(scene)) {
         return Err(console.fail(Exit::WRONG, &format!("{} is given twice", twice.display())));
     }
@@ -177,12 +183,9 @@ fn reference(args: &BenchArgs, scenes: usize, console: &Console) -> Result<Refer
 }
 
 /// The scene that `glimt new` writes, beside the references.
-fn own_scene(console: &Console) -> Result<PathBuf, Exit> {
-    let Some(folder) = cache::folder() else {
-        return Err(console.fail(Exit::WRONG, "no scene is given; see glimt bench --help"));
-    };
-    let path = folder.join("starter.toml");
-    let made = std::fs::create_dir_all(&folder).map_err(|error| format!("cannot make {}: {error}", folder.display()));
-    let written = made.and_then(|()| write::atomic(&path, starter().as_bytes()).map_err(|error| error.to_string()));
-    written.map(|()| path).map_err(|message| console.fail(Exit::FAILED, &message))
+fn own_scene(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
+    match folder.map(cache::starter) {
+        Some(made) => made.map_err(|error| console.fail(Exit::FAILED, &error.to_string())),
+        None => Err(console.fail(Exit::WRONG, "no scene is given; see glimt bench --help")),
+    }
 }

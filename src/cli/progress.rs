@@ -4,8 +4,8 @@ mod bars;
 mod json;
 mod plain;
 
-use super::args::Progress;
 pub(super) use self::bars::style;
+use super::args::Progress;
 use super::console::Console;
 use crate::pipeline::protocol::Event;
 pub(super) use crate::pipeline::words::seconds;

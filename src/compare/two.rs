@@ -110,7 +110,7 @@ mod tests {
         let references = references(0.0);
         assert_eq!(references.noise(), 0.0);
         let error = references.error(&picture(3, 0.0, 0.1));
-        assert!((error - 0.01 * WEIGHT).abs() < 1e-8, "{error}");
+        assert!((error - 0.01 * WEIGHT).abs() < 1e-6, "{error}");
         assert_eq!(references.uncertainty(&picture(3, 0.0, 0.1)), 0.0);
     }
 
@@ -135,6 +135,6 @@ mod tests {
         let references = references(0.02);
         let cross = |offset| references.cross(&picture(5, 0.2, offset), &picture(6, 0.2, offset));
         assert!((cross(0.1) / (0.01 * WEIGHT) - 1.0).abs() < 0.1, "{}", cross(0.1));
-        assert!(cross(0.0).abs() < 0.02 * references.error(&picture(5, 0.2, 0.0)), "{}", cross(0.0));
+        assert!(cross(0.0).abs() < 0.04 * references.error(&picture(5, 0.2, 0.0)), "{}", cross(0.0));
     }
 }

@@ -15,13 +15,15 @@ impl Axis {
     /// Around these values; those that are not above 0 are on no log axis.
     pub(super) fn around(values: impl Iterator<Item = f64>) -> Self {
         let logs = values.filter(|value| *value > 0.0 && value.is_finite()).map(libm::log10);
-        let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| (low.min(log), high.max(log)));
+        let (low, high) =
+            logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| (low.min(log), high.max(log)));
         let (low, high) = if low > high { (-1.0, 1.0) } else { (low, high) };
         let margin = 0.06 * (high - low).max(0.5);
         let range = low - margin..high + margin;
         let powers = |factors: &[f64]| -> Vec<f64> {
             let whole = range.start.floor() as i32..=range.end.ceil() as i32;
-            let all = whole.flat_map(|power| factors.iter().map(move |factor| f64::from(power) + libm::log10(*factor)));
+            let all = whole
+                .flat_map(|power| factors.iter().map(move |factor| f64::from(power) + libm::log10(*factor)));
             all.filter(|mark| range.contains(mark)).collect()
         };
         let marks = powers(&[1.0]);
@@ -101,7 +103,7 @@ mod tests {
         assert_eq!(names, ["0.02", "0.05", "0.1", "0.2"]);
         let names: Vec<String> = near.marks.iter().map(|mark| power(*mark)).collect();
         assert_eq!(names, ["2·10⁻²", "5·10⁻²", "10⁻¹", "2·10⁻¹"]);
-        assert_eq!(Axis::around([].into_iter()).marks.len(), 6);
+        assert_eq!(Axis::around([].into_iter()).marks, [-1.0, 0.0, 1.0]);
         assert_eq!((plain(2.0).as_str(), plain(-12.0).as_str()), ("100", "10⁻¹²"));
     }
 }

@@ -32,7 +32,8 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Fai
     let steps = || scene.methods.iter().flat_map(|method| &method.steps);
     let noise = scene.reference.noise;
     let across = Axis::around(steps().map(|step| step.seconds));
-    let up = Axis::around(steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]).chain([noise]));
+    let up =
+        Axis::around(steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]).chain([noise]));
     let mut chart = ChartBuilder::on(place)
         .caption(format!("{}, {}×{}", scene.scene, scene.width, scene.height), ("sans-serif", 20))
         .margin(14)
@@ -104,10 +105,15 @@ fn bars<'c, 'a: 'c>(
 }
 
 /// The medians, and the method's place in the legend.
-fn line<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, method: &MethodResult, number: usize) -> Result<(), Failed<'a>> {
+fn line<'c, 'a: 'c>(
+    chart: &mut Chart<'c, 'a>,
+    method: &MethodResult,
+    number: usize,
+) -> Result<(), Failed<'a>> {
     let color = color(number);
     let seen = method.steps.iter().filter(|step| step.relmse > 0.0);
-    let points: Vec<(f64, f64)> = seen.map(|step| (libm::log10(step.seconds), libm::log10(step.relmse))).collect();
+    let points: Vec<(f64, f64)> =
+        seen.map(|step| (libm::log10(step.seconds), libm::log10(step.relmse))).collect();
     let sample = move |(x, y): (i32, i32)| {
         let line = PathElement::new([(x, y), (x + 20, y)], color.stroke_width(2));
         EmptyElement::at((0, 0)) + line + marker((x + 10, y), number)

@@ -30,8 +30,13 @@ enum Kind {
 impl Outputs {
     /// What can be told before the work is said.
     pub(super) fn of(args: &BenchArgs, scenes: &[PathBuf], console: &Console) -> Result<Self, Exit> {
-        let all = [("--csv", &args.csv, Kind::Csv), ("--json", &args.json, Kind::Json), ("--plot", &args.plot, Kind::Plot)];
-        let files: Vec<_> = all.into_iter().filter_map(|(option, file, kind)| Some((option, file.clone()?, kind))).collect();
+        let all = [
+            ("--csv", &args.csv, Kind::Csv),
+            ("--json", &args.json, Kind::Json),
+            ("--plot", &args.plot, Kind::Plot),
+        ];
+        let files: Vec<_> =
+            all.into_iter().filter_map(|(option, file, kind)| Some((option, file.clone()?, kind))).collect();
         let scenes = scenes.iter().map(|scene| ("a scene of this call", scene.clone()));
         let references = args.reference.iter().map(|file| ("a reference of this call", file.clone()));
         let baseline = args.baseline.iter().map(|file| ("the baseline of this call", file.clone()));
@@ -50,7 +55,8 @@ impl Outputs {
         self.may_replace(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
         if matches!(kind, Kind::Plot) && !is_svg {
-            let reason = format!("cannot write {}: the plot is an SVG; use a name that ends in .svg", path.display());
+            let reason =
+                format!("cannot write {}: the plot is an SVG; use a name that ends in .svg", path.display());
             return Err(OutputError::Refused { reason });
         }
         output::check_place(path)
@@ -62,7 +68,10 @@ impl Outputs {
         let is_it = |path: &Path| FileIdentity::of(path).as_ref() == Some(&identity);
         let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
-            let reason = format!("cannot write {}: it is {what}; name another file with {option} FILE", path.display());
+            let reason = format!(
+                "cannot write {}: it is {what}; name another file with {option} FILE",
+                path.display()
+            );
             Err(OutputError::Refused { reason })
         };
         if let Some((what, _)) = self.inputs.iter().find(|(_, input)| is_it(input)) {

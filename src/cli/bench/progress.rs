@@ -133,10 +133,20 @@ impl Said {
         }
     }
 
+    pub(super) fn cancelled(&self, message: &str) {
+        if self.is_for_people() {
+            self.console.say(message);
+        } else {
+            object(&json!({ "event": "cancelled" }));
+        }
+    }
+
     pub(super) fn written(&self, path: &Path, bytes: usize) {
         match self.way {
             Way::Bar(_) | Way::Plain => self.console.say(&format!("wrote {}", path.display())),
-            Way::Json => object(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes })),
+            Way::Json => {
+                object(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }))
+            }
             Way::Silent => {}
         }
     }

@@ -208,7 +208,9 @@ impl Engine {
         match self.outcome(request, sink, meanwhile) {
             Event::Done { report, warnings, .. } => {
                 let canvas = self.films.current();
-                let Some(canvas) = canvas else { return Err(Unrendered::Failed(Failure::Work("the film is gone".to_owned()))) };
+                let Some(canvas) = canvas else {
+                    return Err(Unrendered::Failed(Failure::Work("the film is gone".to_owned())));
+                };
                 let image = canvas.film.image(Quantity::Radiance);
                 Ok(Rendered { image, report, warnings, key: canvas.key })
             }
