@@ -77,9 +77,10 @@ pub(super) struct Maker<'a> {
 
 impl Maker<'_> {
     /// A picture of one sample shows what a reference depends on, and that everything can be read.
-    pub(super) fn key(&self, session: &mut Session) -> Result<Key, Trouble> {
+    /// References of a number of samples that was asked for are kept beside those that time made.
+    pub(super) fn key(&self, session: &mut Session, asked: Option<u32>) -> Result<Key, Trouble> {
         let mut key = Fingerprint::new("references");
-        key.text(env!("CARGO_PKG_VERSION"));
+        key.text(env!("CARGO_PKG_VERSION")).u64(asked.unwrap_or(0).into());
         for seed in SEEDS {
             key.key(&self.render(session, seed, Amount { samples: 1, seconds: None })?.key);
         }

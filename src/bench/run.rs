@@ -115,7 +115,11 @@ impl Run<'_> {
         let maker =
             Maker { scene: self.path, common: &common, token: self.token, cache: order.cache.as_deref() };
         let mut session = Session::default();
-        let key = maker.key(&mut session)?;
+        let asked = match &order.reference {
+            ReferenceOrder::Samples(samples) => Some(*samples),
+            ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
+        };
+        let key = maker.key(&mut session, asked)?;
         self.check_targets(&session)?;
         let amount = match (&order.reference, of_files) {
             (_, Some(reference)) => return Ok((reference, common)),

@@ -21,6 +21,7 @@ use crate::bench::{self, News, Order, ReferenceOrder, Results, Steps, Toggles, T
 use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
+use crate::scene::diagnostic::Diagnostic;
 
 /// Between two looks for a signal.
 const TICK: Duration = Duration::from_millis(50);
@@ -98,7 +99,7 @@ fn troubled(trouble: &Trouble, ended: &Ended, said: &Said, console: &Console) ->
             if said.is_for_people() {
                 console.diagnostics(diagnostics);
             } else {
-                let messages: Vec<_> = diagnostics.iter().map(|one| one.message.as_str()).collect();
+                let messages: Vec<_> = diagnostics.iter().map(in_a_line).collect();
                 said.failed("scene", &messages.join("; "));
             }
             Exit::WRONG
@@ -113,6 +114,10 @@ fn troubled(trouble: &Trouble, ended: &Ended, said: &Said, console: &Console) ->
         }
         Trouble::Cancelled => Exit::FAILED,
     }
+}
+
+fn in_a_line(diagnostic: &Diagnostic) -> String {
+    format!("{}: {}", diagnostic.path.display(), diagnostic.message)
 }
 
 /// From what was typed to what it means.

@@ -12,14 +12,15 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Around these values; those that are not above 0 are on no log axis.
-    pub(super) fn around(values: impl Iterator<Item = f64>) -> Self {
+    /// Around these values, with a part of it left free at its beginning; values that are not above 0 are on no log axis.
+    pub(super) fn around(values: impl Iterator<Item = f64>, free: f64) -> Self {
         let logs = values.filter(|value| *value > 0.0 && value.is_finite()).map(libm::log10);
         let (low, high) =
             logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| (low.min(log), high.max(log)));
         let (low, high) = if low > high { (-1.0, 1.0) } else { (low, high) };
         let margin = 0.06 * (high - low).max(0.5);
-        let range = low - margin..high + margin;
+        let length = (high - low + 2.0 * margin) / (1.0 - free);
+        let range = high + margin - length..high + margin;
         let powers = |factors: &[f64]| -> Vec<f64> {
             let whole = range.start.floor() as i32..=range.end.ceil() as i32;
             let all = whole
@@ -50,9 +51,12 @@ impl Ranged for Axis {
     }
 }
 
-/// `10⁻³`, `2·10⁻³`
+/// `10⁻³`, `2·10⁻³`, `5`
 pub(super) fn power(mark: f64) -> String {
     let (factor, whole) = parts(mark);
+    if whole == 0 {
+        return factor.to_string();
+    }
     let digits = format!("{whole}").chars().map(superscript).collect::<String>();
     if factor == 1 { format!("10{digits}") } else { format!("{factor}·10{digits}") }
 }
@@ -96,14 +100,17 @@ mod tests {
 
     #[test]
     fn marks_are_whole_powers_or_few_digits() {
-        let far = Axis::around([1e-5, 0.3].into_iter());
+        let far = Axis::around([1e-5, 0.3].into_iter(), 0.0);
         assert_eq!(far.marks, [-5.0, -4.0, -3.0, -2.0, -1.0]);
-        let near = Axis::around([0.02, 0.3, -1.0, f64::NAN].into_iter());
+        let near = Axis::around([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
         let names: Vec<String> = near.marks.iter().map(|mark| plain(*mark)).collect();
         assert_eq!(names, ["0.02", "0.05", "0.1", "0.2"]);
         let names: Vec<String> = near.marks.iter().map(|mark| power(*mark)).collect();
         assert_eq!(names, ["2·10⁻²", "5·10⁻²", "10⁻¹", "2·10⁻¹"]);
-        assert_eq!(Axis::around([].into_iter()).marks, [-1.0, 0.0, 1.0]);
+        assert_eq!(Axis::around([].into_iter(), 0.0).marks, [-1.0, 0.0, 1.0]);
+        let half = Axis::around([1e-2, 1.0].into_iter(), 0.5).range;
+        assert!((half.start + 4.36).abs() < 1e-9 && (half.end - 0.12).abs() < 1e-9, "{half:?}");
+        assert_eq!(power(libm::log10(5.0)), "5");
         assert_eq!((plain(2.0).as_str(), plain(-12.0).as_str()), ("100", "10⁻¹²"));
     }
 }

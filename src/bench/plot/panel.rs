@@ -31,9 +31,9 @@ type Chart<'c, 'a> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Failed<'a>> {
     let steps = || scene.methods.iter().flat_map(|method| &method.steps);
     let noise = scene.reference.noise;
-    let across = Axis::around(steps().map(|step| step.seconds));
-    let up =
-        Axis::around(steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]).chain([noise]));
+    let across = Axis::around(steps().map(|step| step.seconds), 0.0);
+    let errors = steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]);
+    let up = Axis::around(errors.chain([noise]), of_legend(scene.methods.len()));
     let mut chart = ChartBuilder::on(place)
         .caption(format!("{}, {}×{}", scene.scene, scene.width, scene.height), ("sans-serif", 20))
         .margin(14)
@@ -60,6 +60,11 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Fai
         line(&mut chart, method, number)?;
     }
     legend(&mut chart)
+}
+
+/// The part of the height that the legend has for itself.
+fn of_legend(methods: usize) -> f64 {
+    (0.05 * (methods as f64 + 1.0) + 0.08).min(0.6)
 }
 
 fn color(number: usize) -> RGBColor {
