@@ -24,6 +24,7 @@
 //! | [`compare`] | the error of a picture against a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
 //! | [`pipeline`] | stages, caches, the worker, watching files |
+//! | [`bench`] | run time against error: references, estimates, tables, plots |
 //! | [`tui`] | the terminal front end |
 //! | [`cli`] | arguments, the headless front end |
 //!
@@ -50,8 +51,9 @@
 //! compare     -> assets film math control
 //! output      -> film math control system
 //! pipeline    -> integrators world assets scene film output lights materials math choice control system
+//! bench       -> pipeline compare output scene film math choice control
 //! tui         -> pipeline scene film math choice
-//! cli         -> pipeline tui compare output scene film choice control
+//! cli         -> bench pipeline tui compare output scene film choice control system
 //! ```
 //!
 //! ## What holds everywhere
@@ -65,12 +67,13 @@
 //!   meshes from one of their own.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
 //! - Files are touched in `assets`, `output`, `scene` (the scene, and whether what it names is there),
-//!   `pipeline::watch` and `cli::new` alone.
+//!   `pipeline::watch`, `bench::cache` and `cli::new` alone.
 //! - `unsafe` code is in `accel::wide_bvh::simd` alone, with a portable twin that gives the same bits.
 //! - `tui` does not know `world`; `world` does not know pixels or time.
 
 pub mod accel;
 pub mod assets;
+pub mod bench;
 pub mod choice;
 pub mod cli;
 pub mod compare;

@@ -1,5 +1,7 @@
 //! What can be typed.
 
+mod bench;
+
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
@@ -7,6 +9,7 @@ use clap::Parser;
 use clap::builder::styling::{AnsiColor, Styles};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+pub use self::bench::BenchArgs;
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
@@ -22,6 +25,7 @@ Examples:
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
   glimt compare a.exr reference.exr       the error of one picture against another
+  glimt bench ball.toml --plot plot.svg   what time buys: the error of each method against its seconds
 
 The scene that `glimt new` writes has every key, with comments.
 A scene that is named like a command is given with its folder: glimt ./check
@@ -53,6 +57,7 @@ impl Args {
     pub(super) fn color(&self) -> ColorChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
+            Some(Subcommand::Bench(bench)) => bench.color,
             Some(Subcommand::New { .. } | Subcommand::Compare(_)) | None => self.render.color,
         }
     }
@@ -80,6 +85,9 @@ pub enum Subcommand {
     /// Measure the error of a picture against a reference
     #[command(after_help = COMPARE_HELP)]
     Compare(CompareArgs),
+    /// Measure what time buys: the error of methods against their seconds, over several seeds
+    #[command(after_help = bench::HELP)]
+    Bench(Box<BenchArgs>),
 }
 
 const COMPARE_HELP: &str = "\

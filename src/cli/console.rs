@@ -37,6 +37,14 @@ impl Console {
         Self { style, is_terminal: is_terminal && !is_dumb, lost: Rc::default() }
     }
 
+    /// Whether messages have colours.
+    pub(super) fn is_colored(&self) -> bool {
+        match self.style {
+            Style::Ansi => true,
+            Style::Plain => false,
+        }
+    }
+
     /// A line on stderr; a line end within the text becomes visible.
     pub(super) fn say(&self, text: &str) {
         let line = format!("{}\n", visible(text));

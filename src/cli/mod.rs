@@ -3,6 +3,7 @@
 //! What was typed ([`args`]) is turned into what it means (`lower`) before anything is done.
 
 pub mod args;
+mod bench;
 mod check;
 mod compare;
 mod console;
@@ -37,6 +38,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Check { scene, sets, .. }) => check::run(&scene, &sets, &console),
         Some(Subcommand::New { file }) => new::run(&file, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
+        Some(Subcommand::Bench(args)) => bench::run(&args, &console),
         None => match lower::lower(args.render) {
             Ok(order) if order.is_once => once::run(&order, &console),
             Ok(order) => live::run(order, &console),

@@ -4,6 +4,7 @@ mod bars;
 mod json;
 mod plain;
 
+pub(super) use self::bars::style;
 use super::args::Progress;
 use super::console::Console;
 use crate::pipeline::protocol::Event;

@@ -12,10 +12,12 @@ mod linear;
 mod pair;
 mod plane;
 mod tiles;
+mod two;
 
 pub use diff::{absolute, heat};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
+pub use two::TwoReferences;
 
 /// How far the first picture of a pair is from the second, its reference. Means are over pixels and channels.
 #[derive(Clone, Debug, PartialEq)]

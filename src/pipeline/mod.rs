@@ -15,6 +15,7 @@ mod pace;
 mod plan;
 pub mod protocol;
 mod report;
+pub mod session;
 pub mod settings;
 mod sink;
 mod stages;

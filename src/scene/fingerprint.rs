@@ -35,6 +35,13 @@ impl<T: Fingerprinted> Fingerprinted for Option<T> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Key([u8; 32]);
 
+impl std::fmt::Display for Key {
+    /// Small hexadecimal digits.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
 /// Takes inputs one after another; numbers count by their bits.
 #[derive(Debug)]
 pub struct Fingerprint(blake3::Hasher);

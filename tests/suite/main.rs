@@ -1,5 +1,6 @@
 //! The program as a whole: one crate, so that it links once.
 
+mod bench;
 mod broken;
 mod bytes;
 mod closed_forms;

@@ -78,6 +78,6 @@ impl Reporter for Bars {
 }
 
 /// A style by its template; should it not be understood, the library's own.
-fn style(template: &str) -> ProgressStyle {
+pub(in crate::cli) fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

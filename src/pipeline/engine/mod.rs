@@ -1,6 +1,7 @@
 //! One request from the scene file to pictures on disk: the stages in their order, and all that is kept between
 //! requests.
 
+mod outcome;
 mod outputs;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use self::outcome::Outcome;
 use self::unfinished::Unfinished;
 use super::cache::{Memo, Pool};
 use super::errands::{AtHand, Errand};
@@ -157,6 +159,28 @@ impl Engine {
     /// Do what is asked for and say what came of it.
     pub(super) fn request(&mut self, request: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
         let generation = request.generation;
+        let outcome = self.outcome(request, sink, meanwhile);
+        let is_broken = matches!(outcome, Err(Stop::Failed(Failure::Scene(_))));
+        sink.send(match outcome {
+            Ok(Outcome { report, warnings, unchanged }) => {
+                Event::Done { generation, report: Box::new(report), warnings, unchanged }
+            }
+            Err(Stop::Cancelled) => Event::Cancelled { generation },
+            Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
+        });
+        if is_broken {
+            self.go_on(request, sink, meanwhile);
+        }
+    }
+
+    /// Do what is asked for.
+    fn outcome(
+        &mut self,
+        request: &Request,
+        sink: &Sink,
+        meanwhile: &Meanwhile<'_>,
+    ) -> Result<Outcome, Stop> {
+        let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
         let shown = |engine: &Self| {
@@ -182,21 +206,11 @@ impl Engine {
         // What was read to the end stays for whoever comes next, even if the render was stopped.
         let is_read = self.unfinished.as_ref().is_some_and(|it| it.request.generation == generation);
         self.sweep(outcome.is_ok() || is_read);
-        let is_broken = matches!(outcome, Err(Stop::Failed(Failure::Scene(_))));
-        sink.send(match outcome {
-            Ok(report) => {
-                let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-                let is_same = shown(self) == before;
-                let unchanged = is_same && settled(Stage::Render) && settled(Stage::Write);
-                let warnings = [findings.conflicts, findings.warnings].concat();
-                Event::Done { generation, report: Box::new(report), warnings, unchanged }
-            }
-            Err(Stop::Cancelled) => Event::Cancelled { generation },
-            Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
-        });
-        if is_broken {
-            self.go_on(request, sink, meanwhile);
-        }
+        let report = outcome?;
+        let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
+        let unchanged = shown(self) == before && settled(Stage::Render) && settled(Stage::Write);
+        let warnings = [findings.conflicts, findings.warnings].concat();
+        Ok(Outcome { report, warnings, unchanged })
     }
 
     /// Show the picture as it is at another size, outside of a request.

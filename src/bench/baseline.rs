@@ -1,0 +1,211 @@
+//! What became slower or worse since an older run, and whether that is more than chance.
+
+use super::results::{MethodResult, Results, Step};
+use super::statistics::{above, quantile, welch};
+
+/// The part of all comparisons without a change in which one is called a change, over the whole table.
+const FALSE_ALARMS: f64 = 0.01;
+
+/// How one quantity of a method on a scene changed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// The scene.
+    pub scene: String,
+    /// The method.
+    pub method: String,
+    /// What changed.
+    pub quantity: Quantity,
+    /// Now over then: the geometric mean over the steps.
+    pub factor: f64,
+    /// Where the factor lies with 95 % confidence.
+    pub interval: [f64; 2],
+    /// The probability of as large a change, either way, by chance.
+    pub by_chance: f64,
+    /// Whether that is less than chance explains, over all comparisons.
+    pub is_real: bool,
+}
+
+/// What is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Seconds of rendering.
+    Seconds,
+    /// relMSE.
+    Error,
+}
+
+/// All that both runs have: scenes of the same name and size, methods of the same name, steps of the same samples.
+pub fn changes(then: &Results, now: &Results) -> Vec<Change> {
+    let mut changes = Vec::new();
+    for scene in &now.scenes {
+        let is_same = |other: &&super::SceneResult| {
+            (&other.scene, other.width, other.height) == (&scene.scene, scene.width, scene.height)
+        };
+        let Some(before) = then.scenes.iter().find(is_same) else { continue };
+        for method in &scene.methods {
+            let Some(old) = before.methods.iter().find(|old| old.name == method.name) else { continue };
+            for quantity in [Quantity::Seconds, Quantity::Error] {
+                changes.extend(change(&scene.scene, old, method, quantity));
+            }
+        }
+    }
+    let threshold = FALSE_ALARMS / changes.len().max(1) as f64;
+    changes.iter_mut().for_each(|change| change.is_real = change.by_chance < threshold);
+    changes
+}
+
+fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quantity) -> Option<Change> {
+    let pairs = now.steps.iter().filter_map(|step| Some((twin(step, &then.steps)?, step)));
+    let differences: Vec<(f64, f64, f64)> =
+        pairs.filter_map(|(old, new)| difference(old, new, quantity)).collect();
+    let count = differences.len() as f64;
+    let mean = differences.iter().map(|(difference, ..)| difference).sum::<f64>() / count;
+    let variances = || differences.iter().map(|(_, error, freedom)| (error * error, freedom));
+    let variance: f64 = variances().map(|(square, _)| square).sum();
+    let weights: f64 = variances().map(|(square, freedom)| square * square / freedom).sum();
+    let error = variance.sqrt() / count;
+    let freedom = if weights > 0.0 { variance * variance / weights } else { 1.0 };
+    let by_chance = match (error > 0.0, mean == 0.0) {
+        (true, _) => 2.0 * above(mean.abs() / error, freedom),
+        (false, true) => 1.0,
+        (false, false) => 0.0,
+    };
+    let reach = quantile(0.025, freedom) * error;
+    (count > 0.0).then(|| Change {
+        scene: scene.to_owned(),
+        method: now.name.clone(),
+        quantity,
+        factor: libm::exp(mean),
+        interval: [libm::exp(mean - reach), libm::exp(mean + reach)],
+        by_chance,
+        is_real: false,
+    })
+}
+
+/// The older step of the same samples, or of the same time.
+fn twin<'a>(step: &Step, then: &'a [Step]) -> Option<&'a Step> {
+    then.iter().find(|old| match (step.budget, old.budget) {
+        (None, None) => old.samples == step.samples,
+        (now, then) => now == then,
+    })
+}
+
+/// Of the logarithms, with its standard error and degrees of freedom. None, where too few have a logarithm.
+fn difference(then: &Step, now: &Step, quantity: Quantity) -> Option<(f64, f64, f64)> {
+    let of = |step: &Step| -> Vec<f64> {
+        let values = step.pictures.iter().map(|picture| match quantity {
+            Quantity::Seconds => picture.seconds,
+            Quantity::Error => picture.relmse,
+        });
+        values.filter(|value| *value > 0.0).map(libm::log).collect()
+    };
+    let (old, new) = (of(then), of(now));
+    if old.len() < 2 || new.len() < 2 {
+        return None;
+    }
+    // The same pictures have the same errors: that is no chance.
+    if old == new { Some((0.0, 0.0, 1.0)) } else { Some(welch(&old, &new)) }
+}
+
+/// The lines that say it.
+pub fn lines(changes: &[Change], name: &str) -> Vec<String> {
+    if changes.is_empty() {
+        return vec![format!(
+            "nothing of {name} can be compared: no scene, size, method and step is in both"
+        )];
+    }
+    let mut lines = vec![format!("against {name}, with 95 % confidence:")];
+    lines.extend(changes.iter().map(line));
+    let sure = (1.0 - FALSE_ALARMS) * 100.0;
+    lines.push(format!(
+        "not noise: less probable by chance than leaves {sure:.0} % confidence over all lines."
+    ));
+    lines
+}
+
+fn line(change: &Change) -> String {
+    let Change { scene, method, factor, interval: [low, high], .. } = change;
+    let quantity = match change.quantity {
+        Quantity::Seconds => "time",
+        Quantity::Error => "error",
+    };
+    let said = match (change.is_real, change.quantity, *factor > 1.0) {
+        (false, _, _) if change.by_chance >= 1.0 => "the same".to_owned(),
+        (false, _, _) => "noise".to_owned(),
+        (true, Quantity::Seconds, true) => format!("SLOWER {}", chance(change.by_chance)),
+        (true, Quantity::Seconds, false) => format!("faster {}", chance(change.by_chance)),
+        (true, Quantity::Error, true) => format!("WORSE {}", chance(change.by_chance)),
+        (true, Quantity::Error, false) => format!("better {}", chance(change.by_chance)),
+    };
+    format!("  {scene}, {method}: {quantity} × {factor:.3} ({low:.3} to {high:.3}): {said}")
+}
+
+fn chance(probability: f64) -> String {
+    if probability < 1e-6 {
+        "(by chance < 1e-6)".to_owned()
+    } else {
+        format!("(by chance {probability:.0e})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::results::tests::results;
+    use super::*;
+
+    fn with(scale: impl Fn(&mut super::super::Picture, usize)) -> Results {
+        let mut changed = results();
+        for method in changed.scenes.iter_mut().flat_map(|scene| &mut scene.methods) {
+            for step in &mut method.steps {
+                (0..).zip(&mut step.pictures).for_each(|(number, picture)| scale(picture, number));
+            }
+        }
+        changed
+    }
+
+    #[test]
+    fn the_same_is_the_same() {
+        let found = changes(&results(), &results());
+        assert_eq!(found.len(), 2 * 2 * 2);
+        assert!(
+            found.iter().all(|change| !change.is_real && change.factor == 1.0 && change.by_chance == 1.0)
+        );
+        assert!(lines(&found, "old.json")[1].ends_with("time × 1.000 (1.000 to 1.000): the same"));
+    }
+
+    #[test]
+    fn a_large_change_is_found_and_noise_is_not() {
+        let slower = with(|picture, _| picture.seconds *= 1.5);
+        let found = changes(&results(), &slower);
+        let of = |quantity| found.iter().filter(move |change| change.quantity == quantity);
+        assert!(
+            of(Quantity::Seconds).all(|change| change.is_real && (change.factor - 1.5).abs() < 1e-9),
+            "{found:?}"
+        );
+        assert!(
+            of(Quantity::Seconds).all(|change| change.interval[0] > 1.3 && change.interval[1] < 1.7),
+            "{found:?}"
+        );
+        assert!(of(Quantity::Error).all(|change| !change.is_real));
+        let said = lines(&found, "old.json").join("\n");
+        assert!(
+            said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (by chance"),
+            "{said}"
+        );
+        let noise = with(|picture, number| picture.seconds *= [1.05, 0.97, 0.99][number]);
+        assert!(changes(&results(), &noise).iter().all(|change| !change.is_real));
+    }
+
+    #[test]
+    fn only_what_both_have_is_compared() {
+        let mut other = results();
+        other.scenes[0].scene = "other.toml".to_owned();
+        other.scenes[1].methods[0].name = "other".to_owned();
+        other.scenes[1].methods[1].steps.truncate(1);
+        assert_eq!(changes(&other, &results()).len(), 2);
+        assert_eq!(
+            lines(&[], "x.json"),
+            ["nothing of x.json can be compared: no scene, size, method and step is in both"]
+        );
+    }
+}

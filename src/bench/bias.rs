@@ -1,0 +1,198 @@
+//! What many pictures by one method have in common that the references have not: its bias.
+//!
+//! The mean over all pairs of different seeds of (xᵢ − r₁)(xⱼ − r₂) is the square of the bias, as the noise of all four is
+//! independent. How far it is from 0 by chance is estimated from how the pairs differ, from what leaving each seed out changes,
+//! and from the noise of the references.
+
+use serde::{Deserialize, Serialize};
+
+use super::statistics::{above, quantile};
+use crate::compare::TwoReferences;
+use crate::film::RadianceImage;
+
+/// The part of all cases without bias in which one is found.
+pub const FALSE_ALARMS: f64 = 0.001;
+/// Seeds that it takes to tell.
+pub const LEAST_SEEDS: usize = 3;
+
+/// An estimate of a bias.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bias {
+    /// Its square, as a part of relMSE; by chance below 0 where there is none.
+    pub size: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// The probability that there is as much without a bias.
+    pub by_chance: f64,
+    /// One that were larger would have been found.
+    pub bound: f64,
+}
+
+impl Bias {
+    /// Whether chance is no explanation.
+    pub fn is_found(&self) -> bool {
+        self.by_chance < FALSE_ALARMS
+    }
+}
+
+/// The bias of pictures of different seeds; none for fewer than [`LEAST_SEEDS`].
+pub fn bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<Bias> {
+    if pictures.len() < LEAST_SEEDS {
+        return None;
+    }
+    let pairs = Pairs::of(references, pictures);
+    let by_references = references.uncertainty(&mean_of(pictures));
+    let by_seeds = pairs.variance_without_bias().max(pairs.variance_by_leaving_out());
+    let (size, error) = (pairs.mean(), (by_seeds + by_references * by_references).sqrt());
+    let freedom = pictures.len() as f64 - 1.0;
+    let by_chance = if error > 0.0 { above(size / error, freedom) } else { f64::from(u8::from(size <= 0.0)) };
+    Some(Bias { size, error, by_chance, bound: size.max(0.0) + quantile(FALSE_ALARMS, freedom) * error })
+}
+
+/// What each two pictures have in common.
+struct Pairs {
+    count: usize,
+    /// With the numbers of the two.
+    products: Vec<(usize, usize, f64)>,
+}
+
+impl Pairs {
+    fn of(references: &TwoReferences, pictures: &[RadianceImage]) -> Self {
+        let count = pictures.len();
+        let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+        let products = pairs.map(|(i, j)| (i, j, references.cross(&pictures[i], &pictures[j]))).collect();
+        Self { count, products }
+    }
+
+    fn mean(&self) -> f64 {
+        self.mean_without(usize::MAX)
+    }
+
+    fn mean_without(&self, seed: usize) -> f64 {
+        let kept = self.products.iter().filter(|(i, j, _)| *i != seed && *j != seed);
+        let (sum, count) =
+            kept.fold((0.0, 0.0), |(sum, count), (_, _, product)| (sum + product, count + 1.0));
+        sum / count
+    }
+
+    /// Of the mean: without a bias the products of different pairs are uncorrelated.
+    fn variance_without_bias(&self) -> f64 {
+        let (mean, count) = (self.mean(), self.products.len() as f64);
+        let squares: f64 =
+            self.products.iter().map(|(_, _, product)| (product - mean) * (product - mean)).sum();
+        squares / (count - 1.0) / count
+    }
+
+    /// Of the mean, by the jackknife.
+    fn variance_by_leaving_out(&self) -> f64 {
+        let (mean, count) = (self.mean(), self.count as f64);
+        let squares = (0..self.count).map(|seed| self.mean_without(seed) - mean);
+        squares.map(|difference| difference * difference).sum::<f64>() * (count - 1.0) / count
+    }
+}
+
+fn mean_of(pictures: &[RadianceImage]) -> RadianceImage {
+    let mut mean = RadianceImage::black(pictures[0].width, pictures[0].height);
+    let part = 1.0 / pictures.len() as f32;
+    for picture in pictures {
+        mean.pixels.iter_mut().zip(&picture.pixels).for_each(|(sum, pixel)| *sum += *pixel * part);
+    }
+    mean
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::compare::Pair;
+    use crate::math::Vec3;
+
+    /// Numbers that look random: SplitMix64.
+    struct Noise(u64);
+
+    impl Noise {
+        fn uniform(&mut self) -> f32 {
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut mixed = self.0;
+            mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((mixed ^ (mixed >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
+        }
+
+        /// Grey of 0.5 + offset; blocks of `block`² pixels share their noise, as the light of a photon is spread.
+        fn picture(&mut self, noise: f32, offset: f32, block: u32) -> RadianceImage {
+            const SIDE: u32 = 32;
+            let mut picture = RadianceImage::black(SIDE, SIDE);
+            for y in (0..SIDE).step_by(block as usize) {
+                for x in (0..SIDE).step_by(block as usize) {
+                    let value = Vec3::splat(0.5 + offset + noise * self.uniform());
+                    for (dx, dy) in (0..block).flat_map(|dy| (0..block).map(move |dx| (dx, dy))) {
+                        picture.pixels[((y + dy) * SIDE + x + dx) as usize] = value;
+                    }
+                }
+            }
+            picture
+        }
+
+        fn found(&mut self, seeds: usize, offset: f32, block: u32) -> Bias {
+            let names = [Path::new("r1"), Path::new("r2")];
+            let pair = Pair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
+            let references = TwoReferences::new(pair.expect("a pair"));
+            let pictures: Vec<_> = (0..seeds).map(|_| self.picture(0.2, offset, block)).collect();
+            bias(&references, &pictures).expect("enough seeds")
+        }
+    }
+
+    #[test]
+    fn in_noise_none_is_found_as_often_as_said() {
+        for (seeds, block) in [(3, 1), (6, 1), (6, 4), (6, 16)] {
+            let mut noise = Noise(seeds as u64 * 1000 + u64::from(block));
+            let alarms = (0..1000).filter(|_| noise.found(seeds, 0.0, block).is_found()).count();
+            // One is expected; of a Poisson distribution more than six come once in ten thousand times.
+            assert!(alarms <= 6, "{seeds} seeds, blocks of {block}: {alarms} false alarms of 1000");
+        }
+    }
+
+    #[test]
+    fn a_planted_bias_is_found_with_its_size() {
+        let mut noise = Noise(7);
+        let truth = 0.06_f64.powi(2) / 0.26;
+        let mut sizes = Vec::new();
+        for _ in 0..50 {
+            let found = noise.found(6, 0.06, 1);
+            assert!(found.is_found() && found.bound > truth, "{found:?}");
+            sizes.push(found.size);
+        }
+        let (mean, error) = super::super::statistics::mean(&sizes);
+        assert!((mean - truth).abs() < 4.0 * error && error < 0.02 * truth, "{mean} ± {error}, not {truth}");
+    }
+
+    #[test]
+    fn the_standard_error_is_that_of_many_tries() {
+        let mut noise = Noise(11);
+        for offset in [0.0, 0.04] {
+            let tries: Vec<Bias> = (0..200).map(|_| noise.found(6, offset, 1)).collect();
+            let sizes: Vec<f64> = tries.iter().map(|found| found.size).collect();
+            let (_, error) = super::super::statistics::mean(&sizes);
+            let seen = error * (sizes.len() as f64).sqrt();
+            let said = tries.iter().map(|found| found.error).sum::<f64>() / tries.len() as f64;
+            assert!(said > 0.85 * seen && said < 2.0 * seen, "{offset}: said {said}, seen {seen}");
+        }
+    }
+
+    #[test]
+    fn exact_pictures_have_none_and_exact_wrong_ones_have_theirs() {
+        let mut noise = Noise(1);
+        let pair = Pair::new(
+            [Path::new("a"), Path::new("b")],
+            noise.picture(0.0, 0.0, 1),
+            noise.picture(0.0, 0.0, 1),
+        );
+        let references = TwoReferences::new(pair.expect("a pair"));
+        let of = |picture: RadianceImage| bias(&references, &vec![picture; 3]).expect("enough");
+        assert!(!of(noise.picture(0.0, 0.0, 1)).is_found());
+        assert!(of(noise.picture(0.0, 0.1, 1)).is_found());
+        assert_eq!(bias(&references, &[noise.picture(0.0, 0.0, 1)]), None);
+    }
+}

@@ -1,0 +1,158 @@
+//! References on disk: one file for each fingerprint, which says by itself whether it is whole.
+//!
+//! A line of JSON, the pixels of both pictures as little-endian floats, and the fingerprint of all before it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::compare::Pair;
+use crate::film::RadianceImage;
+use crate::math::Vec3;
+use crate::output::{OutputError, write};
+use crate::scene::fingerprint::{Fingerprint, Key};
+
+/// The folder for references: below `XDG_CACHE_HOME`, else `~/.cache`. None where there is neither.
+pub fn folder() -> Option<PathBuf> {
+    let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
+    Some(caches.join("glimt").join("references"))
+}
+
+/// The scene that `glimt new` writes, as a file in this folder.
+///
+/// # Errors
+/// The folder cannot be made or the file not be written.
+pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
+    make(folder)?;
+    let path = folder.join("starter.toml");
+    write::atomic(&path, crate::scene::starter().as_bytes())?;
+    Ok(path)
+}
+
+fn make(folder: &Path) -> Result<(), OutputError> {
+    fs::create_dir_all(folder).map_err(|source| OutputError::File { path: folder.to_owned(), source })
+}
+
+/// Two references with what they cost.
+#[derive(Clone, Debug)]
+pub(super) struct Stored {
+    pub(super) pair: Pair,
+    pub(super) cost: Cost,
+}
+
+/// What two references cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Cost {
+    /// Samples per pixel of each, on average.
+    pub(super) samples: f64,
+    /// Of both, of rendering.
+    pub(super) seconds: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Head {
+    width: u32,
+    height: u32,
+    cost: Cost,
+}
+
+const KEY_BYTES: usize = 64;
+
+/// What is stored under a key. A file that is not whole is as good as none.
+pub(super) fn load(folder: &Path, key: &Key) -> Option<Stored> {
+    let bytes = fs::read(file(folder, key)).ok()?;
+    let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
+    if seal_of(content).as_bytes() != seal {
+        return None;
+    }
+    let end = content.iter().position(|byte| *byte == b'\n')?;
+    let Head { width, height, cost } = serde_json::from_slice(&content[..end]).ok()?;
+    let (floats, _) = content[end + 1..].as_chunks();
+    let values: Vec<f32> = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let pixels: Vec<Vec3> =
+        values.as_chunks().0.iter().map(|pixel: &[f32; 3]| Vec3::from_array(*pixel)).collect();
+    let count = width as usize * height as usize;
+    if count == 0 || pixels.len() != 2 * count {
+        return None;
+    }
+    let image = |pixels: &[Vec3]| RadianceImage { width, height, pixels: pixels.to_vec() };
+    let pair = Pair::new([folder, folder], image(&pixels[..count]), image(&pixels[count..])).ok()?;
+    Some(Stored { pair, cost })
+}
+
+/// Keep this.
+///
+/// # Errors
+/// The folder cannot be made or the file not be written.
+pub(super) fn store(folder: &Path, key: &Key, stored: &Stored) -> Result<(), OutputError> {
+    let path = file(folder, key);
+    make(folder)?;
+    let (a, b) = (stored.pair.a(), stored.pair.b());
+    let head = Head { width: a.width, height: a.height, cost: stored.cost };
+    let mut bytes = serde_json::to_vec(&head)
+        .map_err(|error| OutputError::File { path: path.clone(), source: error.into() })?;
+    bytes.push(b'\n');
+    for pixel in a.pixels.iter().chain(&b.pixels) {
+        pixel.to_array().iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+    }
+    let seal = seal_of(&bytes);
+    bytes.extend(seal.as_bytes());
+    write::atomic(&path, &bytes)
+}
+
+fn seal_of(content: &[u8]) -> String {
+    Fingerprint::new("references").bytes(content).finish().to_string()
+}
+
+fn file(folder: &Path, key: &Key) -> PathBuf {
+    folder.join(format!("{key}.pair"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stored() -> Stored {
+        let image =
+            |value| RadianceImage { width: 3, height: 2, pixels: vec![Vec3::new(value, -0.5, 1e-30); 6] };
+        let pair = Pair::new([Path::new("a"), Path::new("b")], image(1.0), image(2.0)).expect("a pair");
+        Stored { pair, cost: Cost { samples: 12.5, seconds: 3.25 } }
+    }
+
+    #[test]
+    fn what_is_stored_comes_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let folder = folder.path().join("not/there/yet");
+        let key = Fingerprint::new("x").finish();
+        assert!(load(&folder, &key).is_none());
+        store(&folder, &key, &stored()).expect("stored");
+        let back = load(&folder, &key).expect("there");
+        assert_eq!(back.cost, stored().cost);
+        assert_eq!((back.pair.a(), back.pair.b()), (stored().pair.a(), stored().pair.b()));
+        assert!(load(&folder, &Fingerprint::new("y").finish()).is_none());
+    }
+
+    #[test]
+    fn whatever_is_wrong_with_a_file_it_is_as_good_as_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let key = Fingerprint::new("x").finish();
+        store(folder.path(), &key, &stored()).expect("stored");
+        let path = file(folder.path(), &key);
+        let whole = fs::read(&path).expect("bytes");
+        for length in 0..whole.len() {
+            fs::write(&path, &whole[..length]).expect("written");
+            assert!(load(folder.path(), &key).is_none(), "cut after {length} bytes");
+        }
+        for place in 0..whole.len() {
+            let mut broken = whole.clone();
+            broken[place] ^= 1;
+            fs::write(&path, broken).expect("written");
+            assert!(load(folder.path(), &key).is_none(), "a bit of byte {place}");
+        }
+        let lie = b"{\"width\":4,\"height\":4,\"cost\":{\"samples\":1.0,\"seconds\":1.0}}\n".to_vec();
+        fs::write(&path, [lie.clone(), seal_of(&lie).into_bytes()].concat()).expect("written");
+        assert!(load(folder.path(), &key).is_none(), "fewer pixels than it says");
+    }
+}

@@ -1,0 +1,55 @@
+//! One line for each picture (RFC 4180), for programs that draw and compute.
+
+use super::results::Results;
+
+const HEAD: &str =
+    "scene,width,height,method,step,seed,samples,seconds,setup_seconds,relmse,reference_noise\r\n";
+
+/// The text of the file.
+pub fn csv(results: &Results) -> String {
+    let mut text = HEAD.to_owned();
+    for scene in &results.scenes {
+        let size = format!("{},{}", scene.width, scene.height);
+        let noise = scene.reference.noise;
+        for method in &scene.methods {
+            let of = format!("{},{size},{}", field(&scene.scene), field(&method.name));
+            for (number, step) in (1..).zip(&method.steps) {
+                for picture in &step.pictures {
+                    text += &format!(
+                        "{of},{number},{},{},{},{},{},{noise}\r\n",
+                        picture.seed, picture.samples, picture.seconds, method.setup_seconds, picture.relmse
+                    );
+                }
+            }
+        }
+    }
+    text
+}
+
+/// A text within quotes, where it needs them.
+fn field(text: &str) -> String {
+    if text.contains(['"', ',', '\r', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::results::tests::results;
+    use super::*;
+
+    #[test]
+    fn every_picture_has_a_line_with_all_fields() {
+        let mut results = results();
+        results.scenes[1].scene = "odd, \"name\".toml".to_owned();
+        let text = csv(&results);
+        let lines: Vec<&str> = text.split_terminator("\r\n").collect();
+        assert_eq!(lines.len(), 1 + 2 * 2 * 4 * 3);
+        let columns = HEAD.split(',').count();
+        assert!(lines[..25].iter().all(|line| line.split(',').count() == columns), "{text}");
+        assert!(lines[1].starts_with("a.toml,128,96,path,1,1,1,0.009"), "{}", lines[1]);
+        assert!(lines[25].starts_with("\"odd, \"\"name\"\".toml\",128,96,path,1,1,"), "{}", lines[25]);
+    }
+}

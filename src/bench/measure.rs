@@ -1,0 +1,201 @@
+//! One method on a scene: step after step, seed after seed.
+
+use super::bias::bias;
+use super::methods::Method;
+use super::order::{Steps, Trouble};
+use super::pace::Pace;
+use super::reference::SEEDS;
+use super::results::{MethodResult, Picture, Step};
+use super::run::Run;
+use super::statistics::median;
+use super::table::{error, samples};
+use crate::compare::TwoReferences;
+use crate::film::RadianceImage;
+use crate::pipeline::protocol::{Failure, Report, Stage};
+use crate::pipeline::session::Session;
+use crate::pipeline::settings::Overrides;
+use crate::pipeline::words;
+
+/// The most samples that a ladder without given steps climbs to.
+const MOST_SAMPLES: u32 = 1 << 16;
+/// From step to step of it.
+const FACTOR: u32 = 4;
+
+/// One step that is to be made.
+#[derive(Clone, Copy)]
+struct Aim {
+    index: u32,
+    samples: u32,
+    budget: Option<f64>,
+}
+
+/// A method on a scene.
+pub(super) struct Measure<'a> {
+    pub(super) run: &'a Run<'a>,
+    /// What all pictures share with the references.
+    pub(super) common: &'a Overrides,
+    pub(super) method: &'a Method,
+    pub(super) two: &'a TwoReferences,
+}
+
+impl Measure<'_> {
+    /// Measures it; notes how many threads rendered.
+    pub(super) fn measure(&self, pace: &Pace, threads: &mut usize) -> Result<MethodResult, Trouble> {
+        let mut session = Session::default();
+        // What is made once is made here, and the first picture that counts finds warm caches.
+        let begin = Aim { index: 0, samples: 1, budget: None };
+        let first = self.render(&mut session, SEEDS[0], begin)?;
+        *threads = first.1.settings.threads;
+        let mut steps: Vec<Step> = Vec::new();
+        let mut took = Vec::new();
+        while let Some(aim) = self.next(&steps, &took, pace) {
+            let before = pace.of_method();
+            steps.push(self.step(&mut session, aim, pace, &took)?);
+            took.push(pace.of_method() - before);
+        }
+        Ok(MethodResult::new(self.method.name.clone(), setup(&first.1), steps))
+    }
+
+    /// What comes after these steps, which took so many seconds each.
+    fn next(&self, steps: &[Step], took: &[f64], pace: &Pace) -> Option<Aim> {
+        let index = steps.len() as u32;
+        match &self.run.order.steps {
+            Steps::Samples(list) => {
+                list.get(steps.len()).map(|&samples| Aim { index, samples, budget: None })
+            }
+            Steps::Seconds(list) => {
+                let aim = |&seconds| Aim { index, samples: u32::MAX, budget: Some(seconds) };
+                list.get(steps.len()).map(aim)
+            }
+            Steps::Climb => {
+                let samples = FACTOR.checked_pow(index).filter(|samples| *samples <= MOST_SAMPLES)?;
+                let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(FACTOR));
+                let has_time = pace.of_method() + expected <= pace.allowance();
+                (index == 0 || has_time).then_some(Aim { index, samples, budget: None })
+            }
+        }
+    }
+
+    fn step(&self, session: &mut Session, aim: Aim, pace: &Pace, took: &[f64]) -> Result<Step, Trouble> {
+        let seeds = self.run.order.seeds;
+        let (mut pictures, mut images): (Vec<Picture>, Vec<RadianceImage>) = Default::default();
+        for number in 0..seeds {
+            let seed = self.run.order.seed + aim.index * seeds + number;
+            self.say_picture(aim, number, pace, took, &pictures);
+            let (image, report) = self.render(session, seed, aim)?;
+            let relmse = self.two.error(&image);
+            if !relmse.is_finite() {
+                let name = &self.method.name;
+                return Err(Trouble::Failed(Failure::Work(format!(
+                    "{name}: the error of seed {seed} is not finite"
+                ))));
+            }
+            pictures.push(Picture {
+                seed,
+                samples: report.image.samples.mean,
+                seconds: rendering(&report),
+                relmse,
+            });
+            images.push(image);
+        }
+        let step = summary(aim, pictures, &images, self.two);
+        let (name, seconds) = (&self.method.name, words::seconds(step.seconds));
+        self.run.done(&format!(
+            "{name}, {}: {seconds}, relMSE {}",
+            samples(step.samples),
+            error(step.relmse)
+        ));
+        Ok(step)
+    }
+
+    fn say_picture(&self, aim: Aim, number: u32, pace: &Pace, took: &[f64], pictures: &[Picture]) {
+        let order = self.run.order;
+        let amount = match aim.budget {
+            Some(seconds) => words::seconds(seconds),
+            None => samples(aim.samples.into()),
+        };
+        let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, order.seeds);
+        // Of one picture of this step, by those before it or by the step before.
+        let each = match (pictures, took.last()) {
+            ([.., last], _) => Some(last.seconds),
+            ([], Some(step)) => Some(self.growth(aim) * step / f64::from(order.seeds)),
+            ([], None) => None,
+        };
+        let to_come = f64::from(order.seeds - number);
+        let left =
+            each.map(|each| pace.left(each * (to_come + f64::from(order.seeds) * self.later(aim)), false));
+        self.run.begins(&what, left);
+    }
+
+    /// How much longer a step takes than the one before.
+    fn growth(&self, aim: Aim) -> f64 {
+        let index = aim.index as usize;
+        match &self.run.order.steps {
+            Steps::Climb => f64::from(FACTOR),
+            Steps::Samples(list) => f64::from(list[index]) / f64::from(list[index - 1]),
+            Steps::Seconds(list) => list[index] / list[index - 1],
+        }
+    }
+
+    /// The steps after this one, in times of it.
+    fn later(&self, aim: Aim) -> f64 {
+        let index = aim.index as usize;
+        match &self.run.order.steps {
+            Steps::Climb => 0.0,
+            Steps::Samples(list) => {
+                let sum: f64 = list[index + 1..].iter().map(|samples| f64::from(*samples)).sum();
+                sum / f64::from(list[index])
+            }
+            Steps::Seconds(list) => list[index + 1..].iter().sum::<f64>() / list[index],
+        }
+    }
+
+    fn render(
+        &self,
+        session: &mut Session,
+        seed: u32,
+        aim: Aim,
+    ) -> Result<(RadianceImage, Box<Report>), Trouble> {
+        let Overrides { integrator, photons, shadows, clamp, accel, .. } = self.method.overrides.clone();
+        let overrides = Overrides {
+            integrator,
+            photons,
+            shadows,
+            clamp,
+            accel,
+            seed: Some(seed),
+            samples: Some(aim.samples),
+            time_seconds: aim.budget,
+            ..self.common.clone()
+        };
+        let rendered = session.render(self.run.path, &overrides, self.run.token)?;
+        Ok((rendered.image, rendered.report))
+    }
+}
+
+fn summary(aim: Aim, pictures: Vec<Picture>, images: &[RadianceImage], two: &TwoReferences) -> Step {
+    let of = |value: fn(&Picture) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
+    let errors = of(|picture| picture.relmse);
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = errors.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    Step {
+        samples: median(&of(|picture| picture.samples)),
+        budget: aim.budget,
+        seconds: median(&of(|picture| picture.seconds)),
+        relmse: median(&errors),
+        spread: [least, most],
+        uncertainty: images.first().map_or(0.0, |image| two.uncertainty(image)),
+        bias: bias(two, images),
+        pictures,
+    }
+}
+
+/// Seconds of what every picture takes: its photons and its rays.
+fn rendering(report: &Report) -> f64 {
+    [Stage::Photons, Stage::Render].map(|stage| report.stages[stage as usize].seconds).iter().sum()
+}
+
+/// Seconds of what is done once: all before.
+fn setup(report: &Report) -> f64 {
+    report.stages[..Stage::Photons as usize].iter().map(|stage| stage.seconds).sum()
+}

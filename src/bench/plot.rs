@@ -1,0 +1,92 @@
+//! The error against the seconds on log axes, as SVG: a panel for each scene, a line for each method.
+
+mod axes;
+mod panel;
+
+use plotters::prelude::{IntoDrawingArea, SVGBackend, WHITE};
+
+use super::results::Results;
+
+/// Size of a panel, in pixels of the SVG.
+const PANEL: (u32, u32) = (640, 480);
+/// Panels side by side.
+const ACROSS: usize = 2;
+
+/// The text of the file.
+///
+/// # Errors
+/// What the library says.
+pub fn svg(results: &Results) -> Result<String, String> {
+    let across = results.scenes.len().clamp(1, ACROSS);
+    let down = results.scenes.len().div_ceil(ACROSS).max(1);
+    let size = (PANEL.0 * across as u32, PANEL.1 * down as u32);
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        let draw = || {
+            root.fill(&WHITE)?;
+            let places = root.split_evenly((down, across));
+            results.scenes.iter().zip(&places).try_for_each(|(scene, place)| panel::draw(scene, place))?;
+            root.present()
+        };
+        draw().map_err(|error| error.to_string())?;
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::results::tests::results;
+    use super::*;
+
+    fn texts(svg: &str) -> Vec<String> {
+        let document = roxmltree::Document::parse(svg).expect("XML");
+        let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+        texts.map(|node| node.text().unwrap_or_default().trim().to_owned()).collect()
+    }
+
+    #[test]
+    fn it_is_xml_with_every_scene_method_and_axis() {
+        let svg = svg(&results()).expect("a plot");
+        let texts = texts(&svg);
+        for word in [
+            "a.toml, 128×96",
+            "b & <c>.toml, 128×96",
+            "path, slope −1.00",
+            "seconds of rendering",
+            "relMSE",
+            "10⁻²",
+            "0.1",
+        ] {
+            assert!(texts.iter().any(|text| text == word), "{word} in {texts:?}");
+        }
+        assert!(
+            texts.iter().any(|text| text.starts_with("whitted, slope −0.") && text.ends_with("BIAS 1.0e-2")),
+            "{texts:?}"
+        );
+        let document = roxmltree::Document::parse(&svg).expect("XML");
+        let lines = |color: &str| {
+            document
+                .descendants()
+                .filter(|node| node.has_tag_name("polyline") && node.attribute("stroke") == Some(color))
+                .count()
+        };
+        assert!(lines("#0072B2") >= 2 && lines("#D55E00") >= 2, "a line for each method in each panel");
+        let root = document.root_element();
+        assert_eq!((root.attribute("width"), root.attribute("height")), (Some("1280"), Some("480")));
+    }
+
+    #[test]
+    fn nothing_measured_and_errors_of_nothing_are_drawn_too() {
+        let mut some = results();
+        some.scenes[0].methods.clear();
+        for step in &mut some.scenes[1].methods[0].steps {
+            (step.relmse, step.spread) = (-1e-9, [-1e-8, 1e-9]);
+        }
+        some.scenes[1].methods[1].steps.truncate(1);
+        some.scenes[1].reference.noise = 0.0;
+        texts(&svg(&some).expect("a plot"));
+        some.scenes.clear();
+        texts(&svg(&some).expect("a plot"));
+    }
+}

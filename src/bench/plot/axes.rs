@@ -1,0 +1,116 @@
+//! Log axes: coordinates are powers of ten.
+
+use std::ops::Range;
+
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+
+/// Where an axis begins and ends, and its marks, as powers of ten.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Axis {
+    pub(super) range: Range<f64>,
+    pub(super) marks: Vec<f64>,
+}
+
+impl Axis {
+    /// Around these values, with a part of it left free at its beginning; values that are not above 0 are on no log axis.
+    pub(super) fn around(values: impl Iterator<Item = f64>, free: f64) -> Self {
+        let logs = values.filter(|value| *value > 0.0 && value.is_finite()).map(libm::log10);
+        let (low, high) =
+            logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| (low.min(log), high.max(log)));
+        let (low, high) = if low > high { (-1.0, 1.0) } else { (low, high) };
+        let margin = 0.06 * (high - low).max(0.5);
+        let length = (high - low + 2.0 * margin) / (1.0 - free);
+        let range = high + margin - length..high + margin;
+        let powers = |factors: &[f64]| -> Vec<f64> {
+            let whole = range.start.floor() as i32..=range.end.ceil() as i32;
+            let all = whole
+                .flat_map(|power| factors.iter().map(move |factor| f64::from(power) + libm::log10(*factor)));
+            all.filter(|mark| range.contains(mark)).collect()
+        };
+        let marks = powers(&[1.0]);
+        let marks = if marks.len() < 3 { powers(&[1.0, 2.0, 5.0]) } else { marks };
+        Self { range, marks }
+    }
+}
+
+impl Ranged for Axis {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (begin, end): (i32, i32)) -> i32 {
+        let share = (value - self.range.start) / (self.range.end - self.range.start);
+        begin + (f64::from(end - begin) * share).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, _hint: Hint) -> Vec<f64> {
+        self.marks.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+/// `10⁻³`, `2·10⁻³`, `5`
+pub(super) fn power(mark: f64) -> String {
+    let (factor, whole) = parts(mark);
+    if whole == 0 {
+        return factor.to_string();
+    }
+    let digits = format!("{whole}").chars().map(superscript).collect::<String>();
+    if factor == 1 { format!("10{digits}") } else { format!("{factor}·10{digits}") }
+}
+
+/// `0.02`, `5`, `200`
+pub(super) fn plain(mark: f64) -> String {
+    let (factor, whole) = parts(mark);
+    if (-3..=5).contains(&whole) {
+        let decimals = (-whole).max(0) as usize;
+        format!("{:.decimals$}", f64::from(factor) * libm::pow(10.0, f64::from(whole)))
+    } else {
+        power(mark)
+    }
+}
+
+/// The first digit and the power of ten.
+fn parts(mark: f64) -> (i32, i32) {
+    let whole = (mark + 1e-9).floor();
+    (libm::pow(10.0, mark - whole).round() as i32, whole as i32)
+}
+
+fn superscript(digit: char) -> char {
+    match digit {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '4' => '⁴',
+        '5' => '⁵',
+        '6' => '⁶',
+        '7' => '⁷',
+        '8' => '⁸',
+        '9' => '⁹',
+        _ => '⁰',
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_whole_powers_or_few_digits() {
+        let far = Axis::around([1e-5, 0.3].into_iter(), 0.0);
+        assert_eq!(far.marks, [-5.0, -4.0, -3.0, -2.0, -1.0]);
+        let near = Axis::around([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
+        let names: Vec<String> = near.marks.iter().map(|mark| plain(*mark)).collect();
+        assert_eq!(names, ["0.02", "0.05", "0.1", "0.2"]);
+        let names: Vec<String> = near.marks.iter().map(|mark| power(*mark)).collect();
+        assert_eq!(names, ["2·10⁻²", "5·10⁻²", "10⁻¹", "2·10⁻¹"]);
+        assert_eq!(Axis::around([].into_iter(), 0.0).marks, [-1.0, 0.0, 1.0]);
+        let half = Axis::around([1e-2, 1.0].into_iter(), 0.5).range;
+        assert!((half.start + 4.36).abs() < 1e-9 && (half.end - 0.12).abs() < 1e-9, "{half:?}");
+        assert_eq!(power(libm::log10(5.0)), "5");
+        assert_eq!((plain(2.0).as_str(), plain(-12.0).as_str()), ("100", "10⁻¹²"));
+    }
+}

@@ -1,0 +1,157 @@
+//! One scene.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::axes::{Axis, plain, power};
+use crate::bench::results::{MethodResult, SceneResult, Step, Verdict};
+use crate::bench::slope::Slope;
+
+/// Colours that the colour-blind tell apart, also in this order (Okabe and Ito).
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+const FAINT: RGBColor = RGBColor(225, 225, 225);
+const GREY: RGBColor = RGBColor(110, 110, 110);
+
+/// Pixels of a marker's half, and of the bars' ends.
+const MARKER: i32 = 4;
+
+type Place<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Failed<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
+type Chart<'c, 'a> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
+
+/// Draws it.
+pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Failed<'a>> {
+    let steps = || scene.methods.iter().flat_map(|method| &method.steps);
+    let noise = scene.reference.noise;
+    let across = Axis::around(steps().map(|step| step.seconds), 0.0);
+    let errors = steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]);
+    let up = Axis::around(errors.chain([noise]), of_legend(scene.methods.len()));
+    let mut chart = ChartBuilder::on(place)
+        .caption(format!("{}, {}×{}", scene.scene, scene.width, scene.height), ("sans-serif", 20))
+        .margin(14)
+        .x_label_area_size(50)
+        .y_label_area_size(80)
+        .build_cartesian_2d(across.clone(), up.clone())?;
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(FAINT)
+        .axis_style(GREY)
+        .label_style(("sans-serif", 14))
+        .axis_desc_style(("sans-serif", 16))
+        .x_desc("seconds of rendering")
+        .y_desc("relMSE")
+        .x_label_formatter(&|mark| plain(*mark))
+        .y_label_formatter(&|mark| power(*mark))
+        .draw()?;
+    if noise > 0.0 {
+        floor(&mut chart, libm::log10(noise), &across)?;
+    }
+    for (number, method) in scene.methods.iter().enumerate() {
+        bars(&mut chart, method, color(number), &up)?;
+        line(&mut chart, method, number)?;
+    }
+    legend(&mut chart)
+}
+
+/// The part of the height that the legend has for itself.
+fn of_legend(methods: usize) -> f64 {
+    (0.05 * (methods as f64 + 1.0) + 0.08).min(0.6)
+}
+
+fn color(number: usize) -> RGBColor {
+    COLORS[number % COLORS.len()]
+}
+
+fn legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), Failed<'a>> {
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
+        .background_style(WHITE.mix(0.85))
+        .border_style(FAINT)
+        .label_font(("sans-serif", 14))
+        .margin(8)
+        .draw()
+}
+
+/// The noise of a reference.
+fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &Axis) -> Result<(), Failed<'a>> {
+    let dashes = |points: Vec<(f64, f64)>| DashedLineSeries::new(points, 5, 5, GREY.stroke_width(1));
+    let ends = vec![(across.range.start, level), (across.range.end, level)];
+    let sample = |(x, y): (i32, i32)| PathElement::new([(x, y), (x + 8, y)], GREY);
+    chart.draw_series(dashes(ends))?.label("noise of each reference").legend(sample);
+    Ok(())
+}
+
+/// From the least to the greatest error of each step.
+fn bars<'c, 'a: 'c>(
+    chart: &mut Chart<'c, 'a>,
+    method: &MethodResult,
+    color: RGBColor,
+    up: &Axis,
+) -> Result<(), Failed<'a>> {
+    let seen = method.steps.iter().filter(|step| step.spread[1] > 0.0);
+    let bar = |step: &Step| {
+        let low = if step.spread[0] > 0.0 { libm::log10(step.spread[0]) } else { up.range.start };
+        let high = libm::log10(step.spread[1]);
+        let middle = if step.relmse > 0.0 { libm::log10(step.relmse) } else { low };
+        ErrorBar::new_vertical(libm::log10(step.seconds), low, middle, high, color.stroke_width(1), 8)
+    };
+    chart.draw_series(seen.map(bar))?;
+    Ok(())
+}
+
+/// The medians, and the method's place in the legend.
+fn line<'c, 'a: 'c>(
+    chart: &mut Chart<'c, 'a>,
+    method: &MethodResult,
+    number: usize,
+) -> Result<(), Failed<'a>> {
+    let color = color(number);
+    let seen = method.steps.iter().filter(|step| step.relmse > 0.0);
+    let points: Vec<(f64, f64)> =
+        seen.map(|step| (libm::log10(step.seconds), libm::log10(step.relmse))).collect();
+    let sample = move |(x, y): (i32, i32)| {
+        let line = PathElement::new([(x, y), (x + 20, y)], color.stroke_width(2));
+        EmptyElement::at((0, 0)) + line + marker((x + 10, y), number)
+    };
+    let drawn = chart.draw_series(LineSeries::new(points.clone(), color.stroke_width(2)))?;
+    drawn.label(label(method)).legend(sample);
+    let at = |point: (f64, f64)| EmptyElement::at(point) + marker((0, 0), number);
+    chart.draw_series(points.into_iter().map(at))?;
+    Ok(())
+}
+
+/// A filled shape around a pixel; methods differ in it as well.
+fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
+    let corners: &[(i32, i32)] = match number % 4 {
+        0 => &[(-1, -1), (1, -1), (1, 1), (-1, 1)],
+        1 => &[(0, -1), (1, 1), (-1, 1)],
+        2 => &[(0, -1), (1, 0), (0, 1), (-1, 0)],
+        _ => &[(-1, -1), (1, -1), (0, 1)],
+    };
+    let size = if number % 4 == 0 { MARKER - 1 } else { MARKER + 1 };
+    let corner = |(x, y): &(i32, i32)| (at.0 + x * size, at.1 + y * size);
+    Polygon::new(corners.iter().map(corner).collect::<Vec<_>>(), color(number).filled())
+}
+
+/// `path, slope −0.98`
+fn label(method: &MethodResult) -> String {
+    let slope = method.slope.map_or(String::new(), |Slope { value, .. }| {
+        format!(", slope {}{:.2}", if value < 0.0 { "−" } else { "" }, value.abs())
+    });
+    let bias = match method.verdict {
+        Verdict::Stays { size, .. } => format!(", BIAS {size:.1e}"),
+        Verdict::Falls { size, .. } => format!(", bias {size:.1e}, falling"),
+        Verdict::Unknown | Verdict::NoneFound { .. } => String::new(),
+    };
+    format!("{}{slope}{bias}", method.name)
+}

@@ -1,0 +1,152 @@
+//! Two references of a scene: given, kept from before, or made.
+
+use std::path::{Path, PathBuf};
+
+use super::cache::{self, Cost, Stored};
+use super::order::Trouble;
+use super::results::ReferenceResult;
+use crate::compare::{Pair, TwoReferences};
+use crate::control::CancelToken;
+use crate::pipeline::session::{Rendered, Session};
+use crate::pipeline::settings::Overrides;
+use crate::scene::description::Integrator;
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::fingerprint::{Fingerprint, Key};
+
+/// Seeds of the two. No picture that is measured has them.
+pub(super) const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
+
+/// More than there is time for.
+const NO_END: u32 = 1 << 24;
+
+/// Times the samples of the most that is measured.
+const MORE: u32 = 100;
+
+/// How good the references are to be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Amount {
+    pub(super) samples: u32,
+    /// Of both.
+    pub(super) seconds: Option<f64>,
+}
+
+impl Amount {
+    /// As good as there is time for, but not better than the most samples ask for.
+    pub(super) fn in_time(seconds: f64, most: Option<u32>) -> Self {
+        let samples = most.map_or(NO_END, |most| most.saturating_mul(MORE).min(NO_END));
+        Self { samples, seconds: Some(seconds) }
+    }
+
+    /// Whether what was made before is as good. What had half of the time is.
+    fn is_met(self, cost: Cost) -> bool {
+        cost.samples >= f64::from(self.samples)
+            || self.seconds.is_some_and(|seconds| cost.seconds >= 0.5 * seconds)
+    }
+}
+
+/// The references of a scene, with what is to be said of them.
+pub(super) struct Reference {
+    pub(super) two: TwoReferences,
+    pub(super) result: ReferenceResult,
+    pub(super) warnings: Vec<Diagnostic>,
+    /// Why they could not be kept.
+    pub(super) unkept: Option<String>,
+}
+
+/// Reads both; they may be one file.
+pub(super) fn given(files: &[PathBuf; 2]) -> Result<Reference, Trouble> {
+    let pair = Pair::load(&files[0], &files[1]).map_err(|errors| {
+        Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+    })?;
+    let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
+    names.dedup();
+    let two = TwoReferences::new(pair);
+    let noise = two.noise();
+    let result = ReferenceResult { samples: None, noise, seconds: None, is_cached: false, files: names };
+    Ok(Reference { two, result, warnings: Vec::new(), unkept: None })
+}
+
+/// What makes references.
+pub(super) struct Maker<'a> {
+    pub(super) scene: &'a Path,
+    /// Of the size.
+    pub(super) common: &'a Overrides,
+    pub(super) token: &'a CancelToken,
+    pub(super) cache: Option<&'a Path>,
+}
+
+impl Maker<'_> {
+    /// A picture of one sample shows what a reference depends on, and that everything can be read.
+    /// References of a number of samples that was asked for are kept beside those that time made.
+    pub(super) fn key(&self, session: &mut Session, asked: Option<u32>) -> Result<Key, Trouble> {
+        let mut key = Fingerprint::new("references");
+        key.text(env!("CARGO_PKG_VERSION")).u64(asked.unwrap_or(0).into());
+        for seed in SEEDS {
+            key.key(&self.render(session, seed, Amount { samples: 1, seconds: None })?.key);
+        }
+        Ok(key.finish())
+    }
+
+    /// Those that are kept, if they are good enough.
+    pub(super) fn kept(&self, key: &Key, amount: Amount) -> Option<Reference> {
+        let stored = cache::load(self.cache?, key).filter(|stored| amount.is_met(stored.cost))?;
+        Some(reference(stored, true, Vec::new(), None))
+    }
+
+    /// Renders both; `begin` is told before each how many are left.
+    pub(super) fn make(
+        &self,
+        session: &mut Session,
+        key: &Key,
+        amount: Amount,
+        mut begin: impl FnMut(usize),
+    ) -> Result<Reference, Trouble> {
+        let half = Amount { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
+        begin(2);
+        let first = self.render(session, SEEDS[0], half)?;
+        begin(1);
+        let second = self.render(session, SEEDS[1], half)?;
+        let cost = Cost {
+            samples: (first.report.image.samples.mean + second.report.image.samples.mean) / 2.0,
+            seconds: first.report.seconds + second.report.seconds,
+        };
+        let names = ["the first reference", "the second reference"].map(Path::new);
+        let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
+            Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        })?;
+        let stored = Stored { pair, cost };
+        let unkept = self.cache.and_then(|folder| cache::store(folder, key, &stored).err());
+        Ok(reference(stored, false, first.warnings, unkept.map(|error| error.to_string())))
+    }
+
+    fn render(&self, session: &mut Session, seed: u32, amount: Amount) -> Result<Rendered, Trouble> {
+        let overrides = Overrides {
+            integrator: Some(Integrator::Path),
+            photons: Some(false),
+            clamp: Some(0.0),
+            seed: Some(seed),
+            samples: Some(amount.samples),
+            time_seconds: amount.seconds.map(|seconds| seconds.max(1e-3)),
+            ..self.common.clone()
+        };
+        Ok(session.render(self.scene, &overrides, self.token)?)
+    }
+}
+
+fn reference(
+    stored: Stored,
+    is_cached: bool,
+    warnings: Vec<Diagnostic>,
+    unkept: Option<String>,
+) -> Reference {
+    let Stored { pair, cost } = stored;
+    let two = TwoReferences::new(pair);
+    let result = ReferenceResult {
+        samples: Some(cost.samples),
+        noise: two.noise(),
+        seconds: Some(cost.seconds),
+        is_cached,
+        files: Vec::new(),
+    };
+    Reference { two, result, warnings, unkept }
+}

@@ -1,0 +1,218 @@
+//! Scene after scene, method after method, step after step, seed after seed.
+
+use std::path::Path;
+
+use super::measure::Measure;
+use super::methods::methods;
+use super::order::{News, Order, ReferenceOrder, Steps, Trouble};
+use super::pace::Pace;
+use super::reference::{Amount, Maker, Reference, SEEDS, given};
+use super::results::{Results, SceneResult};
+use crate::control::CancelToken;
+use crate::pipeline::protocol::Failure;
+use crate::pipeline::session::Session;
+use crate::pipeline::settings::Overrides;
+use crate::pipeline::words;
+use crate::scene;
+use crate::scene::description::Scene;
+
+/// Pixels on the longer side where nothing else is said.
+const LONG_SIDE: u32 = 128;
+
+/// Measure what the order asks for.
+///
+/// # Errors
+/// A scene or the call is wrong, the work failed, or it was told to stop.
+pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Results, Trouble> {
+    check_seeds(order)?;
+    let mut pace = Pace::new(order.within, order.scenes.len());
+    let mut results =
+        Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
+    for path in &order.scenes {
+        let scene = Run { order, path, token, tell }.scene(&mut pace, &mut results.threads)?;
+        results.scenes.push(scene);
+        pace.end_scene();
+    }
+    results.seconds = pace.seconds();
+    Ok(results)
+}
+
+/// The size at which a scene is measured.
+pub fn size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
+    let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
+    let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
+    match asked {
+        (Some(width), Some(height)) => (width, height),
+        (Some(asked), None) => (asked, side(height * f64::from(asked) / width)),
+        (None, Some(asked)) => (side(width * f64::from(asked) / height), asked),
+        (None, None) => {
+            let scale = (f64::from(LONG_SIDE) / width.max(height)).min(1.0);
+            (side(width * scale), side(height * scale))
+        }
+    }
+}
+
+/// Each picture has a seed of its own, and none that of a reference.
+fn check_seeds(order: &Order) -> Result<(), Trouble> {
+    /// Steps that a ladder has at most.
+    const MOST_STEPS: u32 = 64;
+    let steps = match &order.steps {
+        Steps::Climb => MOST_STEPS,
+        Steps::Samples(list) => list.len() as u32,
+        Steps::Seconds(list) => list.len() as u32,
+    };
+    let last = u64::from(order.seed) + u64::from(steps) * u64::from(order.seeds);
+    if last < u64::from(SEEDS[0]) {
+        return Ok(());
+    }
+    let way_out = "the seeds of the pictures would reach those of the references; choose a smaller --seed";
+    Err(Trouble::Call(format!("--seed {} is too large: {way_out}", order.seed)))
+}
+
+/// What a scene is measured with.
+pub(super) struct Run<'a> {
+    pub(super) order: &'a Order,
+    pub(super) path: &'a Path,
+    pub(super) token: &'a CancelToken,
+    tell: &'a dyn Fn(News),
+}
+
+impl Run<'_> {
+    fn scene(&self, pace: &mut Pace, threads: &mut usize) -> Result<SceneResult, Trouble> {
+        let order = self.order;
+        let loaded = scene::load(self.path, &order.common.sets)
+            .map_err(|diagnostics| Trouble::Failed(Failure::Scene(diagnostics)))?;
+        let methods = methods(&loaded.scene, &order.toggles);
+        pace.begin_scene(methods.len());
+        let (reference, common) = self.reference(&loaded.scene, pace)?;
+        let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
+        self.say_reference(&reference, (width, height));
+        let mut measured = Vec::new();
+        for method in &methods {
+            pace.begin_method();
+            let method = Measure { run: self, common: &common, method, two: &reference.two };
+            measured.push(method.measure(pace, threads)?);
+            pace.end_method();
+        }
+        let scene = self.path.to_string_lossy().into_owned();
+        Ok(SceneResult { scene, width, height, reference: reference.result, methods: measured })
+    }
+
+    /// The references, and the settings that all pictures share with them.
+    fn reference(&self, scene: &Scene, pace: &Pace) -> Result<(Reference, Overrides), Trouble> {
+        let order = self.order;
+        let of_files = match &order.reference {
+            ReferenceOrder::Files(files) => Some(given(files)?),
+            ReferenceOrder::InTime | ReferenceOrder::Samples(_) => None,
+        };
+        let (width, height) = match &of_files {
+            Some(reference) => (reference.two.pair().a().width, reference.two.pair().a().height),
+            None => size(scene, (order.width, order.height)),
+        };
+        let common =
+            Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
+        self.begins("reading", None);
+        let maker =
+            Maker { scene: self.path, common: &common, token: self.token, cache: order.cache.as_deref() };
+        let mut session = Session::default();
+        let asked = match &order.reference {
+            ReferenceOrder::Samples(samples) => Some(*samples),
+            ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
+        };
+        let key = maker.key(&mut session, asked)?;
+        self.check_targets(&session)?;
+        let amount = match (&order.reference, of_files) {
+            (_, Some(reference)) => return Ok((reference, common)),
+            (ReferenceOrder::Samples(samples), None) => Amount { samples: *samples, seconds: None },
+            (ReferenceOrder::InTime | ReferenceOrder::Files(_), None) => {
+                Amount::in_time(pace.of_references(), order.steps.most_samples())
+            }
+        };
+        if let Some(kept) = maker.kept(&key, amount) {
+            return Ok((kept, common));
+        }
+        let begin = |left: usize| {
+            let seconds = amount.seconds.map(|seconds| pace.left(seconds * left as f64 / 2.0, true));
+            self.begins(&format!("reference {} of 2", 3 - left), seconds);
+        };
+        Ok((maker.make(&mut session, &key, amount, begin)?, common))
+    }
+
+    /// No output may be a file that the scene is made of.
+    fn check_targets(&self, session: &Session) -> Result<(), Trouble> {
+        match self.order.targets.iter().find(|target| session.reads(target)) {
+            Some(target) => Err(Trouble::Call(format!(
+                "cannot write {}: it is a file that {} is made of; name another file",
+                target.display(),
+                self.path.display()
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn say_reference(&self, reference: &Reference, (width, height): (u32, u32)) {
+        if !reference.warnings.is_empty() {
+            (self.tell)(News::Warnings(reference.warnings.clone()));
+        }
+        if let Some(why) = &reference.unkept {
+            self.done(&format!("the references are not kept: {why}"));
+        }
+        let result = &reference.result;
+        let made = match (result.is_cached, result.seconds) {
+            (true, _) => "kept from before".to_owned(),
+            (false, Some(seconds)) => format!("in {}", words::seconds(seconds)),
+            (false, None) => "from files".to_owned(),
+        };
+        self.done(&format!("references of {width}×{height} pixels {made}, relMSE {:.1e} each", result.noise));
+    }
+
+    pub(super) fn begins(&self, what: &str, left: Option<f64>) {
+        let what = format!("{}: {what}", self.path.display());
+        (self.tell)(News::Begins { what, left });
+    }
+
+    pub(super) fn done(&self, what: &str) {
+        (self.tell)(News::Done(format!("{}: {what}", self.path.display())));
+    }
+}
+
+impl Steps {
+    /// The most samples, where that is known.
+    fn most_samples(&self) -> Option<u32> {
+        match self {
+            Self::Samples(list) => list.iter().max().copied(),
+            Self::Climb | Self::Seconds(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_have_the_aspect_of_the_scene() {
+        let of = |width, height, asked| {
+            let mut scene =
+                Scene::clone(&scene::load(Path::new("scenes/cornell.toml"), &[]).expect("a scene").scene);
+            (scene.render.width, scene.render.height) = (width, height);
+            size(&scene, asked)
+        };
+        assert_eq!(of(640, 480, (None, None)), (128, 96));
+        assert_eq!(of(480, 640, (None, None)), (96, 128));
+        assert_eq!(of(64, 32, (None, None)), (64, 32), "none is larger than its scene");
+        assert_eq!(of(65536, 1, (None, None)), (128, 1));
+        assert_eq!(of(640, 480, (Some(40), None)), (40, 30));
+        assert_eq!(of(640, 480, (None, Some(30))), (40, 30));
+        assert_eq!(of(640, 480, (Some(7), Some(9))), (7, 9));
+    }
+
+    #[test]
+    fn no_picture_has_the_seed_of_a_reference() {
+        let order = |seed| Order { seed, seeds: 6, ..Order::default() };
+        assert!(check_seeds(&order(1)).is_ok());
+        assert!(check_seeds(&order(u32::MAX - 6 * 64 - 2)).is_ok());
+        let Err(Trouble::Call(message)) = check_seeds(&order(u32::MAX - 6 * 64)) else { panic!("refused") };
+        assert!(message.contains("choose a smaller --seed"), "{message}");
+    }
+}

@@ -1,0 +1,121 @@
+//! Medians, and how sure a difference is: Student's t.
+
+/// The middle of some numbers; of an even number of them, the mean of the two in the middle. NaN of none.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => f64::NAN,
+        length if length % 2 == 1 => sorted[middle],
+        _ => (sorted[middle - 1] + sorted[middle]) / 2.0,
+    }
+}
+
+/// The mean of some numbers, and its standard error; that of one number is infinite.
+pub fn mean(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    let error = if values.len() < 2 { f64::INFINITY } else { (squares / (count - 1.0) / count).sqrt() };
+    (mean, error)
+}
+
+/// The probability that Student's t with so many degrees of freedom is above `t`.
+pub fn above(t: f64, freedom: f64) -> f64 {
+    let x = freedom / (freedom + t * t);
+    let tail = if t.is_infinite() { 0.0 } else { 0.5 * incomplete_beta(x, freedom / 2.0, 0.5) };
+    if t >= 0.0 { tail } else { 1.0 - tail }
+}
+
+/// The t that [`above`] gives this probability for, one below a half.
+pub fn quantile(probability: f64, freedom: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    while above(high, freedom) > probability && high < 1e12 {
+        high *= 2.0;
+    }
+    for _ in 0..100 {
+        let middle = (low + high) / 2.0;
+        if above(middle, freedom) > probability { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// The difference of two means, b − a, with its standard error and its degrees of freedom by Welch and Satterthwaite.
+pub fn welch(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
+    let ((mean_a, error_a), (mean_b, error_b)) = (mean(a), mean(b));
+    let (square_a, square_b) = (error_a * error_a, error_b * error_b);
+    let square = square_a + square_b;
+    let of = |square: f64, count: usize| square * square / (count as f64 - 1.0).max(1.0);
+    let freedom = square * square / (of(square_a, a.len()) + of(square_b, b.len()));
+    (mean_b - mean_a, square.sqrt(), if freedom.is_finite() { freedom } else { 1.0 })
+}
+
+/// I_x(a, b), by its continued fraction (modified Lentz).
+fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
+    if x <= 0.0 || x >= 1.0 {
+        return x.clamp(0.0, 1.0);
+    }
+    if x > (a + 1.0) / (a + b + 2.0) {
+        return 1.0 - incomplete_beta(1.0 - x, b, a);
+    }
+    let logarithm = libm::lgamma(a + b) - libm::lgamma(a) - libm::lgamma(b);
+    let front = libm::exp(logarithm + a * libm::log(x) + b * libm::log1p(-x)) / a;
+    let away = |value: f64| if value.abs() < 1e-300 { 1e-300 } else { value };
+    let (mut numerator, mut denominator) = (1.0, 1.0 / away(1.0 - (a + b) * x / (a + 1.0)));
+    let mut fraction = denominator;
+    for step in 1..300 {
+        let m = f64::from(step);
+        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
+        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
+        for term in [even, odd] {
+            denominator = 1.0 / away(1.0 + term * denominator);
+            numerator = away(1.0 + term / numerator);
+            fraction *= denominator * numerator;
+        }
+        if (denominator * numerator - 1.0).abs() < 1e-15 {
+            break;
+        }
+    }
+    front * fraction
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_and_means() {
+        assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
+        assert!(median(&[]).is_nan());
+        let (value, error) = mean(&[1.0, 2.0, 3.0, 4.0]);
+        assert!((value - 2.5).abs() < 1e-15 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
+        assert_eq!(mean(&[1.0]), (1.0, f64::INFINITY));
+    }
+
+    /// Tables of Student's t: one-sided.
+    #[test]
+    fn student_is_as_in_tables() {
+        for (freedom, probability, t) in [
+            (1.0, 0.05, 6.313_752),
+            (5.0, 0.001, 5.893_430),
+            (10.0, 0.025, 2.228_139),
+            (100.0, 0.01, 2.364_217),
+        ] {
+            assert!((above(t, freedom) / probability - 1.0).abs() < 1e-5, "{freedom}: {}", above(t, freedom));
+            assert!((quantile(probability, freedom) - t).abs() < 1e-4, "{}", quantile(probability, freedom));
+        }
+        assert!((above(-1.0, 3.0) + above(1.0, 3.0) - 1.0).abs() < 1e-14);
+        assert!((above(0.0, 7.0) - 0.5).abs() < 1e-14);
+        assert_eq!(above(f64::INFINITY, 7.0), 0.0);
+    }
+
+    #[test]
+    fn welch_is_as_computed_by_hand() {
+        let (difference, error, freedom) = welch(&[1.0, 2.0, 3.0], &[5.0, 7.0, 9.0, 11.0]);
+        assert!((difference - 6.0).abs() < 1e-14);
+        // Variances 1 and 20/3: 1/3 + 5/3 = 2; 4/((1/9)/2 + (25/9)/3).
+        assert!((error - 2.0_f64.sqrt()).abs() < 1e-14);
+        assert!((freedom - 4.0 / (1.0 / 18.0 + 25.0 / 27.0)).abs() < 1e-12, "{freedom}");
+    }
+}

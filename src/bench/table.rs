@@ -1,0 +1,150 @@
+//! The results in words and columns, for terminals of 80 columns.
+
+use super::results::{MethodResult, ReferenceResult, Results, SceneResult, Step, TARGETS, Verdict};
+use super::slope::{Slope, TimeTo};
+use crate::pipeline::words;
+
+/// The lines.
+pub fn table(results: &Results) -> Vec<String> {
+    let mut lines: Vec<String> = results.scenes.iter().flat_map(of_scene).collect();
+    lines.push("seconds and relMSE: medians over the seeds; least, greatest: of relMSE; their".to_owned());
+    lines.push("product stays the same where random samples make the error.".to_owned());
+    lines
+}
+
+fn of_scene(scene: &SceneResult) -> Vec<String> {
+    let seeds = scene.methods.iter().flat_map(|method| &method.steps).map(|step| step.pictures.len()).max();
+    let mut lines = vec![
+        format!("{}, {}×{} pixels, {} seeds", scene.scene, scene.width, scene.height, seeds.unwrap_or(0)),
+        references(&scene.reference, scene),
+        String::new(),
+    ];
+    let width = scene.methods.iter().map(|method| method.name.chars().count()).max().unwrap_or(0).max(6);
+    lines.push(format!(
+        "{:<width$} {:>8} {:>9}  {:>9} {:>9} {:>9} {:>10}",
+        "method", "samples", "seconds", "relMSE", "least", "greatest", "s × relMSE"
+    ));
+    for method in &scene.methods {
+        lines.extend(method.steps.iter().map(|step| of_step(&method.name, step, width)));
+    }
+    lines.push(String::new());
+    for method in &scene.methods {
+        lines.push(format!("{}: {}", method.name, speed(method)));
+        lines.extend(times(method).into_iter().chain([verdict(method)]).map(|line| format!("  {line}")));
+    }
+    lines.push(String::new());
+    lines
+}
+
+fn references(reference: &ReferenceResult, scene: &SceneResult) -> String {
+    let noise = format!("noise {}", error(reference.noise));
+    let Some(samples) = reference.samples else {
+        return match reference.files.as_slice() {
+            [one] => format!("reference: {one}, alone: its own noise is read as error"),
+            files => format!("references: {}, {noise}", files.join(" and ")),
+        };
+    };
+    let steps = scene.methods.iter().flat_map(|method| &method.steps);
+    let most = steps.map(|step| step.samples).fold(1.0, f64::max);
+    let times = format!("{:.0} × the most", samples / most);
+    let kept = if reference.is_cached { ", kept" } else { "" };
+    format!("references: path, 2 × {samples:.0} samples ({times}), {noise}{kept}")
+}
+
+fn of_step(name: &str, step: &Step, width: usize) -> String {
+    let [least, most] = step.spread;
+    format!(
+        "{name:<width$} {:>8} {:>9}  {:>9} {:>9} {:>9} {:>10}",
+        count(step.samples),
+        words::seconds(step.seconds),
+        error(step.relmse),
+        error(least),
+        error(most),
+        error(step.seconds * step.relmse)
+    )
+}
+
+/// Whole where it is.
+fn count(samples: f64) -> String {
+    if samples.fract() == 0.0 { format!("{samples:.0}") } else { format!("{samples:.1}") }
+}
+
+/// An error in three digits. One that is not above 0 is less than the references can tell.
+pub(super) fn error(value: f64) -> String {
+    if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
+}
+
+fn speed(method: &MethodResult) -> String {
+    let slope = method.slope.map_or(String::new(), |slope| format!(", slope {}", signed(slope)));
+    format!("set-up {}{slope}", words::seconds(method.setup_seconds))
+}
+
+/// When it reaches the usual errors.
+fn times(method: &MethodResult) -> Option<String> {
+    let times = TARGETS.iter().zip(method.time_to).filter_map(|(target, time)| Some((target, time?)));
+    let parts = times.map(|(target, TimeTo { seconds, is_measured })| {
+        let about = if is_measured { "" } else { "about " };
+        format!("{target:.0e} in {about}{}", words::seconds(seconds))
+    });
+    let parts: Vec<String> = parts.collect();
+    (!parts.is_empty()).then(|| format!("relMSE {}", parts.join(", ")))
+}
+
+/// `1 sample`
+pub(super) fn samples(samples: f64) -> String {
+    format!("{} sample{}", count(samples), if samples == 1.0 { "" } else { "s" })
+}
+
+/// `−0.98 ± 0.02`
+pub(super) fn signed(Slope { value, error }: Slope) -> String {
+    let sign = if value < 0.0 { "−" } else { "" };
+    format!("{sign}{:.2} ± {error:.2}", value.abs())
+}
+
+/// What is known of its bias.
+fn verdict(method: &MethodResult) -> String {
+    let at = method.steps.last().map_or(String::new(), |step| format!(" at {}", samples(step.samples)));
+    let percent = |share: f64| format!("{:.0} % of the error", share * 100.0);
+    match method.verdict {
+        Verdict::Unknown => "too few seeds to tell a bias".to_owned(),
+        Verdict::NoneFound { bound } => format!("no bias found: it is below {}{at}", error(bound)),
+        Verdict::Falls { size, share } => {
+            format!("a bias that falls with the samples: {}, {}{at}", error(size), percent(share))
+        }
+        Verdict::Stays { size, share } => {
+            let last =
+                method.last_slope.map_or(String::new(), |slope| format!(", last slope {}", signed(slope)));
+            format!("BIAS: {}, {}{at}{last}", error(size), percent(share))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::results::tests::results;
+    use super::*;
+
+    #[test]
+    fn the_table_fits_80_columns_and_says_what_is_biased() {
+        let lines = table(&results());
+        assert!(lines.iter().all(|line| line.chars().count() <= 80), "{}", lines.join("\n"));
+        assert_eq!(lines[0], "a.toml, 128×96 pixels, 3 seeds");
+        assert_eq!(lines[1], "references: path, 2 × 4096 samples (64 × the most), noise 1.00e-5");
+        assert_eq!(lines[3], "method   samples   seconds     relMSE     least  greatest s × relMSE");
+        assert_eq!(lines[4], "path           1     10 ms    2.00e-1   1.80e-1   2.20e-1    2.00e-3");
+        assert_eq!(lines[13], "path: set-up 3.0 ms, slope −1.00 ± 0.00");
+        assert_eq!(lines[14], "  relMSE 1e-2 in 200 ms, 1e-3 in about 2.00 s, 1e-4 in about 20.0 s");
+        assert_eq!(lines[15], "  no bias found: it is below 1.00e-8 at 64 samples");
+        assert!(
+            lines[17].starts_with("  BIAS: 1.00e-2, 97 % of the error at 64 samples, last slope −0.0"),
+            "{}",
+            lines[17]
+        );
+    }
+
+    #[test]
+    fn what_the_references_cannot_tell_is_about_nothing() {
+        assert_eq!((error(-1e-9).as_str(), error(0.0123).as_str()), ("≈ 0", "1.23e-2"));
+        assert_eq!((count(16.0).as_str(), count(16.25).as_str()), ("16", "16.2"));
+    }
+}

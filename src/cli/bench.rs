@@ -1,0 +1,196 @@
+//! `glimt bench`: what time buys, as a table, as CSV, as JSON, as a plot.
+
+mod chart;
+mod outputs;
+mod progress;
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use self::outputs::Outputs;
+use self::progress::Said;
+use super::args::BenchArgs;
+use super::console::Console;
+use super::exit::Exit;
+use super::signals::{self, Ended};
+use crate::bench::baseline::{changes, lines};
+use crate::bench::table::table;
+use crate::bench::{self, News, Order, ReferenceOrder, Results, Steps, Toggles, Trouble, cache};
+use crate::control::CancelToken;
+use crate::pipeline::protocol::Failure;
+use crate::pipeline::settings::Overrides;
+use crate::scene::diagnostic::Diagnostic;
+
+/// Between two looks for a signal.
+const TICK: Duration = Duration::from_millis(50);
+
+pub(super) fn run(args: &BenchArgs, console: &Console) -> Exit {
+    measured(args, console).unwrap_or_else(|exit| exit)
+}
+
+/// What was wrong is said, and is the exit code of an error.
+fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
+    let order = order(args, console)?;
+    let outputs = Outputs::of(args, &order.scenes, console)?;
+    let baseline = outputs.baseline(console)?;
+    let token = CancelToken::new();
+    let stop = token.clone();
+    let ended = signals::catch(move || stop.cancel())
+        .map_err(|error| console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")))?;
+    let mut said = Said::new(args.progress, console);
+    let (news, work) = begin(order, token)
+        .map_err(|error| console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")))?;
+    follow(&news, &mut said);
+    let results = work.join().unwrap_or_else(|_| Err(broken()));
+    said.end();
+    let results = results.map_err(|trouble| troubled(&trouble, &ended, &said, console))?;
+    table(&results).iter().for_each(|line| console.answer(line));
+    chart::show(&results, console);
+    if let Some((name, then)) = &baseline {
+        lines(&changes(then, &results), name).iter().for_each(|line| console.answer(line));
+    }
+    outputs.write(&results, &said, console)?;
+    said.done(&results);
+    Ok(ended.by().map_or(Exit::DONE, Exit::signal))
+}
+
+/// The thread that measures.
+type Work = JoinHandle<Result<Results, Trouble>>;
+
+/// The work on a thread of its own, and what it says.
+fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, Work)> {
+    let (sender, news) = mpsc::channel();
+    let tell = move |one: News| {
+        // A front end that is gone need not be told.
+        let _ = sender.send(one);
+    };
+    let work = move || bench::run(&order, &token, &tell);
+    let thread = std::thread::Builder::new().name("glimt-bench".to_owned()).spawn(work)?;
+    Ok((news, thread))
+}
+
+/// Until the work is over.
+fn follow(news: &Receiver<News>, said: &mut Said) {
+    loop {
+        match news.recv_timeout(TICK) {
+            Ok(one) => said.hear(one),
+            Err(RecvTimeoutError::Timeout) => said.tick(),
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+    }
+}
+
+/// A panic has said what it was.
+fn broken() -> Trouble {
+    Trouble::Failed(Failure::Work("internal error: a part of the renderer gave up".to_owned()))
+}
+
+fn troubled(trouble: &Trouble, ended: &Ended, said: &Said, console: &Console) -> Exit {
+    if let Some(number) = ended.by() {
+        if let Some(signal) = signals::name(number) {
+            said.cancelled(&format!("ended by {signal}: nothing was written; finished references are kept"));
+        }
+        return Exit::signal(number);
+    }
+    match trouble {
+        Trouble::Failed(Failure::Scene(diagnostics)) => {
+            if said.is_for_people() {
+                console.diagnostics(diagnostics);
+            } else {
+                let messages: Vec<_> = diagnostics.iter().map(in_a_line).collect();
+                said.failed("scene", &messages.join("; "));
+            }
+            Exit::WRONG
+        }
+        Trouble::Failed(Failure::Work(message)) => {
+            said.failed("work", &format!("error: {message}"));
+            Exit::FAILED
+        }
+        Trouble::Call(message) => {
+            said.failed("call", &format!("error: {message}"));
+            Exit::WRONG
+        }
+        Trouble::Cancelled => Exit::FAILED,
+    }
+}
+
+fn in_a_line(diagnostic: &Diagnostic) -> String {
+    format!("{}: {}", diagnostic.path.display(), diagnostic.message)
+}
+
+/// From what was typed to what it means.
+fn order(args: &BenchArgs, console: &Console) -> Result<Order, Exit> {
+    let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::folder) };
+    let scenes = if args.scenes.is_empty() {
+        vec![own_scene(folder.as_deref(), console)?]
+    } else {
+        args.scenes.clone()
+    };
+    if let Some((_, twice)) = (0..).zip(&scenes).find(|(index, scene)| scenes[..*index].contains(scene)) {
+        return Err(console.fail(Exit::WRONG, &format!("{} is given twice", twice.display())));
+    }
+    let outputs = [&args.csv, &args.json, &args.plot];
+    Ok(Order {
+        reference: reference(args, scenes.len(), console)?,
+        scenes,
+        common: Overrides {
+            sets: args.sets.clone(),
+            max_depth: args.max_depth,
+            dof: args.dof.map(bool::from),
+            threads: args.threads,
+            ..Overrides::default()
+        },
+        width: args.width,
+        height: args.height,
+        toggles: Toggles {
+            integrators: args.integrator.clone(),
+            photons: args.photons.iter().copied().map(bool::from).collect(),
+            shadows: args.shadows.clone(),
+            clamps: args.clamp.clone(),
+            accels: args.accel.clone(),
+        },
+        steps: steps(args),
+        seeds: args.seeds,
+        seed: args.seed,
+        within: args.within,
+        cache: folder,
+        targets: outputs.into_iter().flatten().cloned().collect(),
+    })
+}
+
+/// In rising order, each once.
+fn steps(args: &BenchArgs) -> Steps {
+    let (mut samples, mut seconds) = (args.samples.clone(), args.time.clone());
+    samples.sort_unstable();
+    samples.dedup();
+    seconds.sort_by(f64::total_cmp);
+    seconds.dedup();
+    match (samples.is_empty(), seconds.is_empty()) {
+        (false, _) => Steps::Samples(samples),
+        (true, false) => Steps::Seconds(seconds),
+        (true, true) => Steps::Climb,
+    }
+}
+
+fn reference(args: &BenchArgs, scenes: usize, console: &Console) -> Result<ReferenceOrder, Exit> {
+    match (args.reference.as_slice(), args.reference_samples) {
+        ([], Some(samples)) => Ok(ReferenceOrder::Samples(samples)),
+        ([], None) => Ok(ReferenceOrder::InTime),
+        (_, _) if scenes != 1 => {
+            Err(console.fail(Exit::WRONG, "--reference belongs to one scene: measure one at a time"))
+        }
+        ([one], _) => Ok(ReferenceOrder::Files([one.clone(), one.clone()])),
+        ([one, two], _) => Ok(ReferenceOrder::Files([one.clone(), two.clone()])),
+        (_, _) => Err(console.fail(Exit::WRONG, "--reference is given more than twice")),
+    }
+}
+
+/// The scene that `glimt new` writes, beside the references.
+fn own_scene(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
+    match folder.map(cache::starter) {
+        Some(made) => made.map_err(|error| console.fail(Exit::FAILED, &error.to_string())),
+        None => Err(console.fail(Exit::WRONG, "no scene is given; see glimt bench --help")),
+    }
+}

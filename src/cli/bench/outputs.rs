@@ -1,0 +1,126 @@
+//! The files of `glimt bench`, held against those that it reads and against each other.
+
+use std::path::{Path, PathBuf};
+
+use super::progress::Said;
+use crate::bench::{Results, csv, plot};
+use crate::cli::args::BenchArgs;
+use crate::cli::console::Console;
+use crate::cli::exit::Exit;
+use crate::control::CancelToken;
+use crate::output::write::{self, Guard};
+use crate::output::{self, FileIdentity, OutputError};
+
+/// What is written, and what must not be.
+pub(super) struct Outputs {
+    /// Option, file, and what it holds.
+    files: Vec<(&'static str, PathBuf, Kind)>,
+    /// What it is to this call, and the file.
+    inputs: Vec<(&'static str, PathBuf)>,
+    baseline: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Csv,
+    Json,
+    Plot,
+}
+
+impl Outputs {
+    /// What can be told before the work is said.
+    pub(super) fn of(args: &BenchArgs, scenes: &[PathBuf], console: &Console) -> Result<Self, Exit> {
+        let all = [
+            ("--csv", &args.csv, Kind::Csv),
+            ("--json", &args.json, Kind::Json),
+            ("--plot", &args.plot, Kind::Plot),
+        ];
+        let files: Vec<_> =
+            all.into_iter().filter_map(|(option, file, kind)| Some((option, file.clone()?, kind))).collect();
+        let scenes = scenes.iter().map(|scene| ("a scene of this call", scene.clone()));
+        let references = args.reference.iter().map(|file| ("a reference of this call", file.clone()));
+        let baseline = args.baseline.iter().map(|file| ("the baseline of this call", file.clone()));
+        let inputs = scenes.chain(references).chain(baseline).collect();
+        let outputs = Self { files, inputs, baseline: args.baseline.clone() };
+        for (index, (_, path, kind)) in outputs.files.iter().enumerate() {
+            outputs.check(index, path, *kind).map_err(|error| match error {
+                OutputError::Refused { reason } => console.fail(Exit::WRONG, &reason),
+                error => console.fail(Exit::FAILED, &error.to_string()),
+            })?;
+        }
+        Ok(outputs)
+    }
+
+    fn check(&self, index: usize, path: &Path, kind: Kind) -> Result<(), OutputError> {
+        self.may_replace(index, path)?;
+        let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+        if matches!(kind, Kind::Plot) && !is_svg {
+            let reason =
+                format!("cannot write {}: the plot is an SVG; use a name that ends in .svg", path.display());
+            return Err(OutputError::Refused { reason });
+        }
+        output::check_place(path)
+    }
+
+    /// The file of this number, which leads to `real`, must be no input and no other output.
+    fn may_replace(&self, index: usize, real: &Path) -> Result<(), OutputError> {
+        let Some(identity) = FileIdentity::of(real) else { return Ok(()) };
+        let is_it = |path: &Path| FileIdentity::of(path).as_ref() == Some(&identity);
+        let (option, path, _) = &self.files[index];
+        let refused = |what: &str| {
+            let reason = format!(
+                "cannot write {}: it is {what}; name another file with {option} FILE",
+                path.display()
+            );
+            Err(OutputError::Refused { reason })
+        };
+        if let Some((what, _)) = self.inputs.iter().find(|(_, input)| is_it(input)) {
+            return refused(what);
+        }
+        match self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
+            Some((other, ..)) => refused(&format!("the file of {other}")),
+            None => Ok(()),
+        }
+    }
+
+    /// The older run with its name.
+    pub(super) fn baseline(&self, console: &Console) -> Result<Option<(String, Results)>, Exit> {
+        let Some(path) = &self.baseline else { return Ok(None) };
+        let name = path.display().to_string();
+        let read = std::fs::read(path).map_err(|error| {
+            console.fail(Exit::WRONG, &format!("cannot read {name}: {}", crate::system::in_words(&error)))
+        })?;
+        let results = serde_json::from_slice(&read).map_err(|error| {
+            let way_out = "name a file that `glimt bench --json FILE` wrote";
+            console.fail(Exit::WRONG, &format!("{name} is no baseline: {error}; {way_out}"))
+        })?;
+        Ok(Some((name, results)))
+    }
+
+    /// All of them.
+    pub(super) fn write(&self, results: &Results, said: &Said, console: &Console) -> Result<(), Exit> {
+        for (index, (_, path, kind)) in self.files.iter().enumerate() {
+            let bytes = content(*kind, results).map_err(|why| {
+                console.fail(Exit::FAILED, &format!("cannot write {}: {why}", path.display()))
+            })?;
+            let may_replace = |real: &Path| self.may_replace(index, real);
+            let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
+            let guard = Guard { is_kept: &is_kept, may_replace: &may_replace };
+            write::atomic_until(path, &bytes, &guard, &CancelToken::new())
+                .map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+            said.written(path, bytes.len());
+        }
+        Ok(())
+    }
+}
+
+fn content(kind: Kind, results: &Results) -> Result<Vec<u8>, String> {
+    match kind {
+        Kind::Csv => Ok(csv::csv(results).into_bytes()),
+        Kind::Json => {
+            let text = serde_json::to_string_pretty(results).map_err(|error| error.to_string())?;
+            Ok((text + "\n").into_bytes())
+        }
+        Kind::Plot => Ok(plot::svg(results)?.into_bytes()),
+    }
+}

@@ -1,0 +1,163 @@
+//! What is said on stderr while it is measured.
+
+use std::io::Write;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use indicatif::ProgressBar;
+use serde_json::{Value, json};
+
+use crate::bench::{News, Results};
+use crate::cli::args::Progress;
+use crate::cli::console::Console;
+use crate::cli::progress::{seconds, style};
+use crate::scene::sanitize::visible;
+
+/// Longest silence of plain lines.
+const INTERVAL: Duration = Duration::from_secs(10);
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Says how it goes on, in the way that was asked for.
+pub(super) struct Said {
+    console: Console,
+    way: Way,
+    begin: Instant,
+    what: String,
+    /// Seconds to go, and when that was so.
+    left: Option<(f64, Instant)>,
+    fraction: f64,
+    last: Instant,
+}
+
+enum Way {
+    Bar(ProgressBar),
+    Plain,
+    Json,
+    Silent,
+}
+
+impl Said {
+    pub(super) fn new(progress: Progress, console: &Console) -> Self {
+        let way = match progress {
+            Progress::Auto if console.is_terminal => {
+                let bar = ProgressBar::new(STEPS);
+                Way::Bar(bar.with_style(style("{msg}\n  {wide_bar} {percent:>3}% {prefix}")))
+            }
+            Progress::Auto | Progress::Plain => Way::Plain,
+            Progress::Json => Way::Json,
+            Progress::None => Way::Silent,
+        };
+        let now = Instant::now();
+        let (console, what) = (console.clone(), String::new());
+        Self { console, way, begin: now, what, left: None, fraction: 0.0, last: now }
+    }
+
+    pub(super) fn hear(&mut self, news: News) {
+        match news {
+            News::Begins { what, left } => {
+                self.what = what;
+                self.left = left.map(|left| (left, Instant::now()));
+                self.show(matches!(self.way, Way::Json));
+            }
+            News::Done(line) => {
+                self.last = Instant::now();
+                match &self.way {
+                    Way::Plain => self.console.say(&line),
+                    Way::Json => object(&json!({ "event": "step", "what": line })),
+                    Way::Bar(_) | Way::Silent => {}
+                }
+            }
+            News::Warnings(warnings) => match &self.way {
+                Way::Bar(bar) => bar.suspend(|| self.console.diagnostics(&warnings)),
+                Way::Plain | Way::Silent => self.console.diagnostics(&warnings),
+                Way::Json => {
+                    let messages: Vec<&str> = warnings.iter().map(|one| one.message.as_str()).collect();
+                    object(&json!({ "event": "warnings", "messages": messages }));
+                }
+            },
+        }
+    }
+
+    /// Time went by.
+    pub(super) fn tick(&mut self) {
+        let is_due = self.last.elapsed() >= INTERVAL;
+        self.show(is_due);
+    }
+
+    fn show(&mut self, is_due: bool) {
+        let elapsed = self.begin.elapsed().as_secs_f64();
+        let left = self.left.map(|(left, at)| (left - at.elapsed().as_secs_f64()).max(0.0));
+        if let Some(left) = left {
+            self.fraction = self.fraction.max(elapsed / (elapsed + left).max(1e-9)).min(1.0);
+        }
+        let to_go = left.map_or(String::new(), |left| format!("{} left", seconds(left)));
+        match &self.way {
+            Way::Bar(bar) => {
+                bar.set_message(visible(&self.what).into_owned());
+                bar.set_prefix(to_go);
+                bar.set_position((self.fraction * STEPS as f64) as u64);
+            }
+            Way::Plain if is_due => {
+                let percent = self.fraction * 100.0;
+                self.console.say(&format!("{percent:3.0}% {} {to_go}", self.what));
+            }
+            Way::Json if is_due => object(&json!({
+                "event": "progress", "stage": "bench", "what": self.what, "fraction": self.fraction,
+                "elapsed_seconds": elapsed, "eta_seconds": left,
+            })),
+            Way::Plain | Way::Json | Way::Silent => return,
+        }
+        if is_due {
+            self.last = Instant::now();
+        }
+    }
+
+    /// Clear what is not to stay.
+    pub(super) fn end(&mut self) {
+        if let Way::Bar(bar) = &self.way {
+            bar.finish_and_clear();
+        }
+    }
+
+    /// Whether errors are said in words, with their places.
+    pub(super) fn is_for_people(&self) -> bool {
+        !matches!(self.way, Way::Json)
+    }
+
+    pub(super) fn failed(&self, kind: &str, message: &str) {
+        if self.is_for_people() {
+            self.console.say(message);
+        } else {
+            object(&json!({ "event": "failed", "kind": kind, "message": message }));
+        }
+    }
+
+    pub(super) fn cancelled(&self, message: &str) {
+        if self.is_for_people() {
+            self.console.say(message);
+        } else {
+            object(&json!({ "event": "cancelled" }));
+        }
+    }
+
+    pub(super) fn written(&self, path: &Path, bytes: usize) {
+        match self.way {
+            Way::Bar(_) | Way::Plain => self.console.say(&format!("wrote {}", path.display())),
+            Way::Json => {
+                object(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }))
+            }
+            Way::Silent => {}
+        }
+    }
+
+    pub(super) fn done(&self, results: &Results) {
+        if !self.is_for_people() {
+            object(&json!({ "event": "done", "seconds": results.seconds }));
+        }
+    }
+}
+
+fn object(value: &Value) {
+    let _ = writeln!(std::io::stderr().lock(), "{value}");
+}

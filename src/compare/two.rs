@@ -1,0 +1,140 @@
+//! The error against two references that have noise of their own. With independent noise a and b, a reference is the truth plus
+//! noise, and the mean of (x − r₁)(x − r₂) is that of (x − truth)²: the noise is in no square.
+
+use super::Pair;
+use crate::film::RadianceImage;
+use crate::math::color::RELMSE_LEAST;
+use crate::math::{DVec3, Vec3};
+
+/// Two references of one picture, made independently of each other.
+#[derive(Clone, Debug)]
+pub struct TwoReferences {
+    pair: Pair,
+    /// 1/(r² + 0.01) of their mean r, over the number of channels and pixels.
+    weights: Vec<DVec3>,
+}
+
+impl TwoReferences {
+    /// The two pictures of the pair.
+    pub fn new(pair: Pair) -> Self {
+        let values = 3.0 * pair.a().pixels.len() as f64;
+        let weight = |(a, b): (&Vec3, &Vec3)| {
+            let mean = (a.as_dvec3() + b.as_dvec3()) / 2.0;
+            1.0 / ((mean * mean + RELMSE_LEAST) * values)
+        };
+        let weights = pair.a().pixels.iter().zip(&pair.b().pixels).map(weight).collect();
+        Self { pair, weights }
+    }
+
+    /// The two pictures.
+    pub fn pair(&self) -> &Pair {
+        &self.pair
+    }
+
+    /// relMSE of a picture of the same size: its mean is right whatever the noise of the references. It can be below 0.
+    pub fn error(&self, x: &RadianceImage) -> f64 {
+        self.cross(x, x)
+    }
+
+    /// The mean of (x − r)(y − r) relative to r²: of two pictures by one method with independent noise it is the square of what
+    /// they have in common, the bias.
+    pub fn cross(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
+        let places = self.places().zip(x.pixels.iter().zip(&y.pixels));
+        let sum = places.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
+            let (x, y) = (x.as_dvec3(), y.as_dvec3());
+            sum + weight * ((x - a) * (y - b) + (x - b) * (y - a)) / 2.0
+        });
+        sum.element_sum()
+    }
+
+    /// relMSE of one reference: what its noise would add to the error if it were alone.
+    pub fn noise(&self) -> f64 {
+        let sum = self.places().fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
+        sum.element_sum() / 2.0
+    }
+
+    /// The standard error that the noise of the references gives [`Self::error`]: pixels are taken as independent, channels as
+    /// one.
+    pub fn uncertainty(&self, x: &RadianceImage) -> f64 {
+        let variances = self.places().zip(&x.pixels).map(|((weight, a, b), x)| {
+            let (between, from) = ((a - b) * (a - b), x.as_dvec3() - (a + b) / 2.0);
+            let of = |channel: usize| {
+                // Of a·b and of (x − truth)(a + b), where the variance of one reference is half of `between`.
+                let variance = between[channel] * (between[channel] / 12.0 + from[channel] * from[channel]);
+                weight[channel] * variance.sqrt()
+            };
+            let deviation = of(0) + of(1) + of(2);
+            deviation * deviation
+        });
+        variances.sum::<f64>().sqrt()
+    }
+
+    fn places(&self) -> impl Iterator<Item = (DVec3, DVec3, DVec3)> {
+        let pixels = self.pair.a().pixels.iter().zip(&self.pair.b().pixels);
+        self.weights.iter().zip(pixels).map(|(weight, (a, b))| (*weight, a.as_dvec3(), b.as_dvec3()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Uniform in ±1, by a hash of its number.
+    fn uniform(number: u32) -> f32 {
+        let mixed = number.wrapping_mul(0x9e37_79b9) ^ (number.wrapping_mul(0x85eb_ca6b) >> 13);
+        let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);
+        ((mixed ^ (mixed >> 12)) >> 8) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    const SIDE: u32 = 64;
+
+    /// Grey of 0.5 with noise of ± `noise`, and an offset.
+    fn picture(seed: u32, noise: f32, offset: f32) -> RadianceImage {
+        let value = |i: u32| 0.5 + offset + noise * uniform(seed.wrapping_mul(1 << 20) + i);
+        let pixels = (0..SIDE * SIDE).map(|i| Vec3::new(value(3 * i), value(3 * i + 1), value(3 * i + 2)));
+        RadianceImage { width: SIDE, height: SIDE, pixels: pixels.collect() }
+    }
+
+    fn references(noise: f32) -> TwoReferences {
+        let names = [Path::new("r1"), Path::new("r2")];
+        TwoReferences::new(Pair::new(names, picture(1, noise, 0.0), picture(2, noise, 0.0)).expect("a pair"))
+    }
+
+    /// 1/(0.5² + 0.01).
+    const WEIGHT: f64 = 1.0 / 0.26;
+
+    #[test]
+    fn equal_references_give_the_plain_error() {
+        let references = references(0.0);
+        assert_eq!(references.noise(), 0.0);
+        let error = references.error(&picture(3, 0.0, 0.1));
+        assert!((error - 0.01 * WEIGHT).abs() < 1e-6, "{error}");
+        assert_eq!(references.uncertainty(&picture(3, 0.0, 0.1)), 0.0);
+    }
+
+    #[test]
+    fn the_references_noise_is_not_read_as_error_where_a_plain_error_would_have_it() {
+        let references = references(0.05);
+        let noise = 0.05_f64.powi(2) / 3.0 * WEIGHT;
+        assert!((references.noise() / noise - 1.0).abs() < 0.05, "{} against {noise}", references.noise());
+        let judged = picture(3, 0.01, 0.0);
+        let truth = 0.01_f64.powi(2) / 3.0 * WEIGHT;
+        let (error, uncertainty) = (references.error(&judged), references.uncertainty(&judged));
+        assert!((error - truth).abs() < 4.0 * uncertainty, "{error} ± {uncertainty}, not {truth}");
+        assert!(uncertainty < 0.05 * noise, "{uncertainty}");
+        let plain = super::super::linear::measure(
+            &Pair::new([Path::new("x"), Path::new("r")], judged, picture(1, 0.05, 0.0)).expect("a pair"),
+        );
+        assert!(plain.relmse > 20.0 * truth, "a single reference: {}", plain.relmse);
+    }
+
+    #[test]
+    fn pictures_with_independent_noise_have_their_bias_in_common() {
+        let references = references(0.02);
+        let cross = |offset| references.cross(&picture(5, 0.2, offset), &picture(6, 0.2, offset));
+        assert!((cross(0.1) / (0.01 * WEIGHT) - 1.0).abs() < 0.1, "{}", cross(0.1));
+        assert!(cross(0.0).abs() < 0.04 * references.error(&picture(5, 0.2, 0.0)), "{}", cross(0.0));
+    }
+}

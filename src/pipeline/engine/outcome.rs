@@ -1,0 +1,50 @@
+//! What came of a request, for those who ask for one picture and wait for it.
+
+use std::path::Path;
+
+use super::super::protocol::{Failure, Report, Request};
+use super::super::session::{Rendered, Unrendered};
+use super::super::sink::Sink;
+use super::super::stages::Stop;
+use super::{Engine, Meanwhile};
+use crate::film::Quantity;
+use crate::scene::diagnostic::Diagnostic;
+
+/// Of a request that was done.
+pub(super) struct Outcome {
+    pub(super) report: Report,
+    /// What is probably not meant.
+    pub(super) warnings: Vec<Diagnostic>,
+    /// Whether neither the picture nor its view changed.
+    pub(super) unchanged: bool,
+}
+
+impl Engine {
+    /// Do what is asked for; gives the picture as well, and what it is made of.
+    ///
+    /// # Errors
+    /// Why there is no picture.
+    pub(in crate::pipeline) fn rendered(
+        &mut self,
+        request: &Request,
+        sink: &Sink,
+        meanwhile: &Meanwhile<'_>,
+    ) -> Result<Rendered, Unrendered> {
+        match self.outcome(request, sink, meanwhile) {
+            Ok(Outcome { report, warnings, unchanged: _ }) => {
+                let canvas = self.films.current();
+                let gone = || Unrendered::Failed(Failure::Work("the film is gone".to_owned()));
+                let canvas = canvas.ok_or_else(gone)?;
+                let image = canvas.film.image(Quantity::Radiance);
+                Ok(Rendered { image, report: Box::new(report), warnings, key: canvas.key })
+            }
+            Err(Stop::Failed(failure)) => Err(Unrendered::Failed(failure)),
+            Err(Stop::Cancelled) => Err(Unrendered::Cancelled),
+        }
+    }
+
+    /// Whether a path leads to a file that the last request read.
+    pub(in crate::pipeline) fn reads(&self, path: &Path) -> bool {
+        self.inputs.contain(path)
+    }
+}

@@ -1,0 +1,299 @@
+//! `glimt bench`: small scenes measured as a whole.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+
+use serde_json::Value;
+
+use super::desk::Desk;
+
+/// A ball on a floor under a lamp: few pixels, some indirect light.
+const SCENE: &str = r#"[render]
+width = 24
+height = 16
+ambient = [0.5, 0.5, 0.5]
+[camera]
+position = [0, 1, 4]
+look_at = [0, 0.7, 0]
+[materials]
+wall = { diffuse = [0.6, 0.6, 0.5] }
+lamp = { emission = [8, 8, 8] }
+[[sphere]]
+center = [0, 0.5, 0]
+radius = 0.5
+material = "wall"
+[[quad]]
+material = "wall"
+[[quad]]
+corner = [-0.5, 2, -0.5]
+u = [1, 0, 0]
+v = [0, 0, 1]
+material = "lamp"
+"#;
+
+/// Small enough for a test.
+const SMALL: &str = "--samples 1,4 --reference-samples 64 --seeds 3 --progress none";
+
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.write("box.toml", SCENE);
+    desk
+}
+
+/// Runs it with a cache of its own; gives stdout and stderr.
+#[track_caller]
+fn bench(desk: &Desk, line: &str, code: i32) -> (String, String) {
+    let mut process = desk.glimt(&format!("bench {line}"));
+    let output = process.env("XDG_CACHE_HOME", desk.path("cache")).output().expect("it runs");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    let (stdout, stderr) = (text(output.stdout), text(output.stderr));
+    assert_eq!(output.status.code(), Some(code), "{line}\n{stdout}\n{stderr}");
+    (stdout, stderr)
+}
+
+fn json(desk: &Desk, name: &str) -> Value {
+    serde_json::from_slice(&desk.bytes(name)).expect("JSON")
+}
+
+/// The errors of all pictures.
+fn errors(results: &Value) -> Vec<f64> {
+    let methods = results["scenes"][0]["methods"].as_array().expect("methods");
+    let steps = methods.iter().flat_map(|method| method["steps"].as_array().expect("steps"));
+    let pictures = steps.flat_map(|step| step["pictures"].as_array().expect("pictures"));
+    pictures.map(|picture| picture["relmse"].as_f64().expect("a number")).collect()
+}
+
+#[test]
+fn a_scene_is_measured_from_end_to_end() {
+    let desk = desk();
+    let (stdout, stderr) =
+        bench(&desk, &format!("box.toml {SMALL} --csv a.csv --json a.json --plot a.svg"), 0);
+    assert_eq!(stderr, "");
+    assert!(
+        stdout
+            .starts_with("box.toml, 24×16 pixels, 3 seeds\nreferences: path, 2 × 64 samples (16 × the most)"),
+        "{stdout}"
+    );
+    for method in ["path ", "whitted photons ", "whitted "] {
+        assert!(
+            stdout.lines().filter(|line| line.starts_with(method) && !line.contains(':')).count() >= 2,
+            "{stdout}"
+        );
+    }
+    assert!(
+        stdout.contains("whitted: set-up") && stdout.contains("\n  BIAS: "),
+        "ambient light in place of what bounces: {stdout}"
+    );
+    assert!(stdout.lines().all(|line| line.chars().count() <= 80 || line.contains("set-up")), "{stdout}");
+    let results = json(&desk, "a.json");
+    assert_eq!(errors(&results).len(), 3 * 2 * 3);
+    assert!(errors(&results)[..3].iter().all(|error| *error > 0.0));
+    let text = String::from_utf8(desk.bytes("a.csv")).expect("UTF-8");
+    assert_eq!(text.split_terminator("\r\n").count(), 1 + 18);
+    let svg = String::from_utf8(desk.bytes("a.svg")).expect("UTF-8");
+    let plot = roxmltree::Document::parse(&svg).expect("XML");
+    let said: Vec<_> = plot.descendants().filter_map(|node| node.text()).collect();
+    assert!(said.iter().any(|text| text.contains("whitted photons, slope")), "{said:?}");
+    let seeds: Vec<u64> = (1..=3).chain(4..=6).collect();
+    let steps = results["scenes"][0]["methods"][0]["steps"].as_array().expect("steps");
+    let used = steps.iter().flat_map(|step| step["pictures"].as_array().expect("pictures"));
+    assert_eq!(used.map(|picture| picture["seed"].as_u64().expect("a seed")).collect::<Vec<_>>(), seeds);
+}
+
+#[test]
+fn the_same_seeds_have_the_same_errors_and_references_are_made_once() {
+    let desk = desk();
+    let line = format!("box.toml {SMALL} --integrator path --json");
+    bench(&desk, &format!("{line} a.json"), 0);
+    bench(&desk, &format!("{line} b.json --threads 1"), 0);
+    let (a, b) = (json(&desk, "a.json"), json(&desk, "b.json"));
+    assert_eq!(errors(&a), errors(&b));
+    let is_cached =
+        |results: &Value| results["scenes"][0]["reference"]["is_cached"].as_bool().expect("a flag");
+    assert!(!is_cached(&a) && is_cached(&b));
+    let kept = || {
+        fs::read_dir(desk.path("cache/glimt/references"))
+            .expect("a folder")
+            .map(|entry| entry.expect("a file").path())
+    };
+    for file in kept() {
+        fs::write(&file, "broken").expect("written");
+    }
+    bench(&desk, &format!("{line} c.json"), 0);
+    assert!(!is_cached(&json(&desk, "c.json")), "a broken file is made again");
+    assert_eq!(errors(&json(&desk, "c.json")), errors(&a));
+    desk.write("box.toml", SCENE.replace("0.6, 0.6, 0.5", "0.6, 0.6, 0.4"));
+    bench(&desk, &format!("{line} d.json"), 0);
+    assert!(!is_cached(&json(&desk, "d.json")), "another scene");
+    assert_eq!(kept().count(), 2);
+    bench(&desk, &format!("{line} e.json --no-cache"), 0);
+    assert!(
+        !is_cached(&json(&desk, "e.json"))
+            && errors(&json(&desk, "e.json")) == errors(&json(&desk, "d.json"))
+    );
+}
+
+#[test]
+fn a_run_is_compared_with_an_older_one() {
+    let desk = desk();
+    let line = format!("box.toml {SMALL} --integrator path");
+    bench(&desk, &format!("{line} --json old.json"), 0);
+    let (stdout, _) = bench(&desk, &format!("{line} --baseline old.json"), 0);
+    assert!(stdout.contains("against old.json, with 95 % confidence:"), "{stdout}");
+    assert!(stdout.contains("box.toml, path: error × 1.000 (1.000 to 1.000): the same"), "{stdout}");
+    let (stdout, _) = bench(&desk, &format!("{line} --clamp 0.01 --baseline old.json"), 0);
+    assert!(stdout.contains("nothing of old.json can be compared"), "another method: {stdout}");
+    let (stdout, _) = bench(
+        &desk,
+        &format!("{line} --set render.max_depth=1 --set render.shadow_samples=64 --baseline old.json"),
+        0,
+    );
+    assert!(stdout.contains(": error × 0."), "less light is less noise: {stdout}");
+    desk.write("odd.json", "{}");
+    let (_, stderr) = bench(&desk, &format!("{line} --baseline odd.json"), 2);
+    assert!(
+        stderr.starts_with("error: odd.json is no baseline: ")
+            && stderr.contains("`glimt bench --json FILE` wrote"),
+        "{stderr}"
+    );
+    assert!(
+        bench(&desk, &format!("{line} --baseline none.json"), 2)
+            .1
+            .starts_with("error: cannot read none.json: ")
+    );
+}
+
+#[test]
+fn given_references_decide_the_size_and_one_of_them_is_warned_of() {
+    let desk = desk();
+    for seed in [8, 9] {
+        let line =
+            format!("box.toml --once --integrator path --samples 64 --seed {seed} --width 12 --height 8");
+        desk.expect(&format!("{line} --progress none -o r{seed}.exr"), 0);
+    }
+    let line =
+        format!("box.toml --samples 1,4 --seeds 3 --integrator path --progress none --reference r8.exr");
+    let (two, _) = bench(&desk, &format!("{line} --reference r9.exr"), 0);
+    assert!(
+        two.starts_with("box.toml, 12×8 pixels, 3 seeds\nreferences: r8.exr and r9.exr, noise "),
+        "{two}"
+    );
+    let (one, _) = bench(&desk, &line, 0);
+    assert!(one.contains("\nreference: r8.exr, alone: its own noise is read as error\n"), "{one}");
+    let (_, stderr) = bench(&desk, &format!("{line} --csv r8.exr"), 2);
+    assert_eq!(
+        stderr,
+        "error: cannot write r8.exr: it is a reference of this call; name another file with --csv FILE\n"
+    );
+    let (_, stderr) = bench(&desk, "box.toml --reference none.exr", 2);
+    assert!(stderr.contains("cannot read none.exr"), "{stderr}");
+    assert!(
+        bench(&desk, "box.toml ball.toml --reference r8.exr", 2)
+            .1
+            .contains("--reference belongs to one scene")
+    );
+}
+
+#[test]
+fn no_output_is_an_input_or_another_output() {
+    let desk = desk();
+    desk.write("skin.ppm", "P6\n1 1\n255\nabc");
+    let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
+    desk.write("skin.toml", format!("{textured}\n[textures.skin]\nfile = \"skin.ppm\"\n"));
+    symlink("box.toml", desk.path("link.csv")).expect("a link");
+    for (line, words) in [
+        (
+            "box.toml --csv box.toml",
+            "cannot write box.toml: it is a scene of this call; name another file with --csv FILE",
+        ),
+        ("box.toml --csv link.csv", "cannot write link.csv: it is a scene of this call"),
+        (
+            "box.toml --csv a.json --json ./a.json",
+            "cannot write ./a.json: it is the file of --csv; name another file with --json FILE",
+        ),
+        ("box.toml --plot a.png", "cannot write a.png: the plot is an SVG; use a name that ends in .svg"),
+        (
+            "skin.toml --csv skin.ppm",
+            "cannot write skin.ppm: it is a file that skin.toml is made of; name another file",
+        ),
+    ] {
+        let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
+        assert!(stderr.starts_with(&format!("error: {words}")), "{stderr}");
+    }
+    assert_eq!(desk.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
+    let (_, stderr) = bench(&desk, "box.toml --csv none/a.csv", 1);
+    assert!(stderr.contains("the directory none does not exist"), "{stderr}");
+}
+
+#[test]
+fn wrong_calls_are_told_in_words() {
+    let desk = desk();
+    desk.write("wrong.toml", SCENE.replace("radius = 0.5", "radius = -1"));
+    let (_, stderr) = bench(&desk, "wrong.toml", 2);
+    assert!(stderr.contains("wrong.toml:13:"), "{stderr}");
+    for (line, words) in [
+        ("none.toml", "there is no such scene file"),
+        ("box.toml box.toml", "box.toml is given twice"),
+        ("box.toml --samples 0", "expected a whole number from 1 to 4294967295"),
+        ("box.toml --samples 1 --time 1", "cannot be used with"),
+        ("box.toml --seeds 0", "expected a whole number from 1 to 1000"),
+        ("box.toml --within 0", "expected a number of seconds above 0"),
+        ("box.toml --integrator paths", "paths"),
+        ("box.toml --seed 4294967290", "--seed 4294967290 is too large"),
+    ] {
+        let (_, stderr) = bench(&desk, line, 2);
+        assert!(stderr.contains(words), "{line}: {stderr}");
+    }
+}
+
+#[test]
+fn progress_is_said_in_lines_or_objects() {
+    let desk = desk();
+    let line = "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache";
+    let (stdout, plain) = bench(&desk, line, 0);
+    assert!(
+        plain.contains("box.toml: references of 24×16 pixels in ")
+            && plain.contains("box.toml: path, 1 sample: "),
+        "{plain}"
+    );
+    assert!(stdout.contains("too few seeds to tell a bias"), "{stdout}");
+    let (_, objects) = bench(&desk, &format!("{line} --progress json --csv a.csv"), 0);
+    let objects: Vec<Value> = objects.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let events: Vec<_> = objects.iter().map(|object| object["event"].as_str().expect("a name")).collect();
+    assert!(events.contains(&"progress") && events.contains(&"step"), "{events:?}");
+    assert_eq!(events[events.len() - 2..], ["written", "done"]);
+    let (_, failed) = bench(&desk, "none.toml --progress json", 2);
+    let failed: Value = serde_json::from_str(failed.lines().last().expect("a line")).expect("JSON");
+    assert_eq!((&failed["event"], &failed["kind"]), (&"failed".into(), &"scene".into()));
+}
+
+#[test]
+fn budgets_of_time_are_points_too() {
+    let desk = desk();
+    let line = "box.toml --time 0.02,0.01 --reference-samples 16 --seeds 2 --integrator path --progress none";
+    bench(&desk, &format!("{line} --json a.json"), 0);
+    let results = json(&desk, "a.json");
+    let steps = results["scenes"][0]["methods"][0]["steps"].as_array().expect("steps").clone();
+    let budgets: Vec<_> = steps.iter().map(|step| step["budget"].as_f64().expect("a time")).collect();
+    assert_eq!(budgets, [0.01, 0.02]);
+    assert!(steps.iter().all(|step| step["seconds"].as_f64() >= step["budget"].as_f64()));
+}
+
+#[test]
+fn a_signal_ends_it_cleanly() {
+    use std::process::Stdio;
+    let desk = desk();
+    let mut process =
+        desk.glimt("bench box.toml --reference-samples 4000000000 --no-cache --csv a.csv --progress json");
+    let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");
+    let mut said = std::io::BufReader::new(child.stderr.take().expect("stderr"));
+    let mut line = String::new();
+    while !line.contains("reference 1 of 2") {
+        line.clear();
+        assert!(std::io::BufRead::read_line(&mut said, &mut line).expect("a line") > 0, "it ended early");
+    }
+    let id = nix::unistd::Pid::from_raw(child.id() as i32);
+    nix::sys::signal::kill(id, nix::sys::signal::Signal::SIGINT).expect("sent");
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    assert!(!desk.path("a.csv").exists());
+}
