@@ -61,7 +61,7 @@ fn materials_have_the_documented_defaults() {
     assert!(scene.materials.iter().all(|material| !material.emits() && material.normal_map.is_none()));
     let kinds: Vec<_> = scene.materials.into_iter().map(|material| material.kind).collect();
     let mirror = MaterialKind::Mirror { reflectance: Vec3::splat(0.9) };
-    assert_eq!(kinds, [phong, mirror, MaterialKind::Glass { ior: 1.5, tint: Vec3::ONE }]);
+    assert_eq!(kinds, [phong, mirror, MaterialKind::Glass { ior: 1.5, tint: DVec3::ONE }]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::assets::FileMaterial;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, Texture, TextureFilter, Wrap};
 use crate::materials::{Bsdf, Emission, Glass, Material, Mirror, NormalMap, Phong};
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, ColorSource, EmissionSource, MaterialKind, Scene, TextureUse};
 
 /// A material of the scene file.
@@ -23,7 +23,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             ambient: ambient.as_ref().map(color),
         }),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: *reflectance }),
-        MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass { ior: *ior, tint: *tint }),
+        MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass::new(*ior, *tint)),
     };
     let emission = emission(scene, images, &material.emission);
     let normal_map = material.normal_map.map(|map| NormalMap {
@@ -76,7 +76,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match kind(own) {
         FileKind::Mirror => Bsdf::Mirror(Mirror { reflectance: own.specular.min(Vec3::ONE) }),
-        FileKind::Glass => Bsdf::Glass(Glass { ior: own.ior.clamp(1.0, 10.0), tint: Vec3::ONE }),
+        FileKind::Glass => Bsdf::Glass(Glass::new(own.ior.clamp(1.0, 10.0), DVec3::ONE)),
         FileKind::Phong => return file_phong(images, own),
     };
     Material { bsdf, emission: Emission::NONE, normal_map: None }

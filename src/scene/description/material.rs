@@ -6,7 +6,7 @@ use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use super::Located;
 use crate::choice;
 pub use crate::materials::texture::{TextureFilter, Wrap};
-use crate::math::{Vec2, Vec3};
+use crate::math::{DVec3, Vec2, Vec3};
 
 /// An image that materials look up.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,7 +131,7 @@ pub enum MaterialKind {
         /// Index of refraction inside, in [0.1, 10]; below 1: thinner than what is outside, as a bubble in water.
         ior: f32,
         /// Transmittance per unit of length inside, in [0, 1].
-        tint: Vec3,
+        tint: DVec3,
     },
 }
 
@@ -215,7 +215,7 @@ impl Fingerprinted for MaterialKind {
                 key.index(1).vec3(*reflectance);
             }
             Self::Glass { ior, tint } => {
-                key.index(2).f32(*ior).vec3(*tint);
+                key.index(2).f32(*ior).dvec3(*tint);
             }
         }
     }

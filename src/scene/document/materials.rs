@@ -7,7 +7,7 @@ use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
 use crate::choice;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 /// The materials of a file.
 pub(super) struct Materials {
@@ -123,6 +123,6 @@ fn mirror(table: &Table<'_>) -> MaterialKind {
 fn glass(table: &Table<'_>) -> MaterialKind {
     MaterialKind::Glass {
         ior: table.optional("ior").number32(Limits::Between(0.1, 10.0)).unwrap_or(1.5),
-        tint: table.optional("tint").fraction().unwrap_or(Vec3::ONE),
+        tint: table.optional("tint").exact_fraction().unwrap_or(DVec3::ONE),
     }
 }

@@ -414,7 +414,7 @@ fn light_inside_glass_is_tinted_on_its_way_from_the_lamp_as_well() {
     // Floor, lamp and eye are in one glass: tint^(lamp to floor) · tint^(floor to eye).
     let tint = 0.5_f64;
     let inside = || {
-        let glass = MaterialKind::Glass { ior: 1.5, tint: Vec3::splat(tint as f32) };
+        let glass = MaterialKind::Glass { ior: 1.5, tint: DVec3::splat(tint) };
         let floor = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
         let room =
             scene().shape(floor, matte(0.6)).cuboid(DVec3::Y, v(8.0, 6.0, 8.0), DVec3::ZERO, plain(glass));

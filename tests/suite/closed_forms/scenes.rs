@@ -320,7 +320,7 @@ pub fn mirror(reflectance: f32) -> Material {
 }
 
 pub fn glass(ior: f32) -> Material {
-    plain(MaterialKind::Glass { ior, tint: Vec3::ONE })
+    plain(MaterialKind::Glass { ior, tint: DVec3::ONE })
 }
 
 /// A material of a mesh file by its illumination model: 2 is matte grey, 9 glass.

@@ -303,7 +303,7 @@ fn glass_that_stands_on_something_opaque() {
 #[test]
 fn tints_count_where_their_glass_is() {
     // Straight down through 1 of one tint and 2 of another, of one index: no surface between them reflects.
-    let tinted = |tint: f32| plain(MaterialKind::Glass { ior: 1.5, tint: Vec3::splat(tint) });
+    let tinted = |tint: f64| plain(MaterialKind::Glass { ior: 1.5, tint: DVec3::splat(tint) });
     let level = Turned::by(DVec3::ZERO);
     let r = fresnel(1.0, 1.5, 0.0);
     for first in [false, true] {
@@ -313,7 +313,7 @@ fn tints_count_where_their_glass_is() {
         let build = order.into_iter().fold(scene(), |build, (shape, own)| build.shape(shape, own));
         let build = build.shape(level.square(-3.0, 5000.0), emitter(1.0)).depth(3);
         let seen = build.seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2));
-        let passed = f64::from(Glass { ior: 1.5, tint: Vec3::splat(0.8) }.transmittance(2.0).x) * 0.5;
+        let passed = f64::from(Glass::new(1.5, DVec3::splat(0.8)).transmittance(2.0).x) * 0.5;
         assert_close("straight through", seen.value(), (1.0 - r).powi(2) * passed);
     }
 }
@@ -322,7 +322,7 @@ fn tints_count_where_their_glass_is() {
 fn where_glasses_overlap_the_later_counts() {
     // From y = 2 to 0 and from 1 to −1: between 1 and 0 the later one.
     let level = Turned::by(DVec3::ZERO);
-    let tinted = |ior: f32, tint: f32| plain(MaterialKind::Glass { ior, tint: Vec3::splat(tint) });
+    let tinted = |ior: f32, tint: f64| plain(MaterialKind::Glass { ior, tint: DVec3::splat(tint) });
     for (order, exact) in [([0, 1], 0.5 * 0.8 * 0.8), ([1, 0], 0.5 * 0.5 * 0.8)] {
         let own = [
             (level.cuboid(v(-9.0, 0.0, -9.0), v(9.0, 2.0, 9.0)), tinted(1.0, 0.5)),

@@ -9,8 +9,8 @@ use super::super::limits::Limits;
 use super::super::names::Names;
 use super::super::value::{Item, limited, wrong_type};
 use super::Key;
-use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
+use crate::math::{DVec3, Vec3};
 
 const COLOR: &str = "a colour: [r, g, b], a number, \"#rrggbb\" or a name";
 const COLOR_OR_TEXTURE: &str =
@@ -21,11 +21,16 @@ const EMISSION: &str =
 impl Key<'_> {
     /// A colour ≥ 0, decoded to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
-        self.color_of(Limits::AtLeast(0.0), COLOR)
+        self.color_of(Limits::AtLeast(0.0), COLOR).map(DVec3::as_vec3)
     }
 
     /// A colour of components in [0, 1]: a part of the light.
     pub(in super::super) fn fraction(&self) -> Option<Vec3> {
+        self.exact_fraction().map(DVec3::as_vec3)
+    }
+
+    /// The same as it is written: a part so small or so near to 1 that `f32` does not tell it from that.
+    pub(in super::super) fn exact_fraction(&self) -> Option<DVec3> {
         self.color_of(Limits::Between(0.0, 1.0), COLOR)
     }
 
@@ -38,7 +43,8 @@ impl Key<'_> {
             return texture.map(ColorSource::Texture);
         }
         self.is_no_texture(textures, COLOR_OR_TEXTURE)?;
-        self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE).map(ColorSource::Constant)
+        self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE)
+            .map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
     /// Radiance: a colour ≥ 0, or a texture and what that is multiplied by.
@@ -52,7 +58,7 @@ impl Key<'_> {
             return Some(EmissionSource { scale: scale?, texture: Some(texture?) });
         }
         self.is_no_texture(textures, EMISSION)?;
-        self.color_of(Limits::AtLeast(0.0), EMISSION).map(EmissionSource::constant)
+        self.color_of(Limits::AtLeast(0.0), EMISSION).map(|color| EmissionSource::constant(color.as_vec3()))
     }
 
     /// None, and an error, where a value is the bare name of a texture.
@@ -70,19 +76,18 @@ impl Key<'_> {
         Some(())
     }
 
-    fn color_of(&self, limits: Limits, expected: &str) -> Option<Vec3> {
+    fn color_of(&self, limits: Limits, expected: &str) -> Option<DVec3> {
         let value = self.value?;
         match value.item() {
-            Item::String(text) => return self.written_color(text),
+            Item::String(text) => return self.written_color(text).map(Vec3::as_dvec3),
             Item::Integer { .. } | Item::Float(_) => {
-                return limited(self.context, self.name, value, limits, expected)
-                    .map(|grey| Vec3::splat(grey as f32));
+                return limited(self.context, self.name, value, limits, expected).map(DVec3::splat);
             }
             Item::Boolean(_) | Item::Datetime | Item::Array(_) | Item::Table(_) => {}
         }
         if value.array().is_some_and(|array| array.len() == 3) {
             let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
-            return Some(Vec3::from_array(rgb.map(|component| component as f32)));
+            return Some(DVec3::from_array(rgb));
         }
         wrong_type(self.context, self.name, value, expected);
         None
