@@ -165,3 +165,23 @@ fn an_error_that_stays_is_shown() {
     folder.write("scene.toml", half);
     terminal.wait_for("broken");
 }
+
+#[test]
+fn a_file_that_breaks_does_not_stop_the_render_of_the_last_good_scene() {
+    let folder = Folder::new();
+    // Long enough for a save.
+    let slow = SCENE.replace("samples = 4", "samples = 4000").replace("width = 64", "width = 320");
+    let slow = slow.replace("height = 48", "height = 240");
+    folder.write("scene.toml", &slow);
+    let terminal = folder.terminal();
+    terminal.wait_for("ETA");
+    folder.write("scene.toml", "[render");
+    terminal.wait_for("broken");
+    terminal.wait("the picture on disk", |_| folder.path("scene.png").is_file());
+    terminal.wait_for("broken");
+    let path = folder.path("scene.png");
+    let written = std::fs::read(&path).expect("a picture");
+    folder.write("scene.toml", &slow);
+    terminal.wait_for("done");
+    assert_eq!(written, folder.once(&[]));
+}

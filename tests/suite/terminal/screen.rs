@@ -151,3 +151,23 @@ fn one_line_stays_when_it_is_left() {
     terminal.press("q");
     assert_eq!(terminal.end_saying("wrote scene.png: 64×48, 4 samples, "), 0);
 }
+
+#[test]
+fn a_terminal_of_256_colours_gets_no_others() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("COLORTERM", "")]);
+    terminal.wait_for_render(1);
+    let is_of_palette = |color| matches!(color, vt100::Color::Default | vt100::Color::Idx(_));
+    let fixed = |screen: &vt100::Screen| {
+        let colors = super::pty::cells(screen).map(|cell| (cell.fgcolor(), cell.bgcolor()));
+        colors.filter(|(fg, _)| matches!(fg, vt100::Color::Idx(16..))).count()
+    };
+    terminal.wait("a picture", |screen| fixed(screen) > 50);
+    terminal.press("l");
+    terminal.wait_for("camera moved");
+    terminal.look(|screen| {
+        for cell in super::pty::cells(screen) {
+            assert!(is_of_palette(cell.fgcolor()) && is_of_palette(cell.bgcolor()), "{:?}", cell.contents());
+        }
+    });
+}
