@@ -208,7 +208,7 @@ fn another_size_of_the_preview_interrupts_nothing() {
 
 #[test]
 fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is_kept() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 400"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
     (bench.writing, bench.preview) =
         (Writing::Try, Some(PreviewSize { width: 12, height: 12, around: None }));
     let first = bench.send();
@@ -230,7 +230,7 @@ fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is
             other => panic!("{other:?}"),
         }
     }
-    assert!(is_seen && samples_on_disk(&bench).starts_with("400"), "{}", samples_on_disk(&bench));
+    assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
     bench.edit("width = = 40", "width = 40");
     let report = bench.done().0;
     assert_statuses(&report, "rrrrrsrr");
