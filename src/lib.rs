@@ -24,7 +24,7 @@
 //! | [`compare`] | the error of a picture against a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
 //! | [`pipeline`] | stages, caches, the worker, watching files |
-//! | [`bench`] | run time against error: references, estimates, tables, plots |
+//! | [`mod@bench`] | run time against error: references, estimates, tables, plots |
 //! | [`tui`] | the terminal front end |
 //! | [`cli`] | arguments, the headless front end |
 //!

@@ -65,7 +65,7 @@ pub struct MethodResult {
     pub slope: Option<Slope>,
     /// Of the last two steps.
     pub last_slope: Option<Slope>,
-    /// When it reaches [`TARGETS`], in their order.
+    /// When it reaches the relMSEs that the table asks for, in their order.
     pub time_to: [Option<TimeTo>; TARGETS.len()],
     /// Whether it ends at what the references show.
     pub verdict: Verdict,

@@ -69,7 +69,7 @@ impl Steps {
 /// by earlier steps does worse, as few bright pixels may decide it.
 const RATE: f64 = 2.7;
 
-/// The variance is taken to fall with this power of the samples: the binary logarithm of [`RATE`].
+/// The variance is taken to fall with this power of the samples: the binary logarithm of how many times smaller twice the samples make it, 2.7.
 pub const RATE_POWER: f64 = 1.432_959_407_276_106_2;
 
 /// The variance of means of `count` samples, by the sums of squared steps of one half to 2, 4, … of them: that of the last step and

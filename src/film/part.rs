@@ -72,7 +72,7 @@ impl Part {
 /// Whether the right one of a pair of neighbours is in the first half: every two rows it is the other one.
 #[inline(always)]
 fn swaps(pair: u32, width: u32) -> u32 {
-    pair / width & 1
+    (pair / width) & 1
 }
 
 #[cfg(test)]
@@ -101,16 +101,11 @@ mod tests {
     fn lines_lie_in_both_halves() {
         let rect = Rect { x: 0, y: 0, width: 8, height: 8 };
         let half = |x: u32, y: u32| Part::half_of(y * 8 + x, rect);
-        let lines: [fn(u32, u32) -> (u32, u32); 4] = [
-            |line, at| (at, line),
-            |line, at| (line, at),
-            |line, at| (at, (at + line) % 8),
-            |line, at| (at, (line + 7 - at) % 8),
-        ];
-        for (i, place) in lines.into_iter().enumerate() {
-            for line in 0..8 {
-                let first = (0..8).map(|at| place(line, at)).filter(|&(x, y)| half(x, y) == 0).count();
-                assert_eq!(first, 4, "line {line} of kind {i}");
+        for line in 0..8 {
+            let places = |at| [(at, line), (line, at), (at, (at + line) % 8), (at, (line + 7 - at) % 8)];
+            for kind in 0..4 {
+                let first = (0..8).map(|at| places(at)[kind]).filter(|&(x, y)| half(x, y) == 0).count();
+                assert_eq!(first, 4, "line {line} of kind {kind}");
             }
         }
     }

@@ -171,14 +171,13 @@ fn given_references_decide_the_size_and_one_of_them_is_warned_of() {
             format!("box.toml --once --integrator path --samples 64 --seed {seed} --width 12 --height 8");
         desk.expect(&format!("{line} --progress none -o r{seed}.exr"), 0);
     }
-    let line =
-        format!("box.toml --samples 1,4 --seeds 3 --integrator path --progress none --reference r8.exr");
+    let line = "box.toml --samples 1,4 --seeds 3 --integrator path --progress none --reference r8.exr";
     let (two, _) = bench(&desk, &format!("{line} --reference r9.exr"), 0);
     assert!(
         two.starts_with("box.toml, 12×8 pixels, 3 seeds\nreferences: r8.exr and r9.exr, noise "),
         "{two}"
     );
-    let (one, _) = bench(&desk, &line, 0);
+    let (one, _) = bench(&desk, line, 0);
     assert!(one.contains("\nreference: r8.exr, alone: its own noise is read as error\n"), "{one}");
     let (_, stderr) = bench(&desk, &format!("{line} --csv r8.exr"), 2);
     assert_eq!(

@@ -148,7 +148,7 @@ fn a_known_picture_with_photons_has_its_bits_by_all_threads_and_instructions() {
     const KNOWN: u64 = 0x2b11_c876_ebd8_e18f;
     let desk = Desk::new();
     let text = EVERYTHING.replace("FILTER", "box").replace("INTEGRATOR", "whitted");
-    desk.write("all.toml", &format!("{text}[photons]\nenabled = true\ncount = 5000\n"));
+    desk.write("all.toml", format!("{text}[photons]\nenabled = true\ncount = 5000\n"));
     let mut wrong = Vec::new();
     for (name, instructions) in
         [("portable", Instructions::Portable), ("avx2", Instructions::Avx2), ("avx512", Instructions::Avx512)]

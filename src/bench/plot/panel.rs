@@ -138,7 +138,7 @@ fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
         2 => &[(0, -1), (1, 0), (0, 1), (-1, 0)],
         _ => &[(-1, -1), (1, -1), (0, 1)],
     };
-    let size = if number % 4 == 0 { MARKER - 1 } else { MARKER + 1 };
+    let size = if number.is_multiple_of(4) { MARKER - 1 } else { MARKER + 1 };
     let corner = |(x, y): &(i32, i32)| (at.0 + x * size, at.1 + y * size);
     Polygon::new(corners.iter().map(corner).collect::<Vec<_>>(), color(number).filled())
 }

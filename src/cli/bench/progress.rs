@@ -145,7 +145,7 @@ impl Said {
         match self.way {
             Way::Bar(_) | Way::Plain => self.console.say(&format!("wrote {}", path.display())),
             Way::Json => {
-                object(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }))
+                object(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }));
             }
             Way::Silent => {}
         }

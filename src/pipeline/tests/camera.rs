@@ -161,20 +161,16 @@ fn a_kept_camera_follows_links_and_keeps_permissions() {
 
 #[test]
 fn a_file_that_would_lose_something_keeps_its_camera() {
-    let harm: [(&str, fn(&Bench)); 2] = [
-        ("has other names", |bench| {
-            fs::hard_link(bench.path("scene.toml"), bench.path("other.toml")).expect("another name");
-        }),
-        ("is read-only", |bench| {
-            let path = bench.path("scene.toml");
+    for (why, is_linked) in [("has other names", true), ("is read-only", false)] {
+        let mut bench = Bench::new(SCENE);
+        let path = bench.path("scene.toml");
+        if is_linked {
+            fs::hard_link(path, bench.path("other.toml")).expect("another name");
+        } else {
             let mut permissions = fs::metadata(&path).expect("a file").permissions();
             permissions.set_readonly(true);
             fs::set_permissions(path, permissions).expect("permitted");
-        }),
-    ];
-    for (why, harm) in harm {
-        let mut bench = Bench::new(SCENE);
-        harm(&bench);
+        }
         bench.overrides.camera = moved();
         let camera = camera(&mut bench);
         let refusal = keep(&mut bench, camera).expect_err(why);

@@ -78,7 +78,6 @@ fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort)
         let (blocks, whole) = (0..BLOCKS * BLOCKS, BLOCKS * BLOCKS);
         let ((a, da), (b, db)) = (by_paths[whole], by_photons[whole]);
         let error = da.hypot(db);
-        eprintln!("{what}: {:+.3} ± {:.3} %", 100.0 * (b / a - 1.0), 100.0 * error / a);
         assert!(error < MOST_ERROR * a, "{what}: {b} ± {db} says nothing, by paths {a} ± {da}");
         assert!((a - b).abs() < 4.0 * error + SLACK * a, "{what}: {b} ± {db}, by paths {a} ± {da}");
         for i in blocks {

@@ -211,7 +211,7 @@ fn absorption_along_a_slab_and_a_ball() {
     let chord = 2.0 * (1.0 - (h / 1.5).powi(2)).sqrt();
     for channel in 0..3 {
         // The sky is seen by the reflection, straight through, and by nothing else at depth 2.
-        let exact = r + (1.0 - r).powi(2) * f64::from(tint[channel]).powf(chord);
+        let exact = r + (1.0 - r).powi(2) * tint[channel].powf(chord);
         assert_close("chord", ball.color()[channel], exact);
     }
 }
