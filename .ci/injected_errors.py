@@ -95,7 +95,7 @@ FAULTS = [
     ("orders wait for the photons", "pipeline/stages/photons.rs", "Err(RecvTimeoutError::Timeout) => ⟦tick()⟧,", "()",
      "pipeline::tests::photons::write_is_heard_while_photons_are_sent"),
     ("the time is not heard while photons are sent", "pipeline/stages/render.rs",
-     "samples..part)?;\n            if ⟦self.is_over_time⟧ {", "false",
+     "samples..end)?;\n            if ⟦self.is_over_time⟧ {", "false",
      "pipeline::tests::photons::time_that_ends_while_photons_are_sent_ends_the_render"),
     ("a first picture without photons", "pipeline/stages/render.rs", "photons: ⟦maps.as_ref()⟧, ..tracer };", "None",
      "pipeline::tests::photons::the_first_coarse_picture_has_photons"),
