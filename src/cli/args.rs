@@ -157,7 +157,7 @@ pub struct RenderArgs {
     /// Stop sampling each tile once its noise is below this part of its brightness; 0: never
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = error, help_heading = "Picture")]
     pub error: Option<f32>,
-    /// Stop after this long, with the samples that there are
+    /// Stop after this long; until then, samples go where they lower the error most
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Picture")]
     pub time: Option<f64>,
     /// Render these pixels only (left, top, width, height); the rest stays black

@@ -226,8 +226,8 @@ impl<'a> Painter<'a> {
         Ok(photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?)
     }
 
-    /// Samples that the halves of each tile are to have next, where there is a budget of time: some where they lower the error most.
-    /// Photons cost as much for the samples of one tile as for those of all, and an error asked for tells by itself where samples go.
+    /// Samples that the halves of each cell are to have next, where there is a budget of time: some where they lower the error most.
+    /// Photons cost as much for the samples of one cell as for those of all, and an error asked for tells by itself where samples go.
     fn next_round(&self) -> Option<Vec<[u32; 2]>> {
         let Rendering { plan, photons, .. } = *self.rendering;
         let Render { samples, error, .. } = plan.settings.render;
@@ -237,7 +237,7 @@ impl<'a> Painter<'a> {
         next_round(&self.canvas.film, &self.canvas.done, &self.canvas.rays, samples)
     }
 
-    /// Bring the halves of all tiles to these samples, in steps that are short.
+    /// Bring the halves of all cells to these samples, in steps that are short.
     fn round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
         const STEP: Duration = Duration::from_millis(30);
         /// Pixels of half a tile.
