@@ -151,6 +151,23 @@ impl Film {
         Some(HalfNoise { variance, mean: sum / pixels, samples })
     }
 
+    /// The noise in one half of all cells of a tile; none as in [`Film::half_noise`].
+    pub fn tile_noise(&self, tile: usize, half: usize) -> Option<HalfNoise> {
+        let (mut pixels, mut all) = (0.0, HalfNoise { variance: 0.0, mean: 0.0, samples: u32::MAX });
+        for cell in CELLS * tile..CELLS * (tile + 1) {
+            let count = self.half_pixel_count(cell, half) as f64;
+            if count > 0.0 {
+                let HalfNoise { variance, mean, samples } = self.half_noise(cell, half)?;
+                all.variance += count * variance;
+                all.mean += count * mean;
+                all.samples = all.samples.min(samples);
+                pixels += count;
+            }
+        }
+        let HalfNoise { variance, mean, samples } = all;
+        (pixels > 0.0).then(|| HalfNoise { variance: variance / pixels, mean: mean / pixels, samples })
+    }
+
     /// The error of a half of a cell as it was after the first `count` samples of each of its pixels, a power of two: the mean over the
     /// pixels of the variance of their luminance over luminance² + [`RELMSE_LEAST`]. None for fewer than two samples, for more than
     /// there are, and where there are no pixels.

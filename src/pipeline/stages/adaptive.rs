@@ -1,11 +1,11 @@
 //! Which parts of a picture have enough samples.
 //!
 //! To stop by the same samples that the picture is the mean of would make it too dark: what is rare and bright ends no sampling
-//! where it was not met yet, and goes on where it was. So one half of a cell, which has every other pixel, stops by the noise of the
+//! where it was not met yet, and goes on where it was. So one half of a tile, which has every other pixel, stops by the noise of the
 //! other half, whose samples are others; the noise of both is much the same. A little of the bias is left, as a half
 //! that has stopped tells the other no more: a tenth of it, which is a thirtieth of the noise where that is worst.
 
-use crate::film::{Film, HalfNoise, samples_to};
+use crate::film::{CELLS, Film, HalfNoise, samples_to};
 
 /// Samples before which noise is not asked for.
 pub(super) const LEAST: u32 = 16;
@@ -64,8 +64,8 @@ impl Goals {
             if (0..2).all(|half| self.decided[cell][half] < u32::MAX || done[half] != samples) {
                 continue;
             }
-            let [even, odd] = [0, 1].map(|half| film.half_noise(cell, half));
-            // A cell of one pixel has no other half.
+            let [even, odd] = [0, 1].map(|half| film.tile_noise(cell / CELLS, half));
+            // A tile of one pixel has no other half.
             let of_others = [odd.or(even), even.or(odd)];
             let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
             for half in 0..2 {
@@ -94,7 +94,7 @@ fn wanted(noise: &HalfNoise, brightness: f64, error: f64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{CELLS, Part, Pixels, Rect, TileSamples};
+    use crate::film::{Part, Pixels, Rect, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit;
 
