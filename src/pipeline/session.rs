@@ -83,7 +83,7 @@ impl Session {
 }
 
 /// Nobody gives any.
-struct NoOrders;
+pub(super) struct NoOrders;
 
 impl Orders for NoOrders {
     fn wants_write(&self) -> bool {

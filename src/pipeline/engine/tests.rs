@@ -5,29 +5,9 @@ use std::sync::mpsc;
 
 use super::*;
 use crate::pipeline::protocol::{PreviewSlot, Writing};
+use crate::pipeline::session::NoOrders;
 use crate::pipeline::tests::{OBJ, SCENE};
 use crate::world::{Geometry, MeshTree};
-
-/// Nobody orders anything.
-struct Silence;
-
-impl Orders for Silence {
-    fn wants_write(&self) -> bool {
-        false
-    }
-
-    fn take_write(&self) -> bool {
-        false
-    }
-
-    fn take_preview(&self) -> Option<Option<PreviewSize>> {
-        None
-    }
-
-    fn take_errand(&self) -> Option<Errand> {
-        None
-    }
-}
 
 /// What was made for a request.
 struct Made {
@@ -67,7 +47,11 @@ impl Desk {
             first: None,
         };
         let token = CancelToken::new();
-        self.engine.request(&request, &sink, &Meanwhile { token: &token, writing: &token, orders: &Silence });
+        self.engine.request(
+            &request,
+            &sink,
+            &Meanwhile { token: &token, writing: &token, orders: &NoOrders },
+        );
         let events: Vec<_> = received.try_iter().collect();
         assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
         let geometry = self.engine.accel.latest().expect("it was built").clone();
