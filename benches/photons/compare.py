@@ -132,9 +132,9 @@ def mitsuba(subject, samples=256):
 
 
 def last_slope(subject, errors):
-    """How the error falls over the last decade of passes, or nearly."""
+    """How the error falls over the last decade of passes, as nearly as there are rows."""
     last = max(errors)
-    first = max(1, last // 8)
+    first = min(errors, key=lambda passes: abs(math.log(10 * passes / last)))
     if first < last:
         slope = math.log(errors[last] / errors[first]) / math.log(last / first)
         print(f"{subject.scene.name:12}slope from {first} to {last} passes {slope:+.2f}", flush=True)
@@ -150,22 +150,24 @@ def main():
     parser.add_argument("names", nargs="*", default=["caustic", "box", "large"])
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--most", type=int, default=64)
+    parser.add_argument("--passes", type=lambda text: [int(word) for word in text.split(",")])
     parser.add_argument("--reference", type=int, default=512)
     parser.add_argument("--glimt", default=ROOT / "target" / "release" / "glimt")
     asked = parser.parse_args()
+    passes = asked.passes or powers(asked.most)
     dr.set_thread_count(THREADS)
     print(f"{'':12}{'':10}{'passes':>6}{'seconds':>10}{'relMSE':>11}{'slope':>8}{'mean':>11}")
     square = (256, 256)
     by_paths = ["--integrator", "path"]
     if "caustic" in asked.names:
         subject = Subject(asked.glimt, CAUSTIC, square, asked.reference, True)
-        last_slope(subject, subject.rows("photons", powers(asked.most), asked.seeds))
+        last_slope(subject, subject.rows("photons", passes, asked.seeds))
         subject.rows("path", [256], 3, by_paths)
         mitsuba(subject)
     if "box" in asked.names:
         box = Scene(name="box", anchor=None, boxes=BLOCKS, max_depth=DEPTH, **BOX)
         subject = Subject(asked.glimt, box, square, asked.reference, False)
-        last_slope(subject, subject.rows("photons", powers(asked.most), asked.seeds))
+        last_slope(subject, subject.rows("photons", passes, asked.seeds))
         subject.rows("path", [64, 256], asked.seeds, by_paths)
     if "large" in asked.names:
         settings = ["render.max_depth=30", "photons.bounces=30"]

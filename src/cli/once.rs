@@ -102,7 +102,21 @@ fn follow(
         match &mut event {
             Event::Settings { settings, .. } => idle = without_effect(&order.overrides, settings),
             Event::Done { warnings, .. } => warnings.append(&mut idle),
-            _ => {}
+            Event::Started { .. }
+            | Event::Stage { .. }
+            | Event::Files { .. }
+            | Event::Warnings { .. }
+            | Event::Asset { .. }
+            | Event::Progress { .. }
+            | Event::Preview { .. }
+            | Event::Written { .. }
+            | Event::WriteFailed { .. }
+            | Event::Refused { .. }
+            | Event::WritePostponed { .. }
+            | Event::CameraKept { .. }
+            | Event::Picked { .. }
+            | Event::Failed { .. }
+            | Event::Cancelled { .. } => {}
         }
         reporter.event(&event);
         match event {
@@ -122,7 +136,18 @@ fn follow(
                 return if is_said { exit_of(&failure) } else { failed(&failure, console) };
             }
             Event::Cancelled { .. } => return Exit::FAILED,
-            _ => {}
+            Event::Started { .. }
+            | Event::Stage { .. }
+            | Event::Files { .. }
+            | Event::Warnings { .. }
+            | Event::Asset { .. }
+            | Event::Settings { .. }
+            | Event::Progress { .. }
+            | Event::Preview { .. }
+            | Event::Refused { .. }
+            | Event::WritePostponed { .. }
+            | Event::CameraKept { .. }
+            | Event::Picked { .. } => {}
         }
     }
 }

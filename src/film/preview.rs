@@ -148,7 +148,8 @@ impl Share {
             let down = rows.covered(rect.y + y);
             for (x, across) in across.iter().enumerate() {
                 let index = y as usize * rect.width as usize + x;
-                let Some(mean) = tile.value(quantity, index, rect.width as usize) else { continue };
+                let place = (index, rect.width as usize);
+                let Some(mean) = tile.value(quantity, film.convergence(), place) else { continue };
                 for (row, row_weight) in down.clone() {
                     let line = &mut self.cells[(row - self.y) as usize * self.width as usize..];
                     for &(column, column_weight) in across {

@@ -1,6 +1,6 @@
 //! What a picture is made of: the samples' mean, or numbers about the samples.
 
-use super::noise::pixel_variance;
+use super::noise::Convergence;
 use super::sums::Tile;
 use crate::math::DVec3;
 
@@ -20,17 +20,22 @@ pub enum Quantity {
 const REACH: usize = 2;
 
 impl Tile {
-    /// A number of a pixel in a tile of so many columns; none where it has no sample.
-    pub(super) fn value(&self, quantity: Quantity, index: usize, columns: usize) -> Option<DVec3> {
+    /// A number of the pixel of an index in a tile of so many columns; none where it has no sample.
+    pub(super) fn value(
+        &self,
+        quantity: Quantity,
+        convergence: Convergence,
+        (index, columns): (usize, usize),
+    ) -> Option<DVec3> {
         match quantity {
             Quantity::Radiance => self.mean(index),
             Quantity::Samples => (self.count(index) > 0).then(|| DVec3::splat(f64::from(self.count(index)))),
-            Quantity::Error => self.error(index, columns).map(DVec3::splat),
+            Quantity::Error => self.error(convergence, index, columns).map(DVec3::splat),
         }
     }
 
     /// Standard error of a pixel; 0 for a single sample, of which nothing is known.
-    fn error(&self, index: usize, columns: usize) -> Option<f64> {
+    fn error(&self, convergence: Convergence, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);
         let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
@@ -44,8 +49,11 @@ impl Tile {
                 }
             }
         }
-        let variance =
-            if count > 1 && pixels > 0 { pixel_variance(sum / f64::from(pixels), count) } else { 0.0 };
+        let variance = if count > 1 && pixels > 0 {
+            convergence.pixel_variance(sum / f64::from(pixels), count)
+        } else {
+            0.0
+        };
         (count > 0).then(|| variance.sqrt())
     }
 }

@@ -18,7 +18,8 @@ impl Film {
                 for x in part.x..part.x + part.width {
                     let columns = place.width as usize;
                     let at = (y - place.y) as usize * columns + (x - place.x) as usize;
-                    if let Some(value) = tile.value(quantity, at, columns) {
+                    let value = tile.value(quantity, self.convergence(), (at, columns));
+                    if let Some(value) = value {
                         image.pixels[index_in(rect, x, y)] = value.as_vec3();
                     }
                 }

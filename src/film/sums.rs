@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::noise::{Steps, luminance};
+use super::noise::{Convergence, Steps, luminance};
 use super::part::Part;
 use super::{Quantity, RadianceImage, Rect, TileSamples};
 use crate::math::{DVec3, Vec3};
@@ -69,6 +69,7 @@ pub struct Film {
     order: OnceLock<Vec<usize>>,
     non_finite_samples: AtomicU64,
     id: u64,
+    pub(super) convergence: Convergence,
 }
 
 /// Sums of one tile, in rows; empty until its first samples come, so that the memory is first touched by the thread
@@ -217,7 +218,13 @@ impl Film {
             order: OnceLock::new(),
             non_finite_samples: AtomicU64::new(0),
             id: IDS.fetch_add(1, Ordering::Relaxed),
+            convergence: Convergence::default(),
         })
+    }
+
+    /// The same film, whose noise falls so.
+    pub fn converging(self, convergence: Convergence) -> Self {
+        Self { convergence, ..self }
     }
 
     /// Columns of the whole picture.
@@ -308,7 +315,7 @@ impl Film {
                 let line = &mut image.pixels[start..][..rect.width as usize];
                 for (x, pixel) in line.iter_mut().enumerate() {
                     let columns = rect.width as usize;
-                    let value = tile.value(quantity, row as usize * columns + x, columns);
+                    let value = tile.value(quantity, self.convergence, (row as usize * columns + x, columns));
                     *pixel = value.map_or(Vec3::ZERO, DVec3::as_vec3);
                 }
             }
@@ -326,8 +333,8 @@ impl Film {
         let index = (down / TILE_SIZE) as usize * tile_grid(self.crop).0 + (right / TILE_SIZE) as usize;
         let place = (down % TILE_SIZE, right % TILE_SIZE);
         let columns = tile_rect(self.crop, index).width as usize;
-        let value =
-            lock(&self.tiles[index]).value(quantity, place.0 as usize * columns + place.1 as usize, columns);
+        let index_in_tile = place.0 as usize * columns + place.1 as usize;
+        let value = lock(&self.tiles[index]).value(quantity, self.convergence, (index_in_tile, columns));
         value.map(DVec3::as_vec3)
     }
 

@@ -50,6 +50,11 @@ impl Pace {
         self.total = total;
     }
 
+    /// Units a second, once they can be told.
+    pub(super) fn rate(&self) -> Option<f64> {
+        self.rate
+    }
+
     /// The fraction done, never falling, and the seconds to go once they can be told.
     pub(super) fn at(&mut self, seconds: f64, done: u64) -> (f64, Option<f64>) {
         let (since, before) = self.measured;

@@ -316,6 +316,17 @@ pub struct RenderProgress {
     pub samples: u32,
     /// Samples per pixel that there will be, on average, as far as that is known.
     pub total_samples: u32,
+    /// What is known of the noise; nothing before half a second and 16 samples.
+    pub noise: Option<NoiseProgress>,
+}
+
+/// How much noise there is, and will be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseProgress {
+    /// [`Film::relative_error`](crate::film::Film::relative_error), as it is to be expected by now.
+    pub now: f64,
+    /// A round level below that, or the noise in the end where that comes first; and seconds until then.
+    pub next: Option<(f64, f64)>,
 }
 
 /// The report of one finished request: the JSON of `--report`.

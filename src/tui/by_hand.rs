@@ -113,6 +113,7 @@ fn pretend(
             eta_seconds: Some(f64::from(20 - step) * 0.1),
             samples: step * 3,
             total_samples: 60,
+            noise: None,
         };
         say(Event::Progress { generation, progress });
         if let Ok(command) = orders.recv_timeout(Duration::from_millis(100)) {

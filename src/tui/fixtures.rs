@@ -185,7 +185,7 @@ pub(super) fn asset(name: &str, done: u64, total: u64) -> AssetProgress {
 
 pub(super) fn progress(fraction: f64, eta_seconds: Option<f64>) -> RenderProgress {
     let samples = (fraction * 64.0) as u32;
-    RenderProgress { fraction, elapsed_seconds: 1.0, eta_seconds, samples, total_samples: 64 }
+    RenderProgress { fraction, elapsed_seconds: 1.0, eta_seconds, samples, total_samples: 64, noise: None }
 }
 
 pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) -> protocol::Event {

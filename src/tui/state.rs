@@ -473,7 +473,7 @@ impl State {
             Activity::Running { since } => {
                 Some(self.paused_at.unwrap_or(self.now).saturating_duration_since(since))
             }
-            _ => None,
+            Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => None,
         }
     }
 

@@ -62,7 +62,21 @@ impl Reporter for Bars {
             }
             Event::Asset { progress, .. } => self.asset(progress),
             Event::Progress { progress, .. } => self.progress(progress),
-            _ => {}
+            Event::Started { .. }
+            | Event::Stage { .. }
+            | Event::Files { .. }
+            | Event::Warnings { .. }
+            | Event::Settings { .. }
+            | Event::Preview { .. }
+            | Event::Written { .. }
+            | Event::WriteFailed { .. }
+            | Event::Refused { .. }
+            | Event::WritePostponed { .. }
+            | Event::CameraKept { .. }
+            | Event::Picked { .. }
+            | Event::Done { .. }
+            | Event::Failed { .. }
+            | Event::Cancelled { .. } => {}
         }
     }
 

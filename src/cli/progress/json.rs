@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `stage` | `stage`, `status` (`running`, `done`, `reused`, `skipped`), `seconds`, `why` |
 //! | `asset` | `name`, `fraction` |
-//! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples` |
+//! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
 //! | `written` | `path`, `bytes` |
 //! | `write_failed` | `message`: the report could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
@@ -57,6 +57,10 @@ fn value(event: &Event) -> Option<Value> {
             "event": "progress", "stage": "render", "fraction": progress.fraction,
             "elapsed_seconds": progress.elapsed_seconds, "eta_seconds": progress.eta_seconds,
             "samples": progress.samples, "total_samples": progress.total_samples,
+            "noise": progress.noise.map(|noise| json!({
+                "now": noise.now,
+                "next": noise.next.map(|(level, seconds)| json!({ "level": level, "seconds": seconds })),
+            })),
         }),
         Event::Written { path, bytes, .. } => {
             json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes })
@@ -68,7 +72,15 @@ fn value(event: &Event) -> Option<Value> {
         Event::WriteFailed { message, .. } => json!({ "event": "write_failed", "message": message }),
         Event::Failed { failure, .. } => failed(failure),
         Event::Cancelled { .. } => json!({ "event": "cancelled" }),
-        _ => return None,
+        Event::Started { .. }
+        | Event::Files { .. }
+        | Event::Warnings { .. }
+        | Event::Settings { .. }
+        | Event::Preview { .. }
+        | Event::Refused { .. }
+        | Event::WritePostponed { .. }
+        | Event::CameraKept { .. }
+        | Event::Picked { .. } => return None,
     })
 }
 

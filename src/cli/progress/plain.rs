@@ -56,7 +56,22 @@ impl Reporter for Plain {
                 self.console.say(&format!("{:<8} {} 100%", "loaded", progress.name));
             }
             Event::Progress { progress, .. } => self.progress(progress),
-            _ => {}
+            Event::Started { .. }
+            | Event::Stage { .. }
+            | Event::Files { .. }
+            | Event::Warnings { .. }
+            | Event::Asset { .. }
+            | Event::Settings { .. }
+            | Event::Preview { .. }
+            | Event::Written { .. }
+            | Event::WriteFailed { .. }
+            | Event::Refused { .. }
+            | Event::WritePostponed { .. }
+            | Event::CameraKept { .. }
+            | Event::Picked { .. }
+            | Event::Done { .. }
+            | Event::Failed { .. }
+            | Event::Cancelled { .. } => {}
         }
     }
 }
@@ -92,6 +107,7 @@ mod tests {
             eta_seconds: None,
             samples,
             total_samples: 100,
+            noise: None,
         };
         let mut said = Vec::new();
         for samples in 0..100 {
@@ -116,6 +132,7 @@ mod tests {
             eta_seconds: Some(1.5),
             samples: 25,
             total_samples: 64,
+            noise: None,
         };
         assert_eq!(line(&progress), "render    40% (25/64 samples, 1.50 s left)");
         assert!(!line(&RenderProgress { eta_seconds: None, ..progress }).contains("left"));

@@ -5,7 +5,7 @@
 //! other half, whose samples are others; the noise of both is much the same. A little of the bias is left, as a half
 //! that has stopped tells the other no more: a tenth of it, which is a thirtieth of the noise where that is worst.
 
-use crate::film::{CELLS, Film, HalfNoise, samples_to};
+use crate::film::{CELLS, Convergence, Film, HalfNoise};
 
 /// Samples before which noise is not asked for.
 pub(super) const LEAST: u32 = 16;
@@ -70,7 +70,7 @@ impl Goals {
             let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
-                let wanted = wanted(&noise, brightness, error);
+                let wanted = wanted(&noise, film.convergence(), brightness, error);
                 self.expected[cell][half] = wanted.max(done[half]);
                 // Where the other half has no more samples to come, nothing more will be known.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
@@ -82,13 +82,13 @@ impl Goals {
 }
 
 /// Samples that bring noise to the error asked for.
-fn wanted(noise: &HalfNoise, brightness: f64, error: f64) -> u32 {
+fn wanted(noise: &HalfNoise, convergence: Convergence, brightness: f64, error: f64) -> u32 {
     let HalfNoise { variance, mean, samples } = *noise;
     let relative = variance.sqrt() / mean.max(LEAST_BRIGHTNESS * brightness);
     if !(relative > 0.0) {
         return samples;
     }
-    samples_to(AIM * error / relative, samples)
+    convergence.samples_to(AIM * error / relative, samples)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::super::plan::Plan;
 use super::super::trace::Job;
 use super::adaptive::Goals;
-use crate::film::{CELLS, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
+use crate::film::{CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
 use crate::scene::fingerprint::Key;
 
 /// A film that is being rendered, or that was.
@@ -32,13 +32,19 @@ pub(in crate::pipeline) struct Canvas {
 }
 
 impl Canvas {
-    /// Without samples; its film may take `most_bytes`.
+    /// Without samples; its film may take `most_bytes`, and its noise falls so.
     ///
     /// # Errors
     /// There is no memory for the film.
-    pub(super) fn new(key: Key, plan: &Plan, most_bytes: u64) -> Result<Self, FilmError> {
+    pub(super) fn new(
+        key: Key,
+        plan: &Plan,
+        most_bytes: u64,
+        convergence: Convergence,
+    ) -> Result<Self, FilmError> {
         let film =
-            Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?;
+            Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?
+                .converging(convergence);
         let film_cells = film.cell_count();
         let goals = Goals::none(film_cells);
         let none = |cell| if film.cell_rect(cell).is_some() { [0; 2] } else { [u32::MAX; 2] };
@@ -116,8 +122,8 @@ impl Canvas {
         self.film.memory_bytes() + done + base + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// What brings the halves of every cell of the tiles of a part (none: of all) to as many samples, or to those that they are to have: whole tiles, where all of them lack
-    /// the same, in the film's order.
+    /// What brings the halves of every cell of the tiles of a part (none: of all) to as many samples, or to those that they are to
+    /// have: whole tiles, where all of them lack the same, in the film's order.
     pub(super) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<Job> {
         let missing = |cell: usize, half: usize| {
             self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))

@@ -89,6 +89,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::film::Convergence;
     use crate::pipeline::plan::plan;
     use crate::pipeline::tests::loaded_of;
     use crate::scene::fingerprint::Fingerprint;
@@ -101,7 +102,7 @@ mod tests {
     fn canvas(name: &str) -> Canvas {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
-        let mut canvas = Canvas::new(key(name), &plan, u64::MAX).expect("a film");
+        let mut canvas = Canvas::new(key(name), &plan, u64::MAX, Convergence::Stratified).expect("a film");
         canvas.done.fill([1; 2]);
         canvas
     }

@@ -7,6 +7,7 @@ pub(super) mod films;
 pub(super) mod keys;
 pub(super) mod lights;
 pub(super) mod meshes;
+mod outlook;
 pub(super) mod parse;
 pub(super) mod photons;
 pub(super) mod preview;

@@ -68,9 +68,14 @@ struct Sent {
 }
 
 impl PhotonStore {
+    /// Whether each pass has photons: something throws light.
+    pub(super) fn are_sent(&self) -> bool {
+        self.photons.are_sent()
+    }
+
     /// Passes that may be in use at once, of the size of the first.
     pub(super) fn at_once(&self) -> u32 {
-        if !self.photons.are_sent() {
+        if !self.are_sent() {
             return MOST_WITHOUT;
         }
         let size = self.kept.borrow().first().map_or(1, |pass| pass.memory_bytes().max(1));
@@ -102,7 +107,7 @@ impl PhotonStore {
         sending: Sending<'_>,
         tick: &mut impl FnMut(),
     ) -> Result<Arc<PhotonPass>, Cancelled> {
-        let number_kept = if self.photons.are_sent() { number } else { 0 };
+        let number_kept = if self.are_sent() { number } else { 0 };
         if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
         }

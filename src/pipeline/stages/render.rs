@@ -17,11 +17,12 @@ use super::super::trace::{Job, Tracer, next_pass};
 use super::adaptive::LEAST;
 use super::canvas::Canvas;
 use super::films::Films;
+use super::outlook::{Outlook, Work};
 use super::photons::{PhotonStore, Sending};
 use super::preview::Screen;
 use super::spread::next_round;
 use super::{Staged, Stop};
-use crate::film::{RadianceImage, Rect, TILE_SIZE, TileSamples};
+use crate::film::{Convergence, RadianceImage, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
@@ -73,7 +74,12 @@ pub(in crate::pipeline) fn render(
     let is_other = films.current().is_some_and(|current| current.key != key);
     films.select(key, |kept| !rendering.force && kept.has_at_most(wanted));
     if films.current().is_none() {
-        films.put(|| Canvas::new(key, rendering.plan, rendering.most_film_bytes)).map_err(Stop::work)?;
+        let convergence = match rendering.photons.is_some_and(PhotonStore::are_sent) {
+            true => Convergence::Independent,
+            false => Convergence::Stratified,
+        };
+        let canvas = || Canvas::new(key, rendering.plan, rendering.most_film_bytes, convergence);
+        films.put(canvas).map_err(Stop::work)?;
     }
     let Some(canvas) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
     let budget = rendering.plan.time_seconds;
@@ -109,6 +115,7 @@ struct Painter<'a> {
     screen: Screen<'a>,
     clock: Clock,
     pace: Pace,
+    outlook: Outlook,
     fraction: f64,
     units: u64,
     /// Of an earlier render.
@@ -134,6 +141,7 @@ impl<'a> Painter<'a> {
             screen: Screen { bounds, plan: rendering.plan, sink: rendering.sink },
             clock: Clock::start(),
             pace: Pace::new(units, total_units),
+            outlook: Outlook::new(),
             fraction: 0.0,
             units,
             units_before: units,
@@ -186,10 +194,14 @@ impl<'a> Painter<'a> {
         while !self.canvas.is_complete_in(part, samples) && !self.is_over_time {
             if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
                 self.round(&goals)?;
+                self.look();
                 continue;
             }
             let target = next_pass(self.canvas.samples_in(part, samples), samples);
             self.pass(part, target)?;
+            if target.is_power_of_two() {
+                self.look();
+            }
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
                 self.canvas.judge(target, error.into());
                 self.total_units = self.canvas.units_to_come(most);
@@ -197,6 +209,12 @@ impl<'a> Painter<'a> {
             }
         }
         Ok(())
+    }
+
+    /// At the noise, where it is time.
+    fn look(&mut self) {
+        let least = self.canvas.samples(u32::MAX);
+        self.outlook.look(&self.canvas.film, least, self.units);
     }
 
     /// All tiles of a part that have fewer samples than `target`.
@@ -313,12 +331,14 @@ impl<'a> Painter<'a> {
         }
         self.fraction = if is_last { 1.0 } else { self.fraction.max(fraction) };
         let pixels = self.canvas.film.crop().area() as u64;
+        let work = Work { done: self.units, total: self.total_units, rate: self.pace.rate() };
         self.rendering.sink.progress(RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
             eta_seconds: if is_last { Some(0.0) } else { eta_seconds },
             samples: (self.units / pixels) as u32,
             total_samples: self.total_units.div_ceil(pixels) as u32,
+            noise: self.outlook.at(&self.canvas.film, work),
         });
     }
 

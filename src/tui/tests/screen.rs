@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use ratatui::style::Color;
 
 use super::{BLUE, RED, cells_of};
-use crate::pipeline::protocol::{self, Failure, Stage, StageReport, Status};
+use crate::pipeline::protocol::{self, Failure, NoiseProgress, RenderProgress, Stage, StageReport, Status};
 use crate::pipeline::settings::{Overrides, View};
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
@@ -414,6 +414,24 @@ fn a_picture_that_could_not_be_written_is_not_called_done() {
     assert!(desk.text().contains("not written"), "{}", desk.text());
     desk.worker(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 });
     assert!(first(&mut desk).contains("✓ done"), "{}", desk.text());
+}
+
+#[test]
+fn the_noise_is_told_as_it_falls() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    let noise = Some(NoiseProgress { now: 0.021, next: Some((0.01, 14.0)) });
+    let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
+    desk.worker(protocol::Event::Progress { generation: 1, progress });
+    for (columns, rows, words) in [
+        (80, 24, "noise 2.1 %, 1 % in 14.0 s · 32/64 samples"),
+        (54, 20, "noise 2.1 % · 32/64 samples"),
+        (36, 20, "32/64 samples"),
+    ] {
+        desk.event(Event::Resize(window(columns, rows)));
+        assert!(desk.text().contains(words), "{words}: {}", desk.text());
+    }
+    assert!(!desk.text().contains("noise"), "{}", desk.text());
 }
 
 #[test]

@@ -198,6 +198,15 @@ pub(super) fn percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
 }
 
+/// A small part in percent, with two digits: `2.1 %`, `1 %`.
+pub(super) fn share(part: f64) -> String {
+    let percent = part * 100.0;
+    let digits = if percent > 0.0 { (1 - percent.log10().floor() as i32).clamp(0, 6) } else { 0 };
+    let text = format!("{percent:.0$}", digits as usize);
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    format!("{text} %")
+}
+
 /// Three digits or more.
 pub(super) fn number(x: f32) -> String {
     let digits = match x.abs() {
@@ -219,6 +228,12 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shares_have_two_digits() {
+        let shares = [0.021, 0.01, 0.000_43, 0.5, 1.7, 0.0, 0.0996].map(share);
+        assert_eq!(shares, ["2.1 %", "1 %", "0.043 %", "50 %", "170 %", "0 %", "10 %"]);
+    }
 
     #[test]
     fn a_bar_is_full_only_at_the_end() {

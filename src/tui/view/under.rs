@@ -1,5 +1,7 @@
 //! The line under the picture: a message; else how far the render is; else what it took.
 
+use std::time::Duration;
+
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
@@ -7,8 +9,8 @@ use super::header::at_work;
 use super::layout::Layout;
 use super::message;
 use super::stages;
-use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, rest, running};
-use crate::pipeline::protocol::RenderProgress;
+use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share};
+use crate::pipeline::protocol::{NoiseProgress, RenderProgress};
 use crate::scene::sanitize::visible;
 use crate::tui::state::{Activity, PreviewKind, State};
 
@@ -64,6 +66,11 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
         (None, asset) => (asset.map_or(0.0, stages::fraction), time),
     };
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
+    let noise = state.progress.and_then(|progress| progress.noise);
+    let fits = |noise: &String| room >= columns(noise) + 3 + LEAST_BAR;
+    let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
+    let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
+    let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     if room < LEAST_BAR {
         put(buffer, area, &[(&words, Tone::Plain)], state.depth);
         return;
@@ -73,6 +80,15 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let pieces =
         [(name, Tone::Faint), gap, (&*filled, tone), (&*empty, Tone::Faint), gap, (&*words, Tone::Plain)];
     put(buffer, area, &pieces, state.depth);
+}
+
+/// `noise 2.1 %, 1 % in 14 s`, or shorter: called noise, as what is free of it may still be far from right.
+fn noise_words(noise: &NoiseProgress) -> [String; 2] {
+    let now = format!("noise {}", share(noise.now));
+    let next = noise.next.map(|(level, seconds)| {
+        format!("{now}, {} in {}", share(level), duration(Duration::from_secs_f64(seconds)))
+    });
+    [next.unwrap_or_else(|| now.clone()), now]
 }
 
 /// The stages in one line, and what else is to be told where it is not in the panel.

@@ -1,0 +1,136 @@
+#!/usr/bin/env python3
+"""The noise that is left beside the error that was asked for.
+
+    python3 benches/adaptive/truth.py [SCENE...] [--error E] [--seeds N] [--side PIXELS] [--photons] [--glimt BINARY]
+
+Each scene is rendered by N seeds with `error = E`. The spread of these pictures is the true noise of each tile: the root mean square
+standard deviation of its pixels' luminance, over the larger of its mean and 1 % of the picture's. Printed, as parts of E: the root mean
+square over all tiles, the same over those that needed more than 16 samples, and the largest tile; then the part of such tiles, the
+mean number of samples, the error that the report tells beside the true one of the whole picture, and the time to go that was shown
+when a quarter of the work was done, as a part of the true one (median of the seeds that took half a second or more). By itself: all
+bundled scenes, E = 0.02, 8 seeds, 192 pixels along the longer side. In the environment of ../mitsuba, which is made where it is not
+there.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+TILE = 32
+LEAST = 16
+LEAST_BRIGHTNESS = 0.01
+MOST = 65536
+WEIGHTS = (0.2126, 0.7152, 0.0722)
+
+
+def within_environment():
+    """Start again where numpy and a reader of float files are."""
+    sys.path.insert(0, str(HERE.parent / "mitsuba"))
+    import run
+
+    run.HOME.mkdir(parents=True, exist_ok=True)
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": run.llvm(), "GLIMT_TRUTH": "1"}
+    command = [str(run.python()), __file__, *sys.argv[1:]]
+    os.execve(command[0], command, environment)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", type=Path)
+    parser.add_argument("--error", type=float, default=0.02)
+    parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--side", type=int, default=192)
+    parser.add_argument("--photons", action="store_true")
+    parser.add_argument("--glimt", default=str(ROOT / "target" / "release" / "glimt"))
+    return parser.parse_args()
+
+
+def tiles(picture):
+    """The tiles of a picture, row after row."""
+    rows, columns = picture.shape[:2]
+    return [picture[y : y + TILE, x : x + TILE] for y in range(0, rows, TILE) for x in range(0, columns, TILE)]
+
+
+def rendered(asked, scene, folder):
+    """Luminance by each seed, samples of each pixel, and what the reports tell of the error and the samples."""
+    import mitsuba as mi
+    import numpy as np
+
+    mi.set_variant("scalar_rgb")
+    with scene.open("rb") as file:
+        own = tomllib.load(file).get("render", {})
+    width, height = own.get("width", 640), own.get("height", 480)
+    scale = asked.side / max(width, height)
+    size = ["--width", max(1, round(width * scale)), "--height", max(1, round(height * scale))]
+    picture, report = folder / "picture.exr", folder / "report.json"
+
+    def render(seed, options):
+        call = [asked.glimt, scene, "--once", "--progress", "json", *size, "-o", picture, "--report", report, "--seed", seed]
+        call += ["--error", asked.error, "--samples", MOST, *options]
+        told = subprocess.run([str(word) for word in call], check=True, stderr=subprocess.PIPE, text=True).stderr
+        image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+        return image.astype(np.float64), json.loads(report.read_text())["image"], foretold(told)
+
+    photons = ["--photons", "on"] if asked.photons else []
+    runs = [render(seed, photons) for seed in range(1, asked.seeds + 1)]
+    counts = render(1, [*photons, "--view", "samples"])[0][..., 0]
+    told = [image["error"] for _, image, _ in runs], [image["samples"]["mean"] for _, image, _ in runs]
+    luminance = np.array([picture @ np.array(WEIGHTS) for picture, _, _ in runs])
+    return luminance, counts, *told, [share for _, _, share in runs if share]
+
+
+def foretold(lines):
+    """The seconds to go that were told at a quarter of the render, as a part of those that it took from there on."""
+    events = [json.loads(line) for line in lines.splitlines()]
+    events = [event for event in events if event["event"] == "progress"]
+    at = next((event for event in events if event["fraction"] >= 0.25 and event["eta_seconds"] is not None), None)
+    if at is None or events[-1]["elapsed_seconds"] < 0.5:
+        return None
+    return at["eta_seconds"] / (events[-1]["elapsed_seconds"] - at["elapsed_seconds"])
+
+
+def row(asked, scene, folder):
+    import numpy as np
+
+    luminance, counts, errors, samples, foretold = rendered(asked, scene, folder)
+    mean, variance = luminance.mean(axis=0), luminance.var(axis=0, ddof=1)
+    whole = mean.mean()
+    noise = np.array(
+        [
+            np.sqrt(v.mean()) / max(m.mean(), LEAST_BRIGHTNESS * whole, 1e-300)
+            for m, v in zip(tiles(mean), tiles(variance))
+        ]
+    )
+    noise /= asked.error
+    needed = np.array([tile.mean() > LEAST for tile in tiles(counts)])
+    of_needed = np.sqrt((noise[needed] ** 2).mean()) if needed.any() else float("nan")
+    told = np.mean([error for error in errors if error is not None] or [float("nan")])
+    true = np.sqrt(variance.mean()) / whole
+    print(
+        f"{scene.stem:18}{np.sqrt((noise**2).mean()):7.2f}{of_needed:8.2f}{noise.max():8.2f}{needed.mean():8.2f}"
+        f"{np.mean(samples):9.1f}{told:10.2e}{true:10.2e}{true / told:7.2f}"
+        f"{np.median(foretold) if foretold else float('nan'):7.2f}",
+        flush=True,
+    )
+
+
+def main():
+    asked = arguments()
+    print(f"error = {asked.error}, {asked.side} pixels, {asked.seeds} seeds")
+    print(f"{'':18}{'all':>7}{'needed':>8}{'largest':>8}{'part':>8}{'samples':>9}{'told':>10}{'true':>10}{'ratio':>7}{'to go':>7}")
+    for scene in asked.scenes or sorted((ROOT / "scenes").glob("*.toml")):
+        with tempfile.TemporaryDirectory() as folder:
+            row(asked, scene, Path(folder))
+
+
+if __name__ == "__main__":
+    if "GLIMT_TRUTH" not in os.environ:
+        within_environment()
+    sys.exit(main())
