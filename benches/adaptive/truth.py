@@ -30,14 +30,14 @@ MOST = 65536
 WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 
-def within_environment():
+def within_environment(program):
     """Start again where numpy and a reader of float files are."""
     sys.path.insert(0, str(HERE.parent / "mitsuba"))
     import run
 
     run.HOME.mkdir(parents=True, exist_ok=True)
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": run.llvm(), "GLIMT_TRUTH": "1"}
-    command = [str(run.python()), __file__, *sys.argv[1:]]
+    command = [str(run.python()), program, *sys.argv[1:]]
     os.execve(command[0], command, environment)
 
 
@@ -58,17 +58,22 @@ def tiles(picture):
     return [picture[y : y + TILE, x : x + TILE] for y in range(0, rows, TILE) for x in range(0, columns, TILE)]
 
 
+def size_of(scene, side):
+    """Options for so many pixels along the longer side."""
+    with scene.open("rb") as file:
+        own = tomllib.load(file).get("render", {})
+    width, height = own.get("width", 640), own.get("height", 480)
+    scale = side / max(width, height)
+    return ["--width", max(1, round(width * scale)), "--height", max(1, round(height * scale))]
+
+
 def rendered(asked, scene, folder):
     """Luminance by each seed, samples of each pixel, and what the reports tell of the error and the samples."""
     import mitsuba as mi
     import numpy as np
 
     mi.set_variant("scalar_rgb")
-    with scene.open("rb") as file:
-        own = tomllib.load(file).get("render", {})
-    width, height = own.get("width", 640), own.get("height", 480)
-    scale = asked.side / max(width, height)
-    size = ["--width", max(1, round(width * scale)), "--height", max(1, round(height * scale))]
+    size = size_of(scene, asked.side)
     picture, report = folder / "picture.exr", folder / "report.json"
 
     def render(seed, options):
@@ -132,5 +137,5 @@ def main():
 
 if __name__ == "__main__":
     if "GLIMT_TRUTH" not in os.environ:
-        within_environment()
+        within_environment(__file__)
     sys.exit(main())

@@ -5,6 +5,7 @@ use super::super::lit_row::LitRow;
 use super::super::shot::Shot;
 use super::super::view::{Measure, Ways};
 use super::PhotonMaps;
+use super::chosen::{Place, is_apart};
 use super::map::{Look, PhotonMap};
 use crate::geometry::rows::lanes;
 use crate::materials::lobes::gloss;
@@ -41,7 +42,7 @@ impl Loops for Gathering<'_> {
     fn run(self, folds: impl Folds) -> Lanes3 {
         let Self { shot, row, maps, depth, measure } = self;
         let mut sums = [[0.0; PACKET]; 3];
-        let [looks, _] = row.sampler(shot).pairs(&row.path, Decision::Gather, 0, 1);
+        let [looks, choices] = row.sampler(shot).pairs(&row.path, Decision::Gather, 0, 1);
         let Some(most_depth) = shot.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let Ways { caustic, indirect, .. } = measure.ways();
         for i in lanes(row.used) {
@@ -64,7 +65,13 @@ impl Loops for Gathering<'_> {
             let mut sum = Vec3::ZERO;
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {
                 if gathers && looks[i] < chance {
-                    sum += brought(row, i, (map, &look), measure, folds) / chance;
+                    // What is left of the random number is random again.
+                    let random = [choices[i], looks[i] / chance];
+                    let (light, photon) = brought((row, i), (map, &look), measure, random, folds);
+                    let geometry = &shot.world.geometry;
+                    if !photon.is_some_and(|photon| is_apart(geometry, &look, &photon, map.radius())) {
+                        sum += light / chance;
+                    }
                 }
             }
             set_lane(&mut sums, i, sum);
@@ -73,37 +80,54 @@ impl Loops for Gathering<'_> {
     }
 }
 
-/// What photons of a map bring to a vertex that goes on to the eye.
+/// What photons of a map bring to a vertex that goes on to the eye, and one of them.
 #[inline(always)]
 fn brought(
-    row: &LitRow,
-    i: usize,
+    (row, i): (&LitRow, usize),
     (map, look): (&PhotonMap, &Look),
     measure: Measure,
+    random: [f32; 2],
     folds: impl Folds,
-) -> Vec3 {
+) -> (Vec3, Option<Place>) {
     let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
     if measure == Measure::Work {
-        Vec3::splat(map.count_around(look, folds) as f32)
+        (Vec3::splat(map.count_around(look, folds) as f32), None)
     } else if specular == Vec3::ZERO && row.apart & 1 << i == 0 {
-        diffuse * map.irradiance(look, folds)
+        let (irradiance, photon) = map.irradiance(look, random, folds);
+        (diffuse * irradiance, photon)
     } else {
-        reflected(row, i, map, look, folds)
+        reflected((row, i), (map, look), random, folds)
     }
 }
 
 /// The same, each by its direction.
 #[inline(always)]
-fn reflected(row: &LitRow, i: usize, map: &PhotonMap, look: &Look, folds: impl Folds) -> Vec3 {
+fn reflected(
+    (row, i): (&LitRow, usize),
+    (map, look): (&PhotonMap, &Look),
+    random: [f32; 2],
+    folds: impl Folds,
+) -> (Vec3, Option<Place>) {
     let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
     let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
-    let mut sum = Vec3::ZERO;
+    let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit(look, folds, |photon, density| {
         let mut f = diffuse;
         if specular != Vec3::ZERO {
             f += specular * gloss(mirrored, photon.direction, shininess);
         }
-        sum += f * photon.flux * (density * row.landed(i, photon.direction));
+        let light = f * photon.flux * (density * row.landed(i, photon.direction));
+        sum += light;
+        let weight = light.element_sum();
+        total += weight;
+        // As `Choices` does.
+        let part = if weight > 0.0 { weight / total } else { 0.0 };
+        if left < part {
+            left /= part;
+            chosen = Some(Place { point: photon.point, normal: photon.normal });
+        } else {
+            left = (left - part) / (1.0 - part);
+        }
     });
-    sum
+    (sum, chosen)
 }

@@ -1,6 +1,7 @@
 //! A photon map: photons by the cells of a grid, of which only a hash is kept, so that the grid may be as fine as the radius asks for
 //! wherever photons are. Look-ups weigh sixteen photons at a time.
 
+use super::chosen::{Choices, Place};
 use super::packed::{self, Packed};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::rows::lanes;
@@ -199,23 +200,36 @@ impl PhotonMap {
         size_of_val(&*self.blocks) + size_of_val(&*self.depths) + size_of_val(&*self.starts)
     }
 
-    /// The sum of what photons around a point bring: W·m⁻².
+    /// The sum of what photons around a point bring, W·m⁻², and one of them that two random numbers choose by what it brings.
     #[inline(always)]
-    pub fn irradiance(&self, look: &Look, folds: impl Folds) -> Vec3 {
+    pub fn irradiance(&self, look: &Look, random: [f32; 2], folds: impl Folds) -> (Vec3, Option<Place>) {
         let mut sums = [[0.0; LANES]; 3];
+        let mut choices = Choices::new(random[0]);
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
                 let Some(weights) = self.weights(look, *range, block, folds) else { continue };
                 let flux = &self.blocks[block].flux;
+                let mut brought = [0.0; LANES];
                 for axis in 0..3 {
                     for i in 0..LANES {
-                        sums[axis][i] += flux[axis][i] * weights[i];
+                        let weighed = flux[axis][i] * weights[i];
+                        sums[axis][i] += weighed;
+                        brought[i] += weighed;
                     }
                 }
+                choices.offer(block as u32, &brought);
             }
         }
-        Vec3::from(sums.map(folded)) * self.peak()
+        let chosen = choices.chosen(random[1]).map(|(block, i)| self.place(block as usize, i));
+        (Vec3::from(sums.map(folded)) * self.peak(), chosen)
+    }
+
+    /// Where a photon is.
+    #[inline(always)]
+    fn place(&self, block: usize, i: usize) -> Place {
+        let Block { point, normal, .. } = &self.blocks[block];
+        Place { point: lane(point, i), normal: packed::unit(normal[i]) }
     }
 
     /// How many photons are around a point.
@@ -465,7 +479,7 @@ mod tests {
             let mut sum = 0.0;
             let look = Look { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
             map.visit(&look, PlainFolds, |_, density| sum += density * step * step);
-            let flux = f64::from(map.irradiance(&look, PlainFolds).x * step * step);
+            let flux = f64::from(map.irradiance(&look, [0.5; 2], PlainFolds).0.x * step * step);
             assert!((flux - f64::from(sum)).abs() < 1e-4, "{flux} is not {sum}");
             sum
         };

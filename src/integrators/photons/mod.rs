@@ -19,9 +19,12 @@
 //! a small place that paths hardly ever find: hence the photons that are thrown back. Scatterings of the eye's path, the vertex at which photons are
 //! gathered among them, and those of the photon are at most `max_depth` together.
 //!
+//! Photons behind a wall of a point bring nothing: one of those in the kernel, chosen by what it brings, tells whether they are.
+//!
 //! Kernels that hang over an edge of a surface lose what is beyond it: in a strip of width W along the edge 8r/15πW of the light, in the
 //! mean over the passes with their r, which goes to 0.
 
+mod chosen;
 pub(super) mod gather;
 mod map;
 mod packed;

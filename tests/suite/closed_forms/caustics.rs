@@ -240,3 +240,22 @@ fn kernels_lose_what_hangs_over_an_edge_and_it_vanishes_as_passes_grow() {
         );
     }
 }
+
+#[test]
+fn no_photons_come_round_the_foot_of_a_wall() {
+    // A mirror without thickness on the ground, the sun before it: what it throws lights the ground before it, where a kernel hangs
+    // over its foot; no light comes behind it.
+    let ground = || floor().quad(v(0.0, 0.0, 2.0), v(0.0, 1.0, 0.0), v(0.0, 0.0, -4.0), mirror(0.9));
+    let (width, radius, passes) = (0.2, 0.1, 32);
+    let seen = |side: f64| {
+        let strip = looked_at(ground(), v(side * 0.5 * width, 0.0, 0.0), width, 0.5).depth(3);
+        let lit = sun(strip, v(1.0, -1.0, 0.0).normalize(), 1.0, 0.0).photons(8000, radius);
+        spread(&lit, &[View::Caustic], passes)[0][BLOCKS * BLOCKS]
+    };
+    let lost = 8.0 * radius * mean_radius(passes) / (15.0 * PI * width);
+    let exact = 0.9 * 0.5_f64.sqrt() * 0.7 / PI * (1.0 - lost);
+    let (before, error) = seen(-1.0);
+    assert!(error < 2.0 * MOST_ERROR * exact, "{before} ± {error}");
+    assert!((before - exact).abs() < 4.0 * error + SLACK * exact, "{before} ± {error}, not {exact}");
+    assert_eq!(seen(1.0).0, 0.0);
+}

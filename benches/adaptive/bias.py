@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""The mean of pictures whose samples go where the noise is, beside that of equal samples.
+
+    python3 benches/adaptive/bias.py [SCENE...] [--error E | --time-share P] [--seeds N] [--side PIXELS] [--glimt BINARY]
+
+N pictures, each of a seed of its own, that stop by `error = E`, or by a budget of time: the part P of the seconds that 256 samples
+take. Their mean luminance is held against that of a quarter as many pictures with as many samples each as will make those as exact.
+Printed: the means apart in percent, the standard error of that, and the ratio of both. By itself: cornell and cornell_glass,
+E = 0.05, 200 seeds, 48 pixels along the longer side. In the environment of ../mitsuba, which is made where it is not there.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from truth import MOST, ROOT, WEIGHTS, size_of, within_environment
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", type=Path)
+    parser.add_argument("--error", type=float, default=0.05)
+    parser.add_argument("--time-share", type=float)
+    parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--side", type=int, default=48)
+    parser.add_argument("--glimt", default=str(ROOT / "target" / "release" / "glimt"))
+    return parser.parse_args()
+
+
+def mean_of(asked, scene, folder, seed, options):
+    """The mean luminance of a picture, its mean number of samples, and the seconds of its render stage."""
+    import mitsuba as mi
+    import numpy as np
+
+    mi.set_variant("scalar_rgb")
+    picture, report = folder / "picture.exr", folder / "report.json"
+    call = [asked.glimt, scene, "--once", "--progress", "none", *size_of(scene, asked.side), "-o", picture]
+    call += ["--report", report, "--seed", seed, *options]
+    subprocess.run([str(word) for word in call], check=True, stderr=subprocess.DEVNULL)
+    image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    told = json.loads(report.read_text())
+    seconds = sum(stage["seconds"] for stage in told["stages"] if stage["name"] == "render")
+    return float((image.astype(np.float64) @ np.array(WEIGHTS)).mean()), told["image"]["samples"]["mean"], seconds
+
+
+def row(asked, scene, folder):
+    if asked.time_share is None:
+        options = ["--error", asked.error, "--samples", MOST]
+    else:
+        seconds = mean_of(asked, scene, folder, 1, ["--error", 0, "--samples", 256])[2]
+        options = ["--error", 0, "--samples", MOST, "--time", max(0.001, asked.time_share * seconds)]
+    runs = [mean_of(asked, scene, folder, seed, options) for seed in range(1, asked.seeds + 1)]
+    samples = max(run[1] for run in runs)
+    equal = ["--error", 0, "--samples", 8 * int(samples)]
+    references = [mean_of(asked, scene, folder, 100_000 + seed, equal) for seed in range(max(2, asked.seeds // 4))]
+    means, others = [run[0] for run in runs], [run[0] for run in references]
+    of_other = statistics.fmean(others)
+    apart = statistics.fmean(means) / of_other - 1
+    error = (statistics.variance(means) / len(means) + statistics.variance(others) / len(others)) ** 0.5 / of_other
+    mean_samples = statistics.fmean(run[1] for run in runs)
+    print(f"{scene.stem:18}{mean_samples:9.1f}{100 * apart:+10.4f}{100 * error:10.4f}{apart / error:8.2f}", flush=True)
+
+
+def main():
+    asked = arguments()
+    how = f"error = {asked.error}" if asked.time_share is None else f"--time, {asked.time_share} of 256 samples"
+    print(f"{how}, {asked.side} pixels, {asked.seeds} seeds")
+    print(f"{'':18}{'samples':>9}{'apart %':>10}{'± %':>10}{'ratio':>8}")
+    for scene in asked.scenes or [ROOT / "scenes" / name for name in ("cornell.toml", "cornell_glass.toml")]:
+        with tempfile.TemporaryDirectory() as folder:
+            row(asked, scene, Path(folder))
+
+
+if __name__ == "__main__":
+    if "GLIMT_TRUTH" not in os.environ:
+        within_environment(__file__)
+    sys.exit(main())

@@ -1,0 +1,126 @@
+//! One photon of a kernel stands for all in the question whether a wall is between them and the point: one chosen by what it brings,
+//! so that what is left of the light is right in the mean.
+
+use super::map::Look;
+use crate::geometry::Ray;
+use crate::lights::Source;
+use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes};
+use crate::world::Geometry;
+
+/// How far above the surface the way to a photon is looked at, in radii of the kernel: the lower one passes under what hangs close above
+/// the surface, such as a ball at rest on it, and the higher one over the bend of the surface itself.
+const LIFTS: [f32; 2] = [0.02, 0.15];
+
+/// Shorter ways, in radii, have nothing on them.
+const NEAR: f32 = 1e-3;
+
+/// Largest number below 1.
+const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// Where a photon is, and the normal there.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The point.
+    pub point: Vec3,
+    /// Unit normal of the facet on the side that it came to.
+    pub normal: Vec3,
+}
+
+/// A choice among numbered things that come one after the other, in proportion to weights of which the sum is not known before
+/// (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982), in each of the lanes; a single random number lasts for all of it,
+/// as what is left of it after each choice is random again.
+#[derive(Clone, Copy, Debug)]
+pub struct Choices {
+    random: Lanes,
+    totals: Lanes,
+    chosen: [u32; LANES],
+}
+
+impl Choices {
+    /// By a random number in [0, 1).
+    #[inline(always)]
+    pub fn new(random: f32) -> Self {
+        let mut randoms = [0.0; LANES];
+        for (i, own) in randoms.iter_mut().enumerate() {
+            let turned = random + i as f32 * (1.0 / LANES as f32);
+            *own = if turned < 1.0 { turned } else { turned - 1.0 };
+        }
+        Self { random: randoms, totals: [0.0; LANES], chosen: [0; LANES] }
+    }
+
+    /// Thing `number` comes, with these weights, which are not negative.
+    #[inline(always)]
+    pub fn offer(&mut self, number: u32, weights: &Lanes) {
+        for i in 0..LANES {
+            self.totals[i] += weights[i];
+            let part = if weights[i] > 0.0 { weights[i] / self.totals[i] } else { 0.0 };
+            let takes = self.random[i] < part;
+            let left = if takes { self.random[i] } else { self.random[i] - part };
+            let of = if takes { part } else { 1.0 - part };
+            let random = left / of;
+            // Of a part of next to 1 nothing is left.
+            self.random[i] = if random < BELOW_ONE { random } else { BELOW_ONE };
+            self.chosen[i] = if takes { number } else { self.chosen[i] };
+        }
+    }
+
+    /// What was chosen: a lane by the sums of its weights, and the number there; none where all weights are 0.
+    #[inline(always)]
+    pub fn chosen(&self, random: f32) -> Option<(u32, usize)> {
+        let mut left = random * self.totals.iter().sum::<f32>();
+        let mut last = None;
+        for i in 0..LANES {
+            if self.totals[i] > 0.0 {
+                last = Some((self.chosen[i], i));
+                if left < self.totals[i] {
+                    break;
+                }
+            }
+            left -= self.totals[i];
+        }
+        last
+    }
+}
+
+/// Whether something stands between a point and a photon of its kernel.
+pub fn is_apart(geometry: &Geometry, look: &Look, photon: &Place, radius: f32) -> bool {
+    if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
+        return false;
+    }
+    LIFTS.into_iter().all(|lift| {
+        let above = lift * radius;
+        let way = Ray::segment(look.point + above * look.normal, photon.point + above * photon.normal);
+        geometry.occluded(&way, Source::Nothing)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::unit;
+
+    #[test]
+    fn things_are_chosen_by_their_weights() {
+        const THINGS: usize = 5;
+        let mut next = unit(5);
+        let mut weights = [[0.0; LANES]; THINGS];
+        weights.as_flattened_mut().iter_mut().for_each(|weight| *weight = (next() * 3.0 - 1.0).max(0.0));
+        weights[1][3] = 9.0;
+        let total: f32 = weights.as_flattened().iter().sum();
+        let mut counts = [[0_u32; LANES]; THINGS];
+        const DRAWS: u32 = 400_000;
+        for _ in 0..DRAWS {
+            let mut choices = Choices::new(next());
+            (0..THINGS).for_each(|number| choices.offer(number as u32, &weights[number]));
+            let (number, lane) = choices.chosen(next()).expect("some weigh something");
+            counts[number as usize][lane] += 1;
+        }
+        for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {
+            let expected = f64::from(weight / total) * f64::from(DRAWS);
+            let apart = (f64::from(*count) - expected).abs();
+            assert!(apart <= 5.0 * expected.sqrt(), "{count} times where {expected} are expected");
+        }
+        assert_eq!(Choices::new(0.3).chosen(0.5), None);
+    }
+}
