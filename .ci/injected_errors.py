@@ -92,7 +92,7 @@ FAULTS = [
      CAUSTICS + "kernels_lose_what_hangs_over_an_edge_and_it_vanishes_as_passes_grow"),
     ("radii without bounds", "integrators/photons/mod.rs", "Ok(⟦largest.min(radius * (wanted / (NEAR * step as f32)).sqrt())⟧)",
      "radius * (wanted / (NEAR * step as f32)).sqrt()", "integrators::photons::tests::radii_are_held_to_a_part_of_the_scene"),
-    ("photons of the other side of a wall", "integrators/photons/chosen.rs", "⟦geometry.occluded(&way, Source::Nothing)⟧", "false", CAUSTICS + "no_photons_come_round_the_foot_of_a_wall"),
+    ("photons of the other side of a wall", "integrators/photons/chosen.rs", "if ⟦!is_blocked(from, to)⟧ {", "true", CAUSTICS + "no_photons_come_round_the_foot_of_a_wall"),
     ("orders wait for the photons", "pipeline/stages/photons.rs", "Err(RecvTimeoutError::Timeout) => ⟦tick()⟧,", "()",
      "pipeline::tests::photons::time_that_ends_while_photons_are_sent_ends_the_render"),
     ("the time is not heard while photons are sent", "pipeline/stages/render.rs",

@@ -8,9 +8,11 @@ use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes};
 use crate::world::Geometry;
 
-/// How far above the surface the way to a photon is looked at, in radii of the kernel: the lower one passes under what hangs close above
-/// the surface, such as a ball at rest on it, and the higher one over the bend of the surface itself.
-const LIFTS: [f32; 2] = [0.02, 0.15];
+/// How far above the surface the way to a photon leads, in radii of the kernel: over the bend of the surface itself.
+const ABOVE: f32 = 0.15;
+
+/// The same where something hangs closer above the surface, such as a ball at rest on it.
+const BELOW: f32 = 0.02;
 
 /// Shorter ways, in radii, have nothing on them.
 const NEAR: f32 = 1e-3;
@@ -83,16 +85,24 @@ impl Choices {
     }
 }
 
-/// Whether something stands between a point and a photon of its kernel.
+/// Whether something stands between a point and a photon of its kernel: on the way above the surface, or, where one of them has not
+/// that much room above it, on the way close to the surface.
 pub fn is_apart(geometry: &Geometry, look: &Look, photon: &Place, radius: f32) -> bool {
     if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
         return false;
     }
-    LIFTS.into_iter().all(|lift| {
+    let lifted = |lift: f32| {
         let above = lift * radius;
-        let way = Ray::segment(look.point + above * look.normal, photon.point + above * photon.normal);
-        geometry.occluded(&way, Source::Nothing)
-    })
+        [look.point + above * look.normal, photon.point + above * photon.normal]
+    };
+    let is_blocked = |from, to| geometry.occluded(&Ray::segment(from, to), Source::Nothing);
+    let [from, to] = lifted(ABOVE);
+    if !is_blocked(from, to) {
+        return false;
+    }
+    let [low_from, low_to] = lifted(BELOW);
+    let has_room = !is_blocked(low_from, from) && !is_blocked(low_to, to);
+    has_room || is_blocked(low_from, low_to)
 }
 
 #[cfg(test)]
