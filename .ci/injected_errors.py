@@ -94,7 +94,7 @@ FAULTS = [
      "radius * (wanted / (NEAR * step as f32)).sqrt()", "integrators::photons::tests::radii_are_held_to_a_part_of_the_scene"),
     ("photons of the other side of a wall", "integrators/photons/chosen.rs", "if ⟦!is_blocked(from, to)⟧ {", "true", CAUSTICS + "no_photons_come_round_the_foot_of_a_wall"),
     ("orders wait for the photons", "pipeline/stages/photons.rs", "Err(RecvTimeoutError::Timeout) => ⟦tick()⟧,", "()",
-     "pipeline::tests::photons::time_that_ends_while_photons_are_sent_ends_the_render"),
+     "pipeline::tests::photons::orders_are_heard_while_the_first_photons_are_sent"),
     ("the time is not heard while photons are sent", "pipeline/stages/render.rs",
      "samples..end)?;\n            if ⟦self.is_over_time⟧ {", "false",
      "pipeline::tests::photons::time_that_ends_while_photons_are_sent_ends_the_render"),

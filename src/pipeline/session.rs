@@ -72,7 +72,7 @@ impl Session {
         // Nobody listens: what came of it is given back.
         let (events, _) = mpsc::channel();
         let sink = Sink { generation: self.generation, events, previews: PreviewSlot::default() };
-        let meanwhile = Meanwhile { token, writing: token, orders: &NoOrders };
+        let meanwhile = Meanwhile::new(token, token, &NoOrders);
         self.engine.rendered(&request, &sink, &meanwhile)
     }
 

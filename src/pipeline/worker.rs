@@ -297,7 +297,7 @@ impl Worker {
                 Task::Errand(errand) => catch_unwind(AssertUnwindSafe(|| engine.errand(&errand, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
-                    let meanwhile = Meanwhile { token: &token, writing: &writing, orders: &self.remote };
+                    let meanwhile = Meanwhile::new(&token, &writing, &self.remote);
                     catch_unwind(AssertUnwindSafe(|| engine.request(&request, &sink, &meanwhile)))
                 }
             };

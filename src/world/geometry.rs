@@ -175,6 +175,11 @@ impl Geometry {
         materials.get(hit.shape.primitive as usize).copied().filter(|&own| own != u32::MAX)
     }
 
+    /// Bytes held by the objects and the tree over them, without those of meshes.
+    pub fn own_memory_bytes(&self) -> usize {
+        self.tree.memory_bytes() + size_of_val(self.objects.as_slice())
+    }
+
     /// Bytes held by this tree and by each mesh's once.
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();

@@ -1,8 +1,10 @@
 //! One request from the scene file to pictures on disk: the stages in their order, and all that is kept between
 //! requests.
 
+mod orders;
 mod outcome;
 mod outputs;
+mod spares;
 #[cfg(test)]
 mod tests;
 mod unfinished;
@@ -15,6 +17,7 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+pub(super) use self::orders::{Meanwhile, Orders};
 use self::outcome::Outcome;
 use self::unfinished::Unfinished;
 use super::cache::{Memo, Pool};
@@ -75,6 +78,8 @@ pub(super) struct Engine {
     meshes: Pool<PathBuf, KeptMesh>,
     textures: TextureCache,
     accel: AccelCache,
+    /// How many requests there were.
+    requests: u64,
     lights: Memo<Arc<Lights>>,
     sky: SkyMemo,
     world: Memo<Arc<World>>,
@@ -95,26 +100,6 @@ pub(super) struct Engine {
     inputs: Inputs,
     /// Whether the scene as it is now could not be read: nobody knows all the files that it names.
     is_broken: bool,
-}
-
-/// Orders that come while a request is under way.
-pub(super) trait Orders {
-    /// Whether the picture is to be written as it is.
-    fn wants_write(&self) -> bool;
-    /// The same, and the order is carried out.
-    fn take_write(&self) -> bool;
-    /// The size that previews are to have from now on.
-    fn take_preview(&self) -> Option<Option<PreviewSize>>;
-    /// The next thing that is asked of the picture at hand.
-    fn take_errand(&self) -> Option<Errand>;
-}
-
-/// What a request goes by while it is under way.
-pub(super) struct Meanwhile<'a> {
-    pub(super) token: &'a CancelToken,
-    /// Of the last stage, which writes.
-    pub(super) writing: &'a CancelToken,
-    pub(super) orders: &'a dyn Orders,
 }
 
 /// Everything that is ready to be rendered.
@@ -139,6 +124,7 @@ impl Engine {
             meshes: Pool::default(),
             textures: TextureCache::default(),
             accel: AccelCache::default(),
+            requests: 0,
             lights: Memo::default(),
             sky: SkyMemo::default(),
             world: Memo::default(),
@@ -205,7 +191,7 @@ impl Engine {
         self.say_files(&findings, sink);
         // What was read to the end stays for whoever comes next, even if the render was stopped.
         let is_read = self.unfinished.as_ref().is_some_and(|it| it.request.generation == generation);
-        self.sweep(outcome.is_ok() || is_read);
+        self.end(outcome.is_ok() || is_read);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
         let unchanged = shown(self) == before && settled(Stage::Render) && settled(Stage::Write);
@@ -246,16 +232,20 @@ impl Engine {
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
         let key =
             |of_photons| keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
-        let store = &mut self.photons;
-        table.run(Stage::Photons, || Ok(photons(asked, key, store, sending)?))?;
-        let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
-        self.plan = Some(ready.plan.clone());
         let at_hand = AtHand {
             parsed: ready.parsed.clone(),
             sets: request.overrides.sets.clone(),
             world: world.clone(),
             settings: plan.settings,
         };
+        let (store, inputs) = (&mut self.photons, &self.inputs);
+        let hear = || {
+            meanwhile.postpone_write(sink);
+            meanwhile.run_errand(&at_hand, None, inputs, sink);
+        };
+        table.run(Stage::Photons, || Ok(photons(asked, key, store, sending, hear)?))?;
+        let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
+        self.plan = Some(ready.plan.clone());
         self.at_hand = Some(at_hand);
         let unfinished = Unfinished { request: request.clone(), ready: ready.clone(), photons: photons_key };
         self.unfinished = Some(unfinished);
@@ -367,17 +357,14 @@ impl Engine {
         let (plan, orders) = (&ready.plan, meanwhile.orders);
         let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
         let written = std::cell::RefCell::new(&mut self.written);
-        let is_postponed = Cell::new(false);
         let pulse = |canvas: &Canvas, is_covered: bool| {
             if !is_covered {
-                if orders.wants_write() && !is_postponed.replace(true) {
-                    sink.send(Event::WritePostponed { generation: sink.generation });
-                }
+                meanwhile.postpone_write(sink);
             } else if orders.take_write() {
                 write_by_hand(canvas, to, &mut written.borrow_mut());
             }
-            if let Some((errand, at_hand)) = orders.take_errand().zip(self.at_hand.as_ref()) {
-                at_hand.run(&errand, Some(canvas), &self.inputs, sink);
+            if let Some(at_hand) = &self.at_hand {
+                meanwhile.run_errand(at_hand, Some(canvas), &self.inputs, sink);
             }
         };
         let rendering = Rendering {
@@ -432,12 +419,6 @@ impl Engine {
         let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
         files.extend(self.assets.iter().filter(|asset| !known.contains(asset.path.as_path())).cloned());
         sink.files(files);
-    }
-
-    fn sweep(&mut self, success: bool) {
-        self.meshes.sweep(success);
-        self.textures.sweep(success);
-        self.accel.sweep(success);
     }
 
     /// For `check`: the scene and all files that it names, needed or not.

@@ -32,7 +32,8 @@ impl Desk {
         Self { folder, engine: Engine::new(Means::default(), Arc::default()), text: text.to_owned() }
     }
 
-    fn request(&mut self) -> Made {
+    /// A request for the scene as it is: what is said of it.
+    fn send(&mut self) -> Vec<Event> {
         let scene = self.folder.path().join("scene.toml");
         fs::write(&scene, &self.text).expect("written");
         let (events, received) = mpsc::channel();
@@ -47,12 +48,12 @@ impl Desk {
             first: None,
         };
         let token = CancelToken::new();
-        self.engine.request(
-            &request,
-            &sink,
-            &Meanwhile { token: &token, writing: &token, orders: &NoOrders },
-        );
-        let events: Vec<_> = received.try_iter().collect();
+        self.engine.request(&request, &sink, &Meanwhile::new(&token, &token, &NoOrders));
+        received.try_iter().collect()
+    }
+
+    fn request(&mut self) -> Made {
+        let events = self.send();
         assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
         let geometry = self.engine.accel.latest().expect("it was built").clone();
         let mesh = geometry.objects()[1].mesh().expect("the mesh comes second").tree.clone();
@@ -101,4 +102,44 @@ fn each_edit_keeps_what_does_not_depend_on_it() {
         [false, true, false, false],
         "a lamp moved"
     );
+}
+
+#[test]
+fn a_scene_that_is_switched_back_to_has_the_trees_that_it_had() {
+    let mut desk = Desk::new(SCENE);
+    fs::write(desk.folder.path().join("two.obj"), format!("{OBJ}f 1 3 2\n")).expect("written");
+    let own = desk.text.clone();
+    let before = desk.request();
+    for broken in [false, true] {
+        desk.text = own.replace("one.obj", "two.obj");
+        assert!(!Arc::ptr_eq(&desk.request().mesh, &before.mesh));
+        if broken {
+            desk.text = own.replace("one.obj", "three.obj");
+            assert!(matches!(desk.send().last(), Some(Event::Failed { .. })));
+        }
+        desk.text = own.clone();
+        let after = desk.request();
+        assert!(Arc::ptr_eq(&after.geometry, &before.geometry) && Arc::ptr_eq(&after.mesh, &before.mesh));
+        assert!(Arc::ptr_eq(&after.world.geometry, &before.geometry), "the world has them");
+    }
+}
+
+#[test]
+fn of_several_pictures_those_that_were_not_saved_stay_as_they_are() {
+    let other = "[textures.bark]\nfile = \"bark.ppm\"\n[materials.trunk]\ndiffuse = { texture = \"bark\" }\n\
+                 [[sphere]]\ncenter = [1, 1, 0]\nradius = 0.2\nmaterial = \"trunk\"\n";
+    let mut desk = Desk::new(&format!("{SCENE}{other}"));
+    let write = |desk: &Desk, text: &str| {
+        fs::write(desk.folder.path().join("bark.ppm"), format!("P6\n1 1\n255\n{text}")).expect("written");
+    };
+    let texels = |desk: &Desk, name: &str| {
+        desk.engine.textures.latest(&desk.folder.path().join(name)).expect("it was read").clone()
+    };
+    write(&desk, "xyz");
+    desk.request();
+    let (skin, bark) = (texels(&desk, "skin.ppm"), texels(&desk, "bark.ppm"));
+    write(&desk, "uvw");
+    desk.request();
+    assert!(Arc::ptr_eq(&texels(&desk, "skin.ppm"), &skin));
+    assert!(!Arc::ptr_eq(&texels(&desk, "bark.ppm"), &bark));
 }

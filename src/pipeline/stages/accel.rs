@@ -1,8 +1,9 @@
-//! Trees: one per mesh file, kept while the file's content is the same, and the one over all objects.
+//! Trees: one per mesh file, kept while the file's content is the same, and the one over all objects; those of scenes before while
+//! there is room.
 
 use std::sync::Arc;
 
-use super::super::cache::{Memo, Pool};
+use super::super::cache::{Pool, Spare};
 use super::meshes::Meshes;
 use super::{Reading, Staged, Stop, keys};
 use crate::math::DVec3;
@@ -15,18 +16,30 @@ use crate::world::{Geometry, MeshTree};
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct AccelCache {
     trees: Pool<Key, MeshTree>,
-    geometry: Memo<Arc<Geometry>>,
+    geometry: Pool<Key, Geometry>,
+    /// Of what the last one over all objects is.
+    last: Option<Key>,
 }
 
 impl AccelCache {
-    pub(in crate::pipeline) fn sweep(&mut self, success: bool) {
-        self.trees.sweep(success);
+    pub(in crate::pipeline) fn end(&mut self, success: bool, request: u64) {
+        self.trees.end(success, request);
+        self.geometry.end(success, request);
     }
 
-    /// What was built last.
+    pub(in crate::pipeline) fn spares(&self) -> impl Iterator<Item = Spare> {
+        self.trees.spares().chain(self.geometry.spares())
+    }
+
+    pub(in crate::pipeline) fn drop_before(&mut self, request: u64) {
+        self.trees.drop_before(request);
+        self.geometry.drop_before(request);
+    }
+
+    /// What was built or found last.
     #[cfg(test)]
     pub(in crate::pipeline) fn latest(&self) -> Option<&Arc<Geometry>> {
-        self.geometry.latest()
+        self.geometry.latest(&self.last?)
     }
 }
 
@@ -52,12 +65,16 @@ pub(in crate::pipeline) fn accel(
 ) -> Result<Staged<Built>, Stop> {
     let key = keys::geometry(scene, of, origin);
     let (meshes, kept) = trees(scene, meshes, cache, reading)?;
-    if let Some(geometry) = cache.geometry.get(key).cloned() {
-        return Ok(Staged::reused(Built { meshes, geometry }, "no shape changed"));
+    let is_last = cache.last == Some(key);
+    if let Some(geometry) = cache.geometry.get(&key, key) {
+        cache.last = Some(key);
+        let why = if is_last { "no shape changed" } else { "its trees were kept" };
+        return Ok(Staged::reused(Built { meshes, geometry }, why));
     }
     let build = || Geometry::of_scene(scene, &meshes, origin, reading.token);
     let geometry = Arc::new(reading.pool.install(build)?);
-    cache.geometry.set(key, geometry.clone());
+    cache.geometry.insert(key, key, (geometry.clone(), geometry.own_memory_bytes()));
+    cache.last = Some(key);
     let built = meshes.len() - kept;
     let value = Built { meshes, geometry };
     Ok(match (scene.objects.is_empty(), kept) {
@@ -89,7 +106,9 @@ fn trees(
             None => {
                 let build = || MeshTree::build(mesh.mesh.clone(), accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
-                cache.trees.insert(key, key, tree.clone());
+                // The tree holds its mesh, also when that is read anew.
+                let bytes = tree.memory_bytes() + mesh.mesh.mesh.memory_bytes();
+                cache.trees.insert(key, key, (tree.clone(), bytes));
                 tree
             }
         };

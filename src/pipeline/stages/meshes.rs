@@ -70,7 +70,8 @@ pub(in crate::pipeline) fn meshes(
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
                 warn(loaded, file.span.clone(), &file.value, &mesh.mesh, findings);
-                cache.insert(canonical(&file.value), file_key(&file.value, content), mesh.clone());
+                let bytes = mesh.mesh.mesh.memory_bytes();
+                cache.insert(canonical(&file.value), file_key(&file.value, content), (mesh.clone(), bytes));
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),

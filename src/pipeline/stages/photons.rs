@@ -177,7 +177,8 @@ fn ticking<T: Send>(
     })
 }
 
-/// Make the first maps for a picture that gathers photons. `wanted` is what the command line says, `enabled` what the scene says.
+/// Make the first maps for a picture that gathers photons. `wanted` is what the command line says, `enabled` what the scene says;
+/// `tick` is called every now and then.
 ///
 /// # Errors
 /// Cancelled.
@@ -186,6 +187,7 @@ pub(in crate::pipeline) fn photons(
     key: impl FnOnce(PhotonSettings) -> Key,
     cache: &mut PhotonCache,
     sending: Sending<'_>,
+    mut tick: impl FnMut(),
 ) -> Result<Staged<()>, Cancelled> {
     let settings = sending.plan.settings.heeded();
     let skipped = |why: &str| Ok(Staged::skipped((), why));
@@ -209,8 +211,9 @@ pub(in crate::pipeline) fn photons(
     }
     let Sending { world, pool, token, .. } = sending;
     let begin = Instant::now();
-    let send =
-        |progress: Progress<'_>| pool.install(|| Photons::new(world, &settings, of_photons, progress, token));
+    let send = |progress: Progress<'_>| {
+        ticking(pool, &mut tick, || Photons::new(world, &settings, of_photons, progress, token))
+    };
     let (photons, first) = sending.sink.asset("photons", send)?;
     let seconds = begin.elapsed().as_secs_f64();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);

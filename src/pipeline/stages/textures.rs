@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::super::cache::Pool;
+use super::super::cache::{Pool, Spare};
 use super::super::watch::content::{Content, FileRead};
 use super::meshes::canonical;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
@@ -35,9 +35,24 @@ pub(in crate::pipeline) struct TextureCache {
 }
 
 impl TextureCache {
-    pub(in crate::pipeline) fn sweep(&mut self, success: bool) {
-        self.texels.sweep(success);
-        self.mipmaps.sweep(success);
+    pub(in crate::pipeline) fn end(&mut self, success: bool, request: u64) {
+        self.texels.end(success, request);
+        self.mipmaps.end(success, request);
+    }
+
+    pub(in crate::pipeline) fn spares(&self) -> impl Iterator<Item = Spare> {
+        self.texels.spares().chain(self.mipmaps.spares())
+    }
+
+    pub(in crate::pipeline) fn drop_before(&mut self, request: u64) {
+        self.texels.drop_before(request);
+        self.mipmaps.drop_before(request);
+    }
+
+    /// The texels of a file that were read last.
+    #[cfg(test)]
+    pub(in crate::pipeline) fn latest(&self, path: &Path) -> Option<&Arc<Texels>> {
+        self.texels.latest(&(canonical(path), ImageEncoding::Color))
     }
 }
 
@@ -119,9 +134,10 @@ pub(in crate::pipeline) fn textures(
                 }
                 warn_of_unusable(loaded, &image, texels, findings);
                 if let Some(mipmaps) = mipmaps {
-                    cache.mipmaps.insert(image.name.clone(), key, mipmaps.clone());
+                    let bytes = mipmaps.memory_bytes();
+                    cache.mipmaps.insert(image.name.clone(), key, (mipmaps.clone(), bytes));
                 }
-                cache.texels.insert(image.name, key, texels.clone());
+                cache.texels.insert(image.name, key, (texels.clone(), texels.memory_bytes()));
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => {

@@ -5,6 +5,7 @@ mod camera;
 mod orders;
 mod photons;
 mod reuse;
+mod switching;
 mod targets;
 
 use std::fs;

@@ -15,13 +15,40 @@ fn wrapped(count: u32) -> String {
     format!("{SCENE}{glass}[photons]\nenabled = true\ncount = {count}\n")
 }
 
+/// Until the stage of the first photons is at work.
+fn until_first_are_sent(bench: &Bench) {
+    let is_it = |event: &Event| match event {
+        Event::Stage { stage, .. } => stage.name == Stage::Photons && stage.status == Status::Running,
+        _ => false,
+    };
+    while !is_it(&bench.next()) {}
+}
+
 #[test]
-fn write_is_heard_while_photons_are_sent() {
-    let text = wrapped(1_000_000).replace("samples = 4", "samples = 1000000");
+fn orders_are_heard_while_the_first_photons_are_sent() {
+    let mut bench = Bench::new(&wrapped(4_000_000));
+    let of = bench.send();
+    until_first_are_sent(&bench);
+    // Held, the photons arrive nowhere: nobody waits for their end.
+    bench.worker.send(Command::Pause(true));
+    bench.worker.send(Command::Write);
+    while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
+    bench.worker.send(Command::Pick(Spot { x: 0.5, y: 0.5 }));
+    while !matches!(bench.next(), Event::Picked { picked, .. } if picked.thing.is_some()) {}
+    bench.worker.send(Command::Pause(false));
+    let events = bench.until_end(of);
+    assert!(!events.iter().any(|event| matches!(event, Event::WritePostponed { .. })), "it is said once");
+    assert!(events.iter().any(|event| matches!(event, Event::Written { .. })));
+}
+
+#[test]
+fn write_is_heard_while_the_photons_of_later_samples_are_sent() {
+    let text = wrapped(4_000_000).replace("samples = 4", "samples = 1000000");
     let mut bench = Bench::new(&text);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
-    // Nearly all time is that of photons under way: held, they arrive nowhere.
+    // Nearly all time is that of photons under way, but not the moment in which progress is said.
+    std::thread::sleep(Duration::from_millis(50));
     bench.worker.send(Command::Pause(true));
     std::thread::sleep(Duration::from_millis(100));
     bench.worker.send(Command::Write);

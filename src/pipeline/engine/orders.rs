@@ -1,0 +1,56 @@
+//! What is heard while a request is under way.
+
+use std::cell::Cell;
+
+use crate::control::CancelToken;
+use crate::pipeline::errands::{AtHand, Errand};
+use crate::pipeline::inputs::Inputs;
+use crate::pipeline::protocol::{Event, PreviewSize};
+use crate::pipeline::sink::Sink;
+use crate::pipeline::stages::canvas::Canvas;
+
+/// Orders that come while a request is under way.
+pub(in crate::pipeline) trait Orders {
+    /// Whether the picture is to be written as it is.
+    fn wants_write(&self) -> bool;
+    /// The same, and the order is carried out.
+    fn take_write(&self) -> bool;
+    /// The size that previews are to have from now on.
+    fn take_preview(&self) -> Option<Option<PreviewSize>>;
+    /// The next thing that is asked of the picture at hand.
+    fn take_errand(&self) -> Option<Errand>;
+}
+
+/// What a request goes by while it is under way.
+pub(in crate::pipeline) struct Meanwhile<'a> {
+    pub(in crate::pipeline) token: &'a CancelToken,
+    /// Of the last stage, which writes.
+    pub(in crate::pipeline) writing: &'a CancelToken,
+    pub(in crate::pipeline) orders: &'a dyn Orders,
+    /// Whether it was said that an order to write waits.
+    is_postponed: Cell<bool>,
+}
+
+impl<'a> Meanwhile<'a> {
+    pub(in crate::pipeline) fn new(
+        token: &'a CancelToken,
+        writing: &'a CancelToken,
+        orders: &'a dyn Orders,
+    ) -> Self {
+        Self { token, writing, orders, is_postponed: Cell::new(false) }
+    }
+
+    /// An order to write waits until every pixel has a sample, which is said once.
+    pub(super) fn postpone_write(&self, sink: &Sink) {
+        if self.orders.wants_write() && !self.is_postponed.replace(true) {
+            sink.send(Event::WritePostponed { generation: sink.generation });
+        }
+    }
+
+    /// Do the next thing that is asked of the picture at hand.
+    pub(super) fn run_errand(&self, at_hand: &AtHand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
+        if let Some(errand) = self.orders.take_errand() {
+            at_hand.run(&errand, canvas, inputs, sink);
+        }
+    }
+}
