@@ -103,7 +103,7 @@ fn the_focus_goes_where_was_clicked() {
 }
 
 /// An editor that says what it was called with, reads a line of keys, and changes the scene.
-const EDITOR: &str =
+pub(super) const EDITOR: &str =
     "#!/bin/sh\nprintf 'editing %s at %s\\r\\n' \"$2\" \"$1\"\nread -r line\necho \"# $line\" >> \"$2\"\n";
 
 #[test]

@@ -1,16 +1,21 @@
 //! The live program in a pseudo-terminal, as a person sees it.
 
+mod asking;
 mod blocks;
 mod camera;
+mod edits;
 mod endings;
+mod eye;
 mod hands;
 mod input;
 mod keys;
+mod leafing;
 mod outputs;
 mod pty;
 mod relay;
 mod saving;
 mod screen;
+mod switches;
 mod thin_line;
 
 use std::fs;

@@ -209,6 +209,11 @@ impl Terminal {
         self.master.resize(size(columns, rows)).expect("resized");
     }
 
+    /// Something else writes on the terminal.
+    pub fn scribble(&self, bytes: &str) {
+        self.screen.lock().expect("a parser does not panic").process(bytes.as_bytes());
+    }
+
     pub fn signal(&self, signal: Signal) {
         let id = self.child.process_id().expect("an id");
         kill(Pid::from_raw(i32::try_from(id).expect("a process id")), signal).expect("sent");

@@ -1,0 +1,141 @@
+//! What is asked of a place of the picture: by a click, and at the crosshair by keys alone.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+
+use super::hands::EDITOR;
+use super::pty::{Colors, Folder, SCENE, Terminal};
+
+/// A click on a cell from 1.
+fn click(column: u16, row: u16) -> String {
+    format!("\x1b[<0;{column};{row}M\x1b[<0;{column};{row}m")
+}
+
+/// The scene with its ball, which has a name, before the middle of the board.
+fn centred() -> String {
+    SCENE.replace("center = [0.5, 0.2, 0.8]", "name = \"apple\"\ncenter = [0, 0, 0.8]")
+}
+
+/// The line of the ball in the scene, from 1.
+fn line_of_ball() -> usize {
+    centred().lines().position(|line| line == "[[sphere]]").expect("a ball") + 1
+}
+
+fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal {
+    folder.write("scene.toml", text);
+    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], variables);
+    terminal.wait_for_render(1);
+    // Room for one fact a line.
+    terminal.resize(120, 40);
+    terminal.wait("a large picture", |screen| {
+        screen.contents().lines().nth(39).is_some_and(|line| line.trim_end().ends_with("? help"))
+    });
+    terminal
+}
+
+#[test]
+fn the_crosshair_says_all_that_is_there() {
+    let folder = Folder::new();
+    let mut terminal = terminal(&folder, &centred(), &[]);
+    terminal.press("\r");
+    let place = format!("scene.toml:{}", line_of_ball());
+    for words in ["sphere \"apple\"", &place, "phong ball", "3 away", "at (", "L (", "n ("] {
+        terminal.wait_for(words);
+    }
+    // The next key takes it away; a click says what is elsewhere, which is the crosshair then.
+    terminal.press("e");
+    terminal.wait("no facts", |screen| !screen.contents().contains("apple"));
+    terminal.press(&click(30, 10));
+    terminal.wait_for("quad");
+    terminal.press("e\r");
+    terminal.wait_for("phong board");
+    assert!(!terminal.text().contains("apple"));
+    terminal.press(&click(4, 4));
+    terminal.wait_for("nothing at pixel");
+}
+
+#[test]
+fn the_focus_goes_to_the_crosshair_and_into_the_file() {
+    let folder = Folder::new();
+    let mut terminal = terminal(&folder, &centred(), &[]);
+    terminal.press("f");
+    terminal.wait_for("click where to focus");
+    terminal.press("f");
+    terminal.wait_for("away: shown, not written");
+    let text = terminal.text();
+    let focus = text.split("focus ").nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
+    let depth: f64 = focus.parse().expect("a number");
+    assert!((depth - 3.0).abs() < 0.01, "{depth}");
+    terminal.press("w");
+    terminal.wait_for("wrote scene.png");
+    let expected = folder.once(&["--set", &format!("camera.focus={focus}")]);
+    assert_eq!(folder.bytes("scene.png"), expected);
+    assert_ne!(expected, folder.once(&[]), "it shows");
+    terminal.press("c");
+    terminal.wait_for("the camera is in scene.toml now");
+    let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
+    assert_eq!(written, centred().replace("focus = 4.0", &format!("focus = {focus}")));
+}
+
+#[test]
+fn a_pinhole_has_no_focus_and_no_depth_of_field() {
+    let folder = Folder::new();
+    let mut terminal = terminal(&folder, &centred().replace("aperture = 0.2\n", ""), &[]);
+    terminal.press("ff");
+    terminal.wait_for("everything is in focus");
+    terminal.press("d");
+    terminal.wait_for("no depth of field");
+}
+
+#[test]
+fn the_editor_opens_at_what_was_clicked() {
+    let folder = Folder::new();
+    folder.write("vi", EDITOR);
+    fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
+    let editor = folder.path("vi");
+    let variables = [("VISUAL", ""), ("EDITOR", editor.to_str().expect("a name"))];
+    let mut terminal = terminal(&folder, &centred(), &variables);
+    terminal.press("\r");
+    terminal.wait_for("apple");
+    terminal.press("o");
+    terminal.wait_for(&format!("editing scene.toml at +{}", line_of_ball()));
+    terminal.press("\n");
+    terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
+}
+
+#[test]
+fn pixels_are_shown_around_what_was_clicked() {
+    let folder = Folder::new();
+    let large = SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240");
+    let mut terminal = terminal(&folder, &large, &[]);
+    let before = terminal.settled(|screen| Colors::of(screen).red);
+    // The corner of the picture, where the board is not.
+    terminal.press(&click(4, 4));
+    terminal.wait_for("nothing at pixel");
+    terminal.press("x");
+    terminal
+        .wait("no board", |screen| screen.contents().contains("1:1") && Colors::of(screen).red < before / 2);
+    terminal.press("x");
+    terminal.wait("the picture as before", |screen| Colors::of(screen).red == before);
+}
+
+#[test]
+fn the_rectangle_is_around_the_crosshair_without_the_mouse() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    let mut terminal = folder.terminal();
+    terminal.wait_for("ETA");
+    let has_corners = |screen: &vt100::Screen| {
+        let text = screen.contents();
+        ["┌", "┐", "└", "┘"].iter().all(|it| text.contains(it))
+    };
+    assert!(!terminal.look(has_corners));
+    for keys in ["zz", "mz"] {
+        terminal.press(keys);
+        terminal.wait_for("the rectangle is rendered first; z ends that");
+        terminal.wait("its corners", has_corners);
+        terminal.press("z");
+        terminal.wait_for("no part of the picture comes first any more");
+        terminal.wait("no corners", |screen| !has_corners(screen));
+    }
+}

@@ -1,0 +1,142 @@
+//! Each kind of edit, and what is made again for it: by the lines of stages on the screen, and in the report.
+
+use super::pty::{Folder, SCENE, Terminal};
+
+/// A triangle beside the board.
+const OBJ: &str = "v 1.2 0 0\nv 1.4 0 0\nv 1.2 0.5 0\nf 1 2 3\n";
+
+fn paint(color: &str) -> String {
+    format!("P3\n1 1\n255\n{color}\n")
+}
+
+/// Two textures and a mesh beside what is there.
+fn scene() -> String {
+    let balls = "[[sphere]]\ncenter = [-0.5, 0.5, 0.5]\nradius = 0.2\nmaterial = \"skin\"\n\n\
+                 [[sphere]]\ncenter = [-0.5, -0.5, 0.5]\nradius = 0.2\nmaterial = \"bark\"\n";
+    let mesh = "[[mesh]]\nfile = \"one.obj\"\nmaterial = \"ball\"\n";
+    let materials = "[materials]\nskin = { diffuse = { texture = \"skin\" } }\nbark = { diffuse = { texture = \"bark\" } }";
+    let textures = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.bark]\nfile = \"bark.ppm\"\n\n"
+        .to_owned()
+        + materials;
+    SCENE.replace("samples = 4", "samples = 4\nexposure = 0").replace("[materials]", &textures) + balls + mesh
+}
+
+fn folder(text: &str) -> Folder {
+    let folder = Folder::new();
+    folder.write("one.obj", OBJ);
+    folder.write("two.obj", &OBJ.replace("0.5", "0.6"));
+    folder.write("skin.ppm", &paint("200 150 100"));
+    folder.write("bark.ppm", &paint("100 150 50"));
+    folder.write("scene.toml", text);
+    folder
+}
+
+/// At work on the scene, with room for every line.
+fn terminal(folder: &Folder) -> Terminal {
+    let call = [folder.program(), "scene.toml", "--report", "report.json"];
+    let mut terminal = folder.terminal_with(&call, &[]);
+    terminal.resize(120, 40);
+    terminal
+}
+
+/// `d`one, `r`eused or `s`kipped for each stage in order, and what is said of the stage of this name.
+fn stages(folder: &Folder, name: &str) -> (String, String) {
+    let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
+    let stages = report["stages"].as_array().expect("stages");
+    let text = |stage: &serde_json::Value, key: &str| stage[key].as_str().expect(key).to_owned();
+    let why = stages.iter().find(|stage| stage["name"] == name).map(|stage| text(stage, "why"));
+    (stages.iter().map(|stage| text(stage, "status")[..1].to_owned()).collect(), why.expect("a stage"))
+}
+
+#[test]
+fn each_edit_makes_again_what_depends_on_it_and_nothing_else() {
+    let own = scene();
+    let folder = folder(&own);
+    let terminal = terminal(&folder);
+    terminal.wait_for_render(1);
+    assert_eq!(
+        stages(&folder, "photons"),
+        ("dddddsdd".to_owned(), "the scene does not enable photons".to_owned())
+    );
+
+    folder.write("scene.toml", &own.replace("[camera]", "# the eye\n\n[camera]"));
+    terminal.wait_for("unchanged · run 1");
+    terminal.wait_for("6 reused");
+    assert_eq!(stages(&folder, "render").0, "drrrrsrr");
+
+    let edits = [
+        ("exposure = 0", "exposure = 1", "drrrrsrd", "render", "nothing that it shows changed"),
+        (
+            "exposure = 0",
+            "exposure = 0\ntonemap = \"agx\"",
+            "drrrrsrd",
+            "render",
+            "nothing that it shows changed",
+        ),
+        ("[0.8, 0.02, 0.02]", "[0.7, 0.02, 0.02]", "drrrrsdd", "accel", "no shape changed"),
+        ("samples = 4", "samples = 4\nbackground = [0, 0, 1]", "drrrrsdd", "lights", "no light changed"),
+        ("[20, 20, 20]", "[10, 20, 20]", "drrrdsdd", "lights", "1 light"),
+        ("position = [0, 0, 4]", "position = [0, 0, 5]", "drrrrsdd", "meshes", "the files did not change"),
+        ("center = [0.5, 0.2", "center = [0.4, 0.2", "drrdrsdd", "accel", "0 mesh trees built, 1 kept"),
+        ("one.obj", "two.obj", "ddrdrsdd", "meshes", "1 loaded"),
+    ];
+    let mut renders = 1;
+    for (from, to, expected, stage, why) in edits {
+        for (text, expected, why) in [(own.replace(from, to), Some(expected), why), (own.clone(), None, "")] {
+            folder.write("scene.toml", &text);
+            renders += 1;
+            terminal.wait_for_render(renders);
+            let (statuses, said) = stages(&folder, stage);
+            // Whoever goes back finds the trees and the picture of before.
+            let is_of_light = expected.is_none() && from == "[20, 20, 20]";
+            let back = if is_of_light { "drrrdsrd" } else { "drrrrsrd" };
+            assert_eq!(statuses, expected.unwrap_or(back), "{to}");
+            assert!(said.contains(why), "{to}: {said}");
+            terminal.wait_for(&format!("{} reused", statuses.matches('r').count()));
+        }
+    }
+    folder.write("bark.ppm", &paint("50 150 100"));
+    terminal.wait_for_render(renders + 1);
+    terminal.wait_for("4 reused");
+    assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 kept".to_owned()));
+}
+
+/// Waits until all of these lines of stages are there.
+#[track_caller]
+fn wait_for_stages(terminal: &Terminal, lines: &[(&str, &str, &str)]) {
+    for (sign, name, status) in lines {
+        terminal.wait(&format!("{sign} {name} {status}"), |screen| {
+            let text = screen.contents();
+            let is_it = |line: &str| line.contains(&format!("{sign} {name} ")) && line.contains(status);
+            text.lines().any(is_it)
+        });
+    }
+}
+
+#[test]
+fn each_stage_says_what_became_of_it_while_the_picture_is_rendered() {
+    let own = scene().replace("samples = 4", "samples = 10000000");
+    let folder = folder(&own);
+    let terminal = terminal(&folder);
+    let rendering = (">", "render", "…");
+    let begin = [("✓", "meshes", " "), ("✓", "lights", " "), ("-", "photons", "skipped"), rendering];
+    wait_for_stages(&terminal, &begin);
+    let kept = ("=", "meshes", "reused");
+    let other_light = own.replace("[20, 20, 20]", "[10, 20, 20]");
+    folder.write("scene.toml", &other_light);
+    wait_for_stages(&terminal, &[kept, ("=", "accel", "reused"), ("✓", "lights", " "), rendering]);
+    let moved = other_light.replace("center = [0.5, 0.2", "center = [0.4, 0.2");
+    folder.write("scene.toml", &moved);
+    wait_for_stages(&terminal, &[kept, ("✓", "accel", " "), ("=", "lights", "reused"), rendering]);
+    folder.write("skin.ppm", &paint("50 150 100"));
+    let saved = [("=", "parse", "reused"), kept, ("✓", "textures", " "), ("=", "accel", "reused"), rendering];
+    wait_for_stages(&terminal, &saved);
+
+    // Broken during the render, and mended by going back to the first of them.
+    folder.write("scene.toml", "[render");
+    terminal.wait_for("the last good scene is rendered on");
+    folder.write("scene.toml", &own);
+    let back = [kept, ("=", "textures", "reused"), ("=", "accel", "reused"), ("✓", "lights", " "), rendering];
+    wait_for_stages(&terminal, &back);
+    terminal.wait("no error", |screen| !screen.contents().contains("broken"));
+}

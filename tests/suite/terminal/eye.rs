@@ -1,0 +1,169 @@
+//! Where each key and each way of the mouse brings the eye, by the numbers that `c` writes into the scene file.
+
+use std::fs;
+
+use super::pty::{Folder, SCENE, Terminal};
+
+const UP: &str = "\x1b[A";
+const DOWN: &str = "\x1b[B";
+const RIGHT: &str = "\x1b[C";
+const LEFT: &str = "\x1b[D";
+
+/// The numbers of a key of the scene file.
+fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
+    let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
+    let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = ")).expect(key);
+    line.trim_matches(['[', ']']).split(',').map(|it| it.trim().parse().expect("a number")).collect()
+}
+
+/// What a key of the file is after these keys and `c`. The file is as before then, and its picture on disk.
+fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
+    terminal.press(keys);
+    terminal.wait_for("camera moved: shown, not written");
+    terminal.press("c");
+    terminal.wait_for("the camera is in scene.toml now");
+    let kept = numbers(folder, key);
+    let expected = folder.once(&[]);
+    assert_ne!(expected, own, "{keys:?} shows");
+    let is = |bytes: &[u8]| fs::read(folder.path("scene.png")).is_ok_and(|there| there == bytes);
+    terminal.wait("the picture of the camera that was written", |_| is(&expected));
+    folder.write("scene.toml", SCENE);
+    terminal.wait("the scene's own picture", |_| is(own));
+    terminal.wait_for("done");
+    kept
+}
+
+#[track_caller]
+fn assert_near(numbers: &[f64], expected: &[f64], what: &str) {
+    let is_near = numbers.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3);
+    assert!(numbers.len() == expected.len() && is_near, "{what:?}: {numbers:?} is not {expected:?}");
+}
+
+/// The eye's distance along one axis and along z after a step of 3° from 4 away.
+const ASIDE: f64 = 0.2093;
+const AHEAD: f64 = 3.9945;
+
+#[test]
+fn each_key_brings_the_eye_where_its_table_says() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let own = folder.bytes("scene.png");
+    for (keys, position) in [
+        ([LEFT, "h"], [-ASIDE, 0.0, AHEAD]),
+        ([RIGHT, "l"], [ASIDE, 0.0, AHEAD]),
+        ([UP, "k"], [0.0, ASIDE, AHEAD]),
+        ([DOWN, "j"], [0.0, -ASIDE, AHEAD]),
+        (["+", "="], [0.0, 0.0, 4.0 * 0.95]),
+        (["-", "--+"], [0.0, 0.0, 4.0 / 0.95]),
+    ] {
+        for keys in keys {
+            assert_near(&kept(&folder, &mut terminal, &own, keys, "position"), &position, keys);
+        }
+    }
+    for (keys, fov) in [("<", 40.0 / 1.05), (">", 40.0 * 1.05)] {
+        let written = kept(&folder, &mut terminal, &own, keys, "fov")[0];
+        assert!((written - fov).abs() < 0.006, "{keys}: {written} is not {fov}");
+    }
+}
+
+/// What a terminal sends for a button or the wheel over a cell from 1.
+fn mouse(button: u8, column: u16, row: u16) -> String {
+    format!("\x1b[<{button};{column};{row}M")
+}
+
+fn dragged(from: (u16, u16), to: (u16, u16)) -> String {
+    mouse(0, from.0, from.1) + &mouse(32, to.0, to.1) + &format!("\x1b[<0;{};{}m", to.0, to.1)
+}
+
+#[test]
+fn the_hand_turns_the_scene_with_it_and_the_wheel_goes_nearer_and_farther() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let own = folder.bytes("scene.png");
+    let mut eye = |keys: String| kept(&folder, &mut terminal, &own, &keys, "position");
+    let (right, left) = (eye(dragged((20, 10), (24, 10))), eye(dragged((20, 10), (16, 10))));
+    assert!(right[0] < -0.1 && right[1] == 0.0 && right[2] < 4.0, "{right:?}");
+    assert_near(&left, &[-right[0], right[1], right[2]], "left");
+    let (down, up) = (eye(dragged((20, 10), (20, 12))), eye(dragged((20, 10), (20, 8))));
+    assert!(down[0] == 0.0 && down[1] > 0.1 && down[2] < 4.0, "{down:?}");
+    assert_near(&up, &[down[0], -down[1], down[2]], "up");
+    assert_near(&eye(mouse(64, 20, 10)), &[0.0, 0.0, 4.0 * 0.95], "the wheel");
+    assert_near(&eye(mouse(65, 20, 10)), &[0.0, 0.0, 4.0 / 0.95], "the wheel back");
+}
+
+#[test]
+fn a_hand_that_begins_beside_the_picture_moves_nothing() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press(&dragged((20, 1), (30, 10)));
+    terminal.press("0");
+    terminal.wait_for("the keys have changed nothing");
+}
+
+#[test]
+fn all_that_keys_changed_goes_back_at_once() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let own = folder.bytes("scene.png");
+    for (key, words) in [
+        ("s", "s hard"),
+        ("]", "exposure +0.25"),
+        ("l", "camera moved"),
+        ("<", "camera moved"),
+        ("v", "view normal: shown, not written"),
+    ] {
+        terminal.press(key);
+        terminal.wait_for(words);
+    }
+    terminal.wait_for("done");
+    fs::remove_file(folder.path("scene.png")).expect("removed");
+    terminal.press("0");
+    terminal.wait_for("back to the scene's own settings");
+    terminal.wait("the scene's own picture", |_| {
+        fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own)
+    });
+    let words = ["s soft", "v beauty", "done"];
+    terminal.wait("the toggles as before", |screen| {
+        let text = screen.contents();
+        words.iter().all(|it| text.contains(it)) && !text.contains("camera moved")
+    });
+}
+
+#[test]
+fn an_orbiter_becomes_position_and_view_when_it_is_written() {
+    let folder = Folder::new();
+    let text = SCENE.replace("position = [0, 0, 4]\nlook_at = [0, 0, 0]", "orbiter = \"eye.txt\" # gKit");
+    folder.write("eye.txt", "c 0 0 0\ns 4 2\n");
+    folder.write("scene.toml", &text);
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("+");
+    terminal.wait_for("camera moved: shown, not written");
+    terminal.press("c");
+    terminal.wait_for("the camera is in scene.toml now");
+    assert_eq!(numbers(&folder, "position").len(), 3);
+    let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
+    assert!(written.contains("look_at = [") && !written.contains("orbiter"), "{written}");
+    terminal.wait("its picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
+}
+
+#[test]
+fn a_camera_is_not_written_over_a_file_that_changed() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press(">");
+    terminal.wait_for_render(2);
+    // Room for the words in one line.
+    terminal.resize(120, 40);
+    let broken = SCENE.replace("samples = 4", "samples = \"four\"");
+    folder.write("scene.toml", &broken);
+    terminal.wait_for("broken");
+    terminal.press("c");
+    terminal.wait_for("error: the scene file has changed since it was read");
+    assert_eq!(fs::read_to_string(folder.path("scene.toml")).expect("a scene"), broken);
+}

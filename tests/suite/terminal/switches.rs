@@ -1,0 +1,125 @@
+//! Photons, integrator and views by their keys: on the screen, in the file and in the report.
+
+use std::fs;
+
+use super::pty::{Folder, SCENE, Terminal};
+
+/// A ball of glass before the board, through which photons come.
+fn glassy() -> String {
+    let ball = "ball = { type = \"glass\" }";
+    SCENE.replace("ball = { diffuse = [0.02, 0.02, 0.02] }", ball) + "[photons]\ncount = 2000\n"
+}
+
+fn setting(folder: &Folder, name: &str) -> serde_json::Value {
+    let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
+    report["settings"][name].clone()
+}
+
+#[test]
+fn photons_and_the_integrator_are_switched_for_this_run() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &glassy());
+    let call = [folder.program(), "scene.toml", "--report", "report.json"];
+    let mut terminal = folder.terminal_with(&call, &[]);
+    terminal.wait_for_render(1);
+    terminal.wait_for("p off");
+    let own = folder.bytes("scene.png");
+    let is_written = |bytes: &[u8]| fs::read(folder.path("scene.png")).is_ok_and(|there| there == bytes);
+    let rounds = [
+        ("p", "p on", ["--photons", "on"], ("photons", serde_json::json!(true))),
+        ("p", "p off", ["--photons", "off"], ("photons", serde_json::json!(false))),
+        ("i", "i path", ["--integrator", "path"], ("integrator", serde_json::json!("path"))),
+        ("i", "i whitted", ["--integrator", "whitted"], ("integrator", serde_json::json!("whitted"))),
+    ];
+    for (number, (key, words, options, (name, value))) in (2..).zip(rounds) {
+        terminal.press(key);
+        terminal.wait_for(words);
+        terminal.wait_for_render(number);
+        let expected = folder.once(&options);
+        assert_eq!(expected == own, matches!(words, "p off" | "i whitted"), "{words} shows");
+        assert!(is_written(&expected), "{words}");
+        assert_eq!(setting(&folder, name), value);
+    }
+    let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
+    assert_eq!(text, glassy(), "never the file");
+}
+
+#[test]
+fn what_path_does_not_know_is_said() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &glassy());
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("i");
+    terminal.wait_for_render(2);
+    terminal.wait_for("s –");
+    terminal.press("s");
+    terminal.wait_for("path ignores `shadows`");
+    terminal.press("p");
+    terminal.wait_for("path gathers no photons");
+    terminal.wait_for_render(2);
+}
+
+/// The state of the view in the line of keys.
+fn wait_for_view(terminal: &Terminal, name: &str) {
+    terminal.wait(name, |screen| {
+        let text = screen.contents();
+        text.lines().last().is_some_and(|line| line.contains(&format!("v {name}")))
+    });
+}
+
+#[test]
+fn each_digit_chooses_its_view_while_the_list_is_open() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let views =
+        ["beauty", "normal", "depth", "barycentric", "uv", "albedo", "ambient", "diffuse", "specular"];
+    for (digit, view) in (1..).zip(views) {
+        // Together, so that the list is not gone by itself in between.
+        terminal.press(&format!("v{digit}"));
+        terminal.wait_for(&format!("▸{digit} {view}"));
+        wait_for_view(&terminal, view);
+    }
+    terminal.wait("a whole picture of it", |screen| {
+        let text = screen.contents();
+        text.lines().any(|line| line.contains("✓ done") && line.contains("view specular"))
+    });
+    terminal.press("w");
+    terminal.wait_for("wrote scene.png");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "specular"]));
+    terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
+    terminal.press("2e");
+    terminal.wait_for("no errors and no warnings");
+    wait_for_view(&terminal, "specular");
+}
+
+#[test]
+fn the_previous_view_of_the_first_is_the_last() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    terminal.press("V");
+    wait_for_view(&terminal, "error");
+    terminal.wait_for_render(2);
+    terminal.press("v");
+    wait_for_view(&terminal, "beauty");
+}
+
+#[test]
+fn render_again_takes_every_sample_anew() {
+    let folder = Folder::new();
+    let call = [folder.program(), "scene.toml", "--report", "report.json"];
+    let mut terminal = folder.terminal_with(&call, &[]);
+    terminal.wait_for_render(1);
+    let own = folder.bytes("scene.png");
+    fs::remove_file(folder.path("report.json")).expect("removed");
+    terminal.press("r");
+    terminal.wait_for_render(2);
+    let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
+    let statuses = report["stages"].as_array().expect("stages").iter().map(|it| it["status"].clone());
+    let statuses: Vec<_> = statuses.collect();
+    assert_eq!((&statuses[0], &statuses[6]), (&"reused".into(), &"done".into()), "{statuses:?}");
+    assert_eq!(report["counters"]["camera_rays"], 64 * 48 * 4);
+    assert_eq!(folder.bytes("scene.png"), own);
+}
