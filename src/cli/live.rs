@@ -84,7 +84,11 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         }
         said.iter().for_each(|line| console.say(line));
     }
-    outcome.map(|ended| Exit(ended.status.0)).map_err(|error| {
+    let exit = |ended: Ended| match ended.status {
+        ExitStatus::QUIT if ended.is_unwritten => Exit::FAILED,
+        status => Exit(status.0),
+    };
+    outcome.map(exit).map_err(|error| {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
         (exit, error.to_string())
     })
@@ -174,8 +178,9 @@ fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: im
         if !is_heard {
             continue;
         }
-        if let Event::Files { files, .. } = &event {
-            watcher.set_files(files.clone());
+        if let Event::Files { files, read, since, .. } = &event {
+            let (read, before) = files.split_at((*read).min(files.len()));
+            watcher.set_files(read.to_vec(), before.to_vec(), *since);
         }
         if let Event::Failed { failure: Failure::Scene(all), .. } = &mut event {
             all.iter_mut().for_each(await_scene);

@@ -7,6 +7,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 pub use super::answers::{Kept, Picked, Section, Spot, Thing};
 use super::settings::{Effective, Overrides};
@@ -102,6 +103,10 @@ pub enum Event {
         generation: u64,
         /// The scene and everything that it names.
         files: Vec<FileRead>,
+        /// So many of them, the first ones, were read by this request; the others by some before.
+        read: usize,
+        /// After that.
+        since: Instant,
     },
     /// Everything that is there to warn of is known; the picture is yet to be rendered.
     Warnings {

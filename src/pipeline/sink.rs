@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, PoisonError};
+use std::time::Instant;
 
 use super::protocol::{
     AssetProgress, Event, LatestPreview, PreviewSlot, RenderProgress, Section, StageReport,
@@ -33,8 +34,8 @@ impl Sink {
         self.send(Event::Progress { generation: self.generation, progress });
     }
 
-    pub(super) fn files(&self, files: Vec<FileRead>) {
-        self.send(Event::Files { generation: self.generation, files });
+    pub(super) fn files(&self, files: Vec<FileRead>, read: usize, since: Instant) {
+        self.send(Event::Files { generation: self.generation, files, read, since });
     }
 
     pub(super) fn written(&self, path: &Path, bytes: u64) {

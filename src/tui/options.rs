@@ -83,6 +83,8 @@ pub struct Ended {
     pub is_write_unanswered: bool,
     /// What was written, its samples and its seconds, in one line.
     pub summary: String,
+    /// Whether the last picture that was to be written is not on disk.
+    pub is_unwritten: bool,
 }
 
 /// Why the front end could not go on.

@@ -14,6 +14,9 @@ pub(super) fn words(state: &State) -> String {
     } else {
         format!("wrote {}", files.join(", "))
     };
+    if let Some(why) = &state.write_failed {
+        return unwritten(state, why);
+    }
     let made = state.rendered.as_ref().map_or(String::new(), |report| format!(": {}", made(report)));
     let next = if state.rendered.is_some() { "the render after it" } else { "the render" };
     let since = match (state.activity, &state.progress) {
@@ -28,6 +31,17 @@ pub(super) fn words(state: &State) -> String {
         }
     };
     files + &made + &since
+}
+
+/// That the last picture is not on disk, and why; what is there is of before, but for what was written of it.
+fn unwritten(state: &State, why: &str) -> String {
+    let mut words = format!("the last picture is not written: {}", visible(why));
+    for written in &state.written {
+        let name = visible(&written.path.to_string_lossy()).into_owned();
+        let is_new = written.generation == state.generation;
+        words += &if is_new { format!("; wrote {name}") } else { format!("; {name} is an earlier one") };
+    }
+    words
 }
 
 fn made(report: &Report) -> String {
@@ -65,6 +79,17 @@ mod tests {
         desk.worker(Event::Started { generation: 3 });
         desk.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
         assert_eq!(words(&desk.state), format!("{made}; the render after it was stopped at 50 %"));
+        desk.worker(Event::WriteFailed { generation: 3, message: "cannot write b.exr: no space".to_owned() });
+        desk.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1 });
+        desk.worker(done(3, Vec::new(), false));
+        let failed = "the last picture is not written: cannot write b.exr: no space; cornell.png is an earlier one; wrote a.png";
+        assert_eq!(words(&desk.state), failed);
+        desk.press('r');
+        desk.worker(Event::Started { generation: 4 });
+        desk.worker(Event::Written { generation: 4, path: "a.png".into(), bytes: 1 });
+        desk.worker(done(4, Vec::new(), false));
+        let made = "wrote cornell.png, a.png: 640×480, 64 samples, 1.93 s";
+        assert_eq!(words(&desk.state), made);
         desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
         assert_eq!(words(&desk.state), format!("{made}; cornell.toml has errors since"));
     }

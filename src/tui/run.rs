@@ -217,8 +217,8 @@ impl Ui {
             }
             None => ExitStatus::QUIT,
         };
-        let summary = parting::words(&self.state);
-        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write, summary })
+        let (summary, is_unwritten) = (parting::words(&self.state), self.state.write_failed.is_some());
+        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write, summary, is_unwritten })
     }
 
     /// Gives the screen back and waits a little for the answers that the terminal owes: a shell would take them for

@@ -263,8 +263,9 @@ pub(super) struct State {
     pub edits: u64,
     /// Whether the next picture that is written is one that was asked for.
     pub asked_to_write: bool,
-    /// Why the picture at hand is not on disk although it is to be.
+    /// Why the picture at hand is not on disk although it is to be; and that in full.
     pub unwritten: Option<String>,
+    pub write_failed: Option<String>,
     pub written: Vec<Written>,
     pub picture: Option<Shown>,
 
@@ -348,6 +349,7 @@ impl State {
             edits: 0,
             asked_to_write: false,
             unwritten: None,
+            write_failed: None,
             written: Vec::new(),
             picture: None,
             problems: None,
@@ -395,8 +397,7 @@ impl State {
         moved.into_iter().chain(exposed).collect()
     }
 
-    /// Whether a picture is written without being asked for: one of the scene's own camera, in the view that the run was started
-    /// with.
+    /// Whether a picture is written unasked: one of the scene's own camera, in the view that the run began with.
     pub(super) fn is_written(&self) -> bool {
         self.view() == self.base_view() && !self.toggles.camera.is_any()
     }

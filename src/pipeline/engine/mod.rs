@@ -418,7 +418,7 @@ impl Engine {
         let mut files = findings.files.clone();
         let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
         files.extend(self.assets.iter().filter(|asset| !known.contains(asset.path.as_path())).cloned());
-        sink.files(files);
+        sink.files(files, findings.files.len(), findings.begun);
     }
 
     /// For `check`: the scene and all files that it names, needed or not.

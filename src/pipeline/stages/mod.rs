@@ -21,6 +21,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Instant;
 
 use rayon::ThreadPool;
 
@@ -83,8 +84,10 @@ pub(super) struct Reading<'a> {
 }
 
 /// What a request found out about files on its way.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Findings {
+    /// Before anything was read.
+    pub(super) begun: Instant,
     /// Everything that was read or tried, each once.
     pub(super) files: Vec<FileRead>,
     known: HashSet<FileRead>,
@@ -92,6 +95,19 @@ pub(super) struct Findings {
     /// Why nothing is written, as it was found last.
     pub(super) conflicts: Vec<Diagnostic>,
     pub(super) warnings: Vec<Diagnostic>,
+}
+
+impl Default for Findings {
+    fn default() -> Self {
+        Self {
+            begun: Instant::now(),
+            files: Vec::new(),
+            known: HashSet::new(),
+            errors: Vec::new(),
+            conflicts: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
 }
 
 impl Findings {

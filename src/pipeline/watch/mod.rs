@@ -86,8 +86,8 @@ pub struct Watcher {
 enum Message {
     /// Something happened to a watched name.
     Hint(Hint),
-    /// Watch these.
-    Files(Vec<FileRead>),
+    /// Watch these, which were read after that, and these, which were read before.
+    Files(Vec<FileRead>, Vec<FileRead>, Instant),
     Quit,
 }
 
@@ -123,10 +123,10 @@ impl Watcher {
         Ok(Self { orders })
     }
 
-    /// Watch these files and no others. A file that was not watched before and holds something else than given
-    /// counts as changed.
-    pub fn set_files(&self, files: Vec<FileRead>) {
-        let _ = self.orders.send(Message::Files(files));
+    /// Watch these files and no others: those read after `since`, and those known from before. A file that holds something else than
+    /// given counts as changed, unless something was said of it since it was read.
+    pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
+        let _ = self.orders.send(Message::Files(read, before, since));
     }
 }
 
@@ -139,8 +139,8 @@ impl Drop for Watcher {
 struct Watch<F> {
     folders: Folders,
     contents: Arc<Contents>,
-    /// What the files held when that was last said, or when they were last read.
-    files: HashMap<PathBuf, Content>,
+    /// What the files held when that was last said, or when they were last read, whichever is later; and when.
+    files: HashMap<PathBuf, (Content, Instant)>,
     growth: Growth,
     /// What the last look found and did not say.
     pending: Vec<FileRead>,
@@ -153,7 +153,7 @@ impl<F: FnMut(News)> Watch<F> {
             let pause = self.next_look().saturating_duration_since(Instant::now());
             match orders.recv_timeout(pause) {
                 Ok(Message::Hint(hint)) => self.growth.hint(hint, Instant::now()),
-                Ok(Message::Files(files)) => self.set(files),
+                Ok(Message::Files(read, before, since)) => self.set(read, before, since),
                 Err(RecvTimeoutError::Timeout) => self.look(Instant::now()),
                 Ok(Message::Quit) | Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -166,16 +166,22 @@ impl<F: FnMut(News)> Watch<F> {
         self.growth.due().map_or(unhinted, |due| due.min(unhinted))
     }
 
-    fn set(&mut self, files: Vec<FileRead>) {
+    fn set(&mut self, read: Vec<FileRead>, known: Vec<FileRead>, since: Instant) {
         let before = std::mem::take(&mut self.files);
-        for FileRead { path, content } in files {
-            // What was already said of a file is newer than what was read of it.
-            let content = before.get(&path).copied().unwrap_or(content);
-            self.files.insert(path, content);
+        for FileRead { path, content } in known {
+            let said = before.get(&path).copied();
+            self.files.insert(path, said.unwrap_or((content, since)));
+        }
+        for FileRead { path, content } in read {
+            // What was said of a file after that is newer than what was read of it; what was said before is not, and the file may be
+            // as it was then again.
+            let said = before.get(&path).copied().filter(|(_, when)| *when > since);
+            self.files.insert(path, said.unwrap_or((content, since)));
         }
         self.contents.retain(|path| self.files.contains_key(path));
         self.folders.set(self.files.keys());
-        if self.files.keys().any(|path| !before.contains_key(path)) {
+        let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);
+        if self.files.iter().any(|(path, (content, _))| was(path) != Some(content)) {
             self.growth.hint(Hint::Touched, Instant::now());
         }
     }
@@ -186,7 +192,7 @@ impl<F: FnMut(News)> Watch<F> {
         let is_said = !self.is_early(&found, now);
         if is_said {
             for FileRead { path, content } in found {
-                self.files.insert(path, content);
+                self.files.insert(path, (content, now));
             }
             let noticed = self.growth.said(now);
             (self.say)(News::Changed(Changed { noticed }));
@@ -224,7 +230,7 @@ impl<F: FnMut(News)> Watch<F> {
         let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(Content::Unusable);
         let files = self.files.iter();
         let mut found: Vec<FileRead> = files
-            .map(|(path, content)| (path, *content, now(path)))
+            .map(|(path, (content, _))| (path, *content, now(path)))
             .filter(|(_, before, now)| before != now)
             .map(|(path, _, content)| FileRead { path: path.clone(), content })
             .collect();

@@ -46,7 +46,8 @@ impl Scratch {
             path: path.to_path_buf(),
             content: contents.read(path, &CancelToken::new()).expect("not cancelled"),
         };
-        self.watcher.set_files(paths.iter().map(read).collect());
+        let since = Instant::now();
+        self.watcher.set_files(paths.iter().map(read).collect(), Vec::new(), since);
         // Folders are watched by the watcher's thread.
         std::thread::sleep(Duration::from_millis(150));
     }
@@ -199,8 +200,30 @@ fn a_change_between_reading_and_watching_is_seen() {
     let path = scratch.path("b.toml");
     fs::write(&path, "new").expect("written");
     let content = Content::Hash(*blake3::hash(b"old").as_bytes());
-    scratch.watcher.set_files(vec![FileRead { path, content }]);
+    scratch.watcher.set_files(vec![FileRead { path, content }], Vec::new(), Instant::now());
     scratch.expect_one();
+}
+
+#[test]
+fn a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_between() {
+    let scratch = Scratch::new(false);
+    let path = scratch.path("a.toml");
+    fs::write(&path, "said").expect("written");
+    scratch.expect_one();
+    // Something else was there for a moment: a request read it, the watcher did not.
+    let content = Content::Hash(*blake3::hash(b"between").as_bytes());
+    let between = vec![FileRead { path: path.clone(), content }];
+    scratch.watcher.set_files(between.clone(), Vec::new(), Instant::now());
+    scratch.expect_one();
+    // What is known from before a save says nothing.
+    scratch.watcher.set_files(Vec::new(), between, Instant::now());
+    scratch.expect_none();
+    // What was said after a request began is newer than what that read.
+    let begun = Instant::now();
+    fs::write(&path, "said later").expect("written");
+    scratch.expect_one();
+    scratch.watcher.set_files(vec![FileRead { path, content }], Vec::new(), begun);
+    scratch.expect_none();
 }
 
 #[test]

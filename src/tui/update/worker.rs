@@ -45,6 +45,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 state.unwritten = Some("not written".to_owned());
             }
             say(state, format!("error: {}", visible(&message)));
+            state.write_failed = Some(message);
         }
         Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::WritePostponed { .. } => {
@@ -92,7 +93,7 @@ fn started(state: &mut State) {
     state.assets.clear();
     state.progress = None;
     state.report = None;
-    state.unwritten = None;
+    (state.unwritten, state.write_failed) = (None, None);
     state.unchanged = false;
 }
 
@@ -117,7 +118,11 @@ fn wrote(state: &mut State, written: Written) {
     if std::mem::take(&mut state.asked_to_write) {
         say(state, format!("wrote {}", visible(&written.path.to_string_lossy())));
     }
-    state.unwritten = None;
+    // Of several outputs, another one may have failed.
+    let is_by_hand = state.activity == Activity::Done;
+    if is_by_hand {
+        (state.unwritten, state.write_failed) = (None, None);
+    }
     state.written.retain(|other| other.path != written.path);
     state.written.push(written);
 }
@@ -127,6 +132,7 @@ fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.asked_to_write = false;
     state.unwritten = Some("not written: e says why".to_owned());
     say(state, "nothing is written (e shows why)");
+    state.write_failed = Some(conflicts.first().map_or(String::new(), |conflict| conflict.message.clone()));
     if !conflicts.iter().all(|conflict| state.warnings.contains(conflict)) {
         state.pane = Pane { open: true, scroll: 0 };
     }

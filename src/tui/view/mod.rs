@@ -28,10 +28,11 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     panel::draw(state, layout.panel, buffer);
     under::draw(state, &layout, buffer);
     keys::draw(state, &layout, buffer);
-    message::draw(state, &layout, buffer);
     if state.pane.open {
         diagnostics::draw(state, layout.pane, buffer);
     }
+    // A long one goes on over whatever lies there.
+    message::draw(state, &layout, buffer);
     if state.views.is_some() {
         views::draw(state, &layout, buffer);
     }

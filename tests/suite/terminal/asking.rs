@@ -116,7 +116,8 @@ fn pixels_are_shown_around_what_was_clicked() {
     terminal
         .wait("no board", |screen| screen.contents().contains("1:1") && Colors::of(screen).red < before / 2);
     terminal.press("x");
-    terminal.wait("the picture as before", |screen| Colors::of(screen).red == before);
+    // But for a few cells on its edges, which keep what is as near.
+    terminal.wait("the picture as before", |screen| Colors::of(screen).red.abs_diff(before) <= before / 8);
 }
 
 #[test]
