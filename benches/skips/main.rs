@@ -29,14 +29,17 @@ fn main() -> ExitCode {
     let words: Vec<&String> = asked.iter().filter(|word| !word.starts_with("rounds=")).collect();
     let is_asked =
         |pair: &Pair| words.is_empty() || words.iter().any(|word| pair.name.contains(word.as_str()));
-    println!("| not used | s without | ratio with | quartiles | bits |");
-    println!("| --- | --- | --- | --- | --- |");
+    println!("| not used | s without | ratio with | quartiles | bits | report |");
+    println!("| --- | --- | --- | --- | --- | --- |");
     let mut faulty = false;
     for pair in pairs::pairs(SIZE).iter().filter(|pair| is_asked(pair)) {
         match ratios(pair, rounds) {
-            Ok(Paired { seconds, ratio: [low, ratio, high], is_same }) => {
+            Ok(Paired { seconds, ratio: [low, ratio, high], is_same, said }) => {
                 let bits = if is_same { "same" } else { "**other**" };
-                println!("| {} | {seconds:.4} | {ratio:.3} | {low:.3} … {high:.3} | {bits} |", pair.name);
+                println!(
+                    "| {} | {seconds:.4} | {ratio:.3} | {low:.3} … {high:.3} | {bits} | {said} |",
+                    pair.name
+                );
                 faulty |= !is_same || !((ratio - 1.0).abs() <= BOUND);
             }
             Err(error) => {
@@ -55,11 +58,13 @@ struct Paired {
     /// Quartiles and median.
     ratio: [f64; 3],
     is_same: bool,
+    /// Why the report says that a stage was skipped.
+    said: String,
 }
 
 /// Rounds in turns; which one is first changes from round to round.
 fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
-    let (mut ratios, mut seconds, mut is_same) = (Vec::new(), Vec::new(), true);
+    let (mut ratios, mut seconds, mut is_same, mut said) = (Vec::new(), Vec::new(), true, String::new());
     for round in 0..rounds.max(1) {
         let (off, on) = if round % 2 == 0 {
             let off = run::render(&pair.off)?;
@@ -69,11 +74,19 @@ fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
             (run::render(&pair.off)?, on)
         };
         is_same &= off.pixels.iter().map(|x| x.to_bits()).eq(on.pixels.iter().map(|x| x.to_bits()));
+        said = pair.skipped.map_or(String::new(), |(stage, _)| why(&on.report, stage));
         ratios.push(on.seconds / off.seconds);
         seconds.push(off.seconds);
     }
     ratios.sort_by(f64::total_cmp);
     seconds.sort_by(f64::total_cmp);
     let at = |quarter: usize| ratios[(ratios.len() - 1) * quarter / 4];
-    Ok(Paired { seconds: seconds[seconds.len() / 2], ratio: [at(1), at(2), at(3)], is_same })
+    Ok(Paired { seconds: seconds[seconds.len() / 2], ratio: [at(1), at(2), at(3)], is_same, said })
+}
+
+/// What the report says of a stage.
+fn why(report: &serde_json::Value, stage: &str) -> String {
+    let stages = report["stages"].as_array().into_iter().flatten();
+    let said = stages.filter(|one| one["name"] == stage);
+    said.map(|one| format!("{stage} {}: {}", one["status"], one["why"]).replace('"', "")).collect()
 }

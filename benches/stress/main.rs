@@ -7,7 +7,9 @@
 
 mod cases;
 mod frame;
+#[allow(dead_code, reason = "options are for other scenes")]
 mod row;
+#[allow(dead_code, reason = "reports are for other readers")]
 mod run;
 
 use std::fmt::Write as _;

@@ -8,8 +8,10 @@ mod frame;
 #[path = "../../benches/skips/pairs.rs"]
 mod pairs;
 #[path = "../../benches/stress/row.rs"]
+#[allow(dead_code, reason = "times are for the benchmark")]
 mod row;
 #[path = "../../benches/stress/run.rs"]
+#[allow(dead_code, reason = "times are for the benchmark")]
 mod run;
 
 use row::Extent;

@@ -24,7 +24,9 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
         ("lens", "LENS"),
         ("64 lamps", "LAMPS"),
     ];
-    for (name, setting) in settings {
+    // With a tree of lights a last digit is another one at another scale, and a pick at another place: in the long run alone.
+    let settings = settings.iter().filter(|(_, setting)| extent == Extent::Long || *setting != "LAMPS");
+    for &(name, setting) in settings {
         let scene = |frame: Frame| everything(frame, setting);
         let twins = |frames: Vec<Frame>| frames.into_iter().map(|frame| (scene(frame), scene(Frame::PLAIN)));
         let scaled = twins(steps.iter().map(|&k| Frame::scaled(k)).collect());
