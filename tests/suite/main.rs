@@ -17,5 +17,6 @@ mod once;
 mod options;
 mod output;
 mod same_bits;
+mod stress;
 mod terminal;
 mod views;

@@ -1,0 +1,118 @@
+//! Scenes with something that they do not use, on and off.
+
+use super::row::Picture;
+
+/// The same picture without and with what the scene does not use.
+pub(crate) struct Pair {
+    pub(crate) name: &'static str,
+    pub(crate) off: Picture,
+    pub(crate) on: Picture,
+    /// A stage that the report calls skipped with `on`, and a part of why.
+    pub(crate) skipped: Option<(&'static str, &'static str)>,
+}
+
+/// A small room; `RENDER` keys, `CAMERA` keys and what else there is can be put in.
+const ROOM: &str = r#"
+[render]
+width = WIDTH
+height = HEIGHT
+samples = SAMPLES
+RENDER
+[camera]
+position = [0, 1.2, 4]
+look_at = [0, 0.6, 0]
+CAMERA
+[materials]
+floor = { diffuse = 0.6 }
+ball = { diffuse = [0.7, 0.3, 0.2] BALL }
+[[quad]]
+corner = [-4, 0, 4]
+u = [8, 0, 0]
+v = [0, 0, -8]
+material = "floor"
+[[sphere]]
+center = [0, 0.6, 0]
+radius = 0.6
+material = "ball"
+[[box]]
+center = [1.4, 0.4, -0.5]
+size = [0.7, 0.8, 0.7]
+rotate = [0, 30, 0]
+material = "ball"
+"#;
+
+const POINT: &str = "[[light]]\nposition = [1, 3, 2]\nintensity = 20\n";
+
+const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3, -0.5]\nu = [1, 0, 0]\nv = [0, 0, 1]\nmaterial = \"lamp\"\n";
+
+const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
+
+/// All of them, in pictures of this size.
+pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
+    let scene = |render: &str, camera: &str, ball: &str, rest: &str| {
+        let size = [("WIDTH", width), ("HEIGHT", height), ("SAMPLES", samples)];
+        let sized =
+            size.iter().fold(ROOM.to_owned(), |text, (key, value)| text.replace(key, &value.to_string()));
+        let filled = sized.replace("RENDER", render).replace("CAMERA", camera).replace("BALL", ball);
+        Picture::new(filled + rest).with("a.ppm", PICTURE.to_owned())
+    };
+    let plain = || scene("", "", "", POINT);
+    let lit = || scene("", "", "", LAMP);
+    let path = || scene("integrator = \"path\"", "", "", LAMP);
+    let with = |rest: &str| scene("", "", "", &(POINT.to_owned() + rest));
+    let lens = |options| scene("", "aperture = 0.1", "", POINT).by(options);
+    let pair = |name, off, on| Pair { name, off, on, skipped: None };
+    let texture = "[textures.t]\nfile = \"a.ppm\"\n";
+    let unused = "[textures.t]\nfile = \"a.ppm\"\nfilter = \"mipmap\"\n[materials.unused]\ndiffuse = { texture = \"t\" }\nnormal_map = \"t\"\n";
+    vec![
+        Pair {
+            skipped: Some(("photons", "path needs none")),
+            ..pair("photons, by path", path(), path().by("--photons on"))
+        },
+        Pair {
+            skipped: Some(("photons", "mirrors or glass")),
+            ..pair(
+                "photons, direct light and nothing specular",
+                scene("max_depth = 1", "", "", POINT),
+                scene("max_depth = 1", "", "", POINT).by("--photons on"),
+            )
+        },
+        Pair {
+            skipped: Some(("photons", "does not enable")),
+            ..pair(
+                "photons that are not enabled",
+                plain(),
+                with("[photons]\ncount = 4000000\nradius = 0.5\n"),
+            )
+        },
+        pair("depth of field without an aperture", plain().by("--dof off"), plain().by("--dof on")),
+        pair("an aperture, switched off", plain(), lens("--dof off")),
+        pair("soft shadows of point lights", plain().by("--shadows hard"), plain().by("--shadows soft")),
+        pair("shadow samples of point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
+        pair("shadows, by path", path().by("--shadows off"), path().by("--shadows soft")),
+        Pair {
+            skipped: Some(("textures", "names a texture")),
+            ..pair("a texture that nothing names", plain(), with(texture))
+        },
+        Pair {
+            skipped: Some(("textures", "names a texture")),
+            ..pair("a material with pictures that no shape has", plain(), with(unused))
+        },
+        pair(
+            "glass and mirror that no shape has",
+            plain(),
+            with("[materials.g]\ntype = \"glass\"\ntint = 0.5\n[materials.r]\ntype = \"mirror\"\n"),
+        ),
+        pair("a highlight of strength 0", plain(), scene("", "", ", specular = 0, shininess = 1e5", POINT)),
+        pair("an emission of 0", plain(), scene("", "", ", emission = 0", POINT)),
+        pair("samples where the noise is, no error asked", lit(), lit().by("--error 0")),
+        pair("a clamp of 0", lit(), scene("clamp = 0", "", "", LAMP)),
+        pair(
+            "ambient light of a scene by path",
+            path(),
+            scene("integrator = \"path\"\nambient = 0.5", "", "", LAMP),
+        ),
+        pair("a light of intensity 0", plain(), with("[[light]]\nposition = [2, 3, 2]\nintensity = 0\n")),
+        pair("a black sky", plain(), with("[environment]\ncolor = 0\n")),
+    ]
+}

@@ -1,0 +1,129 @@
+//! Lenses, angles of view, cameras in and on things, pictures of extreme shape.
+
+use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
+
+/// White: under light 1 from all around it has the radiance 1.
+const WHITE: &str =
+    "[materials.w]\ndiffuse = 1\n[[sphere]]\ncenter = [0, 0, -5]\nradius = 1\nmaterial = \"w\"\n";
+
+pub(super) fn rows(extent: Extent) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let plain = signs("", CAMERA, "");
+    rows.push(
+        Row::alike(
+            "an aperture of 0, as no lens",
+            vec![(signs("", &with("aperture = 0\nfocus = 3"), ""), plain.clone())],
+            0.0,
+        )
+        .timed(),
+    );
+    rows.push(
+        Row::alike(
+            "an aperture of 1e-12, as no lens",
+            vec![(signs("", &with("aperture = 1e-12"), ""), plain.clone())],
+            1e-3,
+        )
+        .timed(),
+    );
+    let white = |camera: &str| (furnace(64, camera, WHITE), furnace(64, CAMERA, WHITE));
+    rows.push(
+        Row::mean("an aperture of the scene's size, a white ball", white(&with("aperture = 8")), 1.0, 1e-2)
+            .timed(),
+    );
+    rows.push(
+        Row::mean("an angle of view of 179°, a white ball", white(&with("fov = 179")), 1.0, 1e-2).timed(),
+    );
+    rows.extend([1e-3, 179.0].map(angle_of_view));
+    for (name, place) in [("glass of ior 1", "1"), ("glass of ior 1.000001", "1.000001")] {
+        let ball = around_the_camera(place);
+        let pairs = vec![(signs("", CAMERA, &ball), plain.clone())];
+        rows.push(Row::alike(format!("a camera in {name}, as in the open"), pairs, 1e-3));
+        let white = (furnace(64, CAMERA, &ball), furnace(64, CAMERA, &around_the_camera("1.5")));
+        rows.push(
+            Row::mean(format!("a camera in {name} under light from all around"), white, 1.0, 1e-3).timed(),
+        );
+    }
+    let inside = (furnace(64, CAMERA, &around_the_camera("1.5")), furnace(64, CAMERA, WHITE));
+    rows.push(Row::mean("a camera in glass of ior 1.5 under light from all around", inside, 1.0, 1e-3));
+    let black = "[materials.k]\ndiffuse = 0\n";
+    for (name, thing) in [
+        ("sphere", "[[sphere]]\ncenter = [0, 0, 1]\nradius = 1"),
+        ("box", "[[box]]\ncenter = [0, 0, 1]\nsize = [2, 2, 2]"),
+        ("quad", "[[quad]]\ncorner = [-1, -1, 0]\nu = [2, 0, 0]\nv = [0, 2, 0]"),
+        ("plane", "[[plane]]\npoint = [1, 1, 0]\nnormal = [0, 0, 1]"),
+        ("cylinder", "[[cylinder]]\na = [-1, 0, 1]\nb = [1, 0, 1]\nradius = 1"),
+        ("cone", "[[cone]]\nbase = [0, 0, 1]\ntip = [0, 0, 0]\nradius = 1"),
+        ("torus", "[[torus]]\ncenter = [0, 0, 1]\naxis = [1, 0, 0]\nradius = 0.75\ntube = 0.25"),
+        ("triangle", "[[triangle]]\na = [-1, -1, 0]\nb = [1, -1, 0]\nc = [0, 1, 0]"),
+        ("disk", "[[disk]]\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nradius = 1"),
+    ] {
+        // A round bar's own frame is turned: rounding puts the eye to either side of the surface.
+        if extent == Extent::Short && ["cylinder", "cone", "torus"].contains(&name) {
+            continue;
+        }
+        let thing = format!("{black}{thing}\nmaterial = \"k\"\n");
+        rows.push(
+            Row::alike(
+                format!("a camera on a {name}, as without"),
+                vec![(signs("", CAMERA, &thing), plain.clone())],
+                0.0,
+            )
+            .timed(),
+        );
+    }
+    rows.extend(images());
+    rows
+}
+
+fn with(key: &str) -> String {
+    format!("{CAMERA}{key}\n")
+}
+
+fn around_the_camera(ior: &str) -> String {
+    format!(
+        "[materials.g]\ntype = \"glass\"\nior = {ior}\n[[sphere]]\ncenter = [0.1, 0, 0]\nradius = 0.5\nmaterial = \"g\"\n"
+    )
+}
+
+/// A wall seen from a distance d has the height 2 d tan(fov / 2) in the picture: as from another one by 40°.
+fn angle_of_view(fov: f64) -> Row {
+    let distance = |fov: f64| 1.0 / (0.5 * fov.to_radians()).tan();
+    let picture = |fov: f64| {
+        let camera =
+            format!("[camera]\nposition = [0, 0, {:?}]\nlook_at = [0, 0, 0]\nfov = {fov:?}\n", distance(fov));
+        let wall = r#"
+[materials]
+red = { diffuse = 0, emission = [0.9, 0.2, 0.1] }
+blue = { diffuse = 0, emission = [0.2, 0.3, 1.0] }
+[[disk]]
+center = [0.2, 0.1, 0]
+normal = [0, 0, 1]
+radius = 0.6
+material = "red"
+[[triangle]]
+a = [-1.2, -0.9, 0]
+b = [-0.3, -0.8, 0]
+c = [-0.7, 0.9, 0]
+material = "blue"
+"#;
+        Picture::new(head(64, "") + &camera + wall)
+    };
+    let name = format!("a wall by an angle of view of {fov}°, as by 40°");
+    Row::alike(name, vec![(picture(fov), picture(40.0))], 1e-3).timed()
+}
+
+/// A ball of reflectance ρ around the eye and a point light of intensity I: every pixel has the radiance ρ I / (π R²), here 1.
+fn images() -> Vec<Row> {
+    let around =
+        "[materials.w]\ndiffuse = 0.5\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 5\nmaterial = \"w\"\n";
+    let light = format!("[[light]]\nposition = [0, 0, 0]\nintensity = {:?}\n", 50.0 * std::f64::consts::PI);
+    let sized = |width: u32, height: u32, samples: u32| {
+        let render = format!("[render]\nwidth = {width}\nheight = {height}\nsamples = {samples}\n");
+        Picture::new(render + CAMERA + around + &light)
+    };
+    let row = |(width, height, samples)| {
+        let name = format!("a picture of {width} × {height}, {samples} samples, beside 256 × 256");
+        Row::mean(name, (sized(width, height, samples), sized(256, 256, 1)), 1.0, 1e-5).timed()
+    };
+    [(1, 1, 65_536), (65_536, 1, 1), (1, 65_536, 1)].map(row).into()
+}

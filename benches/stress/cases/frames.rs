@@ -1,0 +1,319 @@
+//! The whole scene scaled and moved: the same picture.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+use super::super::frame::Frame;
+use super::{Extent, Picture, Row};
+
+/// What all moved pictures keep to.
+const MOVED: f64 = 1e-3;
+
+pub(super) fn rows(extent: Extent) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let (steps, distances): (Vec<i32>, &[f64]) = match extent {
+        Extent::Short => (vec![-30, -7, 30], &[1e8]),
+        Extent::Long => ((-30..=30).filter(|k| *k != 0).collect(), &[1e2, 1e4, 1e6, 1e8]),
+    };
+    let settings = [
+        ("whitted, bvh", "accel = \"bvh\""),
+        ("whitted, kd-tree", "accel = \"kdtree\""),
+        ("path, bvh", "integrator = \"path\""),
+        ("path, kd-tree", "integrator = \"path\"\naccel = \"kdtree\""),
+        ("photons", PHOTONS),
+        ("lens", "LENS"),
+        ("64 lamps", "LAMPS"),
+    ];
+    // With a tree of lights a last digit is another one at another scale, and a pick at another place: in the long run alone.
+    let settings = settings.iter().filter(|(_, setting)| extent == Extent::Long || *setting != "LAMPS");
+    for &(name, setting) in settings {
+        let scene = |frame: Frame| everything(frame, setting);
+        let twins = |frames: Vec<Frame>| frames.into_iter().map(|frame| (scene(frame), scene(Frame::PLAIN)));
+        let scaled = twins(steps.iter().map(|&k| Frame::scaled(k)).collect());
+        rows.push(Row::alike(format!("everything × 2^−30 … 2^30, {name}"), scaled.collect(), 0.0));
+        for &sizes in distances {
+            let moved = twins(vec![Frame::moved(sizes)]).collect();
+            rows.push(Row::alike(format!("everything moved by {sizes:e} sizes, {name}"), moved, MOVED));
+        }
+    }
+    rows.extend(of_shapes(extent));
+    rows.extend(of_lights(extent));
+    rows.extend(["obj", "off", "ply"].map(georeferenced));
+    rows
+}
+
+/// Asks for photons.
+const PHOTONS: &str = "PHOTONS";
+
+/// Every shape by every material and by both trees, far away; scaled as well, in the long run.
+fn of_shapes(extent: Extent) -> Vec<Row> {
+    let trees: &[&str] = if extent == Extent::Short { &["bvh"] } else { &["bvh", "kdtree"] };
+    let one = |shape: &str| {
+        // A plane is no lamp, and has a tile to the unit of length, whatever the scale.
+        let materials = MATERIALS.iter().filter(|name| shape != "plane" || !["lamp", "tiles"].contains(name));
+        let both = materials.flat_map(|name| trees.iter().map(move |tree| (*name, *tree)));
+        both.collect::<Vec<_>>()
+    };
+    let pairs = |shape: &str, frame: Frame| {
+        let picture = |frame, material: &str, tree: &str| {
+            let render = super::head(4, &format!("background = [0.25, 0.25, 0.25]\naccel = \"{tree}\""));
+            let scene = around(frame, &shape_of(shape, frame, material)) + &lights_of(frame, &LIGHTS[..3]);
+            with_files(&(render + &camera(frame, "") + &scene))
+        };
+        let twin = |(material, tree)| (picture(frame, material, tree), picture(Frame::PLAIN, material, tree));
+        one(shape).into_iter().map(twin).collect::<Vec<_>>()
+    };
+    let mut rows = Vec::new();
+    for shape in SHAPES {
+        rows.push(Row::alike(
+            format!("a {shape} of every material, moved by 1e8 sizes"),
+            pairs(shape, Frame::moved(1e8)),
+            MOVED,
+        ));
+        if extent == Extent::Long {
+            let scaled = [-30, -11, 7, 30].into_iter().flat_map(|k| pairs(shape, Frame::scaled(k)));
+            rows.push(Row::alike(
+                format!("a {shape} of every material, × 2^−30 … 2^30"),
+                scaled.collect(),
+                0.0,
+            ));
+        }
+    }
+    rows
+}
+
+/// Every light alone.
+fn of_lights(extent: Extent) -> Vec<Row> {
+    let integrators: &[&str] = if extent == Extent::Short { &["whitted"] } else { &["whitted", "path"] };
+    let picture = |frame, light: &str, integrator: &str| {
+        let scene = around(frame, &shape_of("sphere", frame, "gloss")) + &lights_of(frame, &[light]);
+        with_files(&(super::head(4, &format!("integrator = \"{integrator}\"")) + &camera(frame, "") + &scene))
+    };
+    let rows = LIGHTS.iter().flat_map(|&light| {
+        let pairs = |frames: &[Frame]| {
+            let both = frames.iter().flat_map(|&frame| integrators.iter().map(move |one| (frame, *one)));
+            both.map(|(frame, one)| (picture(frame, light, one), picture(Frame::PLAIN, light, one))).collect()
+        };
+        let moved = pairs(&[Frame::moved(1e8)]);
+        let scaled = pairs(&[Frame::scaled(-30), Frame::scaled(30)]);
+        [
+            Row::alike(format!("light: {light}, moved by 1e8 sizes"), moved, MOVED),
+            Row::alike(format!("light: {light}, × 2^−30 and 2^30"), scaled, 0.0),
+        ]
+    });
+    rows.collect()
+}
+
+/// A mesh whose file has its vertices 1e8 sizes from the origin.
+fn georeferenced(ending: &'static str) -> Row {
+    let name = match ending {
+        "obj" => "far.obj",
+        "off" => "far.off",
+        _ => "far.ply",
+    };
+    let picture = |frame: Frame| {
+        let mesh = format!("[[mesh]]\nfile = \"{name}\"\nmaterial = \"gloss\"\n");
+        let scene =
+            super::head(4, "") + &camera(frame, "") + &around(frame, &mesh) + &lights_of(frame, &LIGHTS[..2]);
+        with_files(&scene).with(name, ball(ending, frame, [0.0, 0.0, -5.0], 0.75))
+    };
+    let pairs = vec![(picture(Frame::moved(1e8)), picture(Frame::PLAIN))];
+    Row::alike(format!("vertices of a .{ending} 1e8 sizes away"), pairs, MOVED)
+}
+
+const SHAPES: [&str; 10] =
+    ["sphere", "quad", "plane", "box", "triangle", "disk", "cylinder", "cone", "torus", "mesh"];
+
+const MATERIALS: [&str; 6] = ["matte", "gloss", "mirror", "glass", "lamp", "tiles"];
+
+const LIGHTS: [&str; 9] = [
+    "point",
+    "spot",
+    "directional",
+    "steady point",
+    "sun",
+    "sky of one colour",
+    "sky with a picture",
+    "quad",
+    "sphere",
+];
+
+const TABLES: &str = r#"
+[textures.tiles]
+file = "tiles.ppm"
+[textures.bumps]
+file = "tiles.ppm"
+[materials]
+matte = { diffuse = 0.5 }
+gloss = { diffuse = 0.4, specular = 0.3, shininess = 20 }
+mirror = { type = "mirror" }
+glass = { type = "glass" }
+lamp = { diffuse = 0, emission = 0.5 }
+tiles = { diffuse = { texture = "tiles" }, normal_map = "bumps", normal_strength = 0.2 }
+"#;
+
+fn camera(frame: Frame, more: &str) -> String {
+    let (from, to) = (frame.point(0.125, 0.25, 0.5), frame.point(0.0, 0.0, -5.0));
+    format!("[camera]\nposition = {from}\nlook_at = {to}\nfov = 50\n{more}\n")
+}
+
+/// A shape over a floor.
+fn around(frame: Frame, shape: &str) -> String {
+    let floor = (frame.point(-4.0, -1.0, 0.0), frame.way(8.0, 0.0, 0.0), frame.way(0.0, 0.0, -8.0));
+    let (corner, u, v) = floor;
+    format!("{TABLES}[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = \"matte\"\n{shape}")
+}
+
+fn shape_of(shape: &str, frame: Frame, material: &str) -> String {
+    let (p, w, l) = (|x, y, z| frame.point(x, y, z), |x, y, z| frame.way(x, y, z), |x| frame.length(x));
+    let rest = match shape {
+        "sphere" => format!("center = {}\nradius = {}", p(0.0, 0.0, -5.0), l(0.75)),
+        "quad" => {
+            format!("corner = {}\nu = {}\nv = {}", p(-1.0, -0.7, -5.5), w(2.0, 0.0, 0.25), w(0.25, 1.5, 0.0))
+        }
+        "plane" => format!("point = {}\nnormal = [0, 0.25, 1]", p(0.3, 0.0, -6.0)),
+        "box" => {
+            format!("center = {}\nsize = {}\nrotate = [20, 30, 10]", p(0.0, 0.0, -5.0), w(0.8, 1.0, 0.7))
+        }
+        "triangle" => {
+            format!("a = {}\nb = {}\nc = {}", p(-1.0, -0.6, -5.0), p(1.2, -0.5, -5.1), p(0.1, 1.0, -5.6))
+        }
+        "disk" => format!("center = {}\nnormal = [1, 0.5, 2]\nradius = {}", p(0.0, 0.0, -5.0), l(0.875)),
+        "cylinder" => {
+            format!("a = {}\nb = {}\nradius = {}", p(-0.6, -0.4, -5.0), p(0.6, 0.5, -5.3), l(0.375))
+        }
+        "cone" => {
+            format!("base = {}\ntip = {}\nradius = {}", p(0.0, -0.7, -5.0), p(0.2, 0.9, -5.2), l(0.625))
+        }
+        "torus" => format!(
+            "center = {}\naxis = [0.25, 0.5, 1]\nradius = {}\ntube = {}",
+            p(0.0, 0.0, -5.0),
+            l(0.625),
+            l(0.25)
+        ),
+        _ => format!("file = \"ball.obj\"\nscale = {}\ntranslate = {}", l(0.75), p(0.0, 0.0, -5.0)),
+    };
+    format!("[[{shape}]]\n{rest}\nmaterial = \"{material}\"\n")
+}
+
+fn lights_of(frame: Frame, lights: &[&str]) -> String {
+    let (p, l) = (|x, y, z| frame.point(x, y, z), |x| frame.length(x));
+    let (above, intensity) = (p(-1.5, 3.0, -3.0), frame.intensity(0.75));
+    let one = |light: &str| match light {
+        "point" => format!("[[light]]\nposition = {above}\nintensity = {intensity}\n"),
+        "spot" => format!(
+            "[[light]]\ntype = \"spot\"\nposition = {}\nlook_at = {}\nangle = 50\nintensity = {intensity}\n",
+            p(2.0, 3.0, -4.0),
+            p(0.0, -0.5, -5.0)
+        ),
+        "directional" => {
+            "[[light]]\ntype = \"directional\"\ndirection = [0.5, -1, -0.75]\nirradiance = 0.1\n".to_owned()
+        }
+        "steady point" => format!("[[light]]\nposition = {above}\nintensity = 0.1\nfalloff = \"none\"\n"),
+        "sun" => {
+            "[[light]]\ntype = \"directional\"\ndirection = [0.5, -1, -0.75]\nirradiance = 0.1\nangle = 5\n"
+                .to_owned()
+        }
+        "sky of one colour" => "[environment]\ncolor = [0.1, 0.2, 0.3]\n".to_owned(),
+        "sky with a picture" => "[environment]\nfile = \"tiles.ppm\"\n".to_owned(),
+        "quad" => format!(
+            "[[quad]]\ncorner = {}\nu = {}\nv = {}\nmaterial = \"lamp\"\n",
+            p(-0.5, 2.0, -5.5),
+            frame.way(1.0, 0.0, 0.0),
+            frame.way(0.0, 0.0, 1.0)
+        ),
+        _ => {
+            format!("[[sphere]]\ncenter = {}\nradius = {}\nmaterial = \"lamp\"\n", p(1.5, 2.0, -4.0), l(0.25))
+        }
+    };
+    lights.iter().map(|light| one(light)).collect()
+}
+
+/// All shapes beside each other, some of them lamps, and lights.
+fn everything(frame: Frame, setting: &str) -> Picture {
+    let (render, more) = match setting {
+        "LENS" => ("", format!("aperture = {}\nfocus = {}", frame.length(0.0625), frame.length(5.0))),
+        PHOTONS | "LAMPS" => ("", String::new()),
+        other => (other, String::new()),
+    };
+    let mut scene =
+        super::head(4, &format!("background = [0.25, 0.25, 0.25]\n{render}")) + &camera(frame, &more);
+    if setting == PHOTONS {
+        scene += "[photons]\nenabled = true\ncount = 5000\n";
+    }
+    scene += &around(frame, "");
+    for (number, shape) in SHAPES.iter().enumerate() {
+        let angle = TAU * number as f64 / 10.0;
+        let move_by = [1.5 * angle.cos(), 1.0 + 0.8 * angle.sin(), -1.5]
+            .map(|x| (x * 1024.0).round() / 1024.0 * frame.unit);
+        let there = Frame { at: [0, 1, 2].map(|axis| frame.at[axis] + move_by[axis]), ..frame };
+        let material = if *shape == "plane" { "matte" } else { MATERIALS[number % MATERIALS.len()] };
+        scene += &shape_of(shape, there, material);
+    }
+    scene += &lights_of(frame, &["point", "spot", "directional", "sun", "quad", "sphere"]);
+    for number in 0..if setting == "LAMPS" { 64 } else { 0 } {
+        let (x, z) = (f64::from(number % 8) - 3.5, f64::from(number / 8) - 8.0);
+        let (center, radius) = (frame.point(x, 3.5, z), frame.length(0.0625));
+        let _ = write!(scene, "[[sphere]]\ncenter = {center}\nradius = {radius}\nmaterial = \"lamp\"\n");
+    }
+    with_files(&scene)
+}
+
+/// With the files that scenes of this kind name.
+fn with_files(scene: &str) -> Picture {
+    let tiles = "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3";
+    let ball = ball("obj", Frame::PLAIN, [0.0; 3], 1.0);
+    Picture::new(scene.to_owned()).with("tiles.ppm", tiles.to_owned()).with("ball.obj", ball)
+}
+
+/// A ball of facets as the text of a file.
+fn ball(ending: &str, frame: Frame, center: [f64; 3], radius: f64) -> String {
+    const RINGS: usize = 9;
+    const STEPS: usize = 14;
+    let at = |ring: usize, step: usize| {
+        let (theta, phi) =
+            (TAU / 2.0 * ring as f64 / RINGS as f64, TAU * (step % STEPS) as f64 / STEPS as f64);
+        let [x, y, z] = [theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()];
+        let text = frame.point(center[0] + radius * x, center[1] + radius * y, center[2] + radius * z);
+        text.replace(['[', ']', ','], "")
+    };
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    for ring in 0..=RINGS {
+        points.extend((0..STEPS).map(|step| at(ring, step)));
+    }
+    for ring in 0..RINGS {
+        for step in 0..STEPS {
+            let [a, b] = [step, (step + 1) % STEPS].map(|step| ring * STEPS + step);
+            if ring > 0 {
+                faces.push([a, b, b + STEPS]);
+            }
+            if ring + 1 < RINGS {
+                faces.push([a, b + STEPS, a + STEPS]);
+            }
+        }
+    }
+    mesh(ending, &points, &faces)
+}
+
+/// The text of a file of points and triangles.
+pub(super) fn mesh(ending: &str, points: &[String], faces: &[[usize; 3]]) -> String {
+    let (from, mut text) = match ending {
+        "obj" => (1, String::new()),
+        "off" => (0, format!("OFF\n{} {} 0\n", points.len(), faces.len())),
+        _ => (
+            0,
+            format!(
+                "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+             element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+                points.len(),
+                faces.len()
+            ),
+        ),
+    };
+    let (point, face) = if ending == "obj" { ("v ", "f") } else { ("", "3") };
+    points.iter().for_each(|one| text += &format!("{point}{one}\n"));
+    for [a, b, c] in faces {
+        let _ = writeln!(text, "{face} {} {} {}", a + from, b + from, c + from);
+    }
+    text
+}

@@ -1,0 +1,155 @@
+//! Slivers, needles, layers and a million spheres.
+
+use std::fmt::Write as _;
+
+use super::frames::mesh;
+use super::{CAMERA, Extent, Picture, Row, head};
+
+pub(super) fn rows(extent: Extent) -> Vec<Row> {
+    let mut rows = vec![slivers(), coplanar("[[quad]]"), coplanar("mesh"), needles("bvh"), needles("kdtree")];
+    let counts: &[u32] = if extent == Extent::Short { &[1000] } else { &[1000, 1_000_000] };
+    for &count in counts {
+        rows.push(overlapping(count, "bvh"));
+        rows.push(nested(count.min(MOST_NESTED), "bvh"));
+        if extent == Extent::Long {
+            rows.push(nested(count.min(MOST_NESTED), "kdtree"));
+        }
+    }
+    rows
+}
+
+/// A ray meets the boxes of all spheres around one middle that it passes: the time grows with their number, and so does the
+/// twin's.
+const MOST_NESTED: u32 = 1_000_000;
+
+const LAMP: &str = "[[light]]\nposition = [1, 2, 0]\nintensity = 9\n";
+
+fn of_mesh(text: String, render: &str) -> Picture {
+    let scene = head(16, render)
+        + CAMERA
+        + "[materials]\nm = { diffuse = 0.6 }\n[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\nsmooth = false\n"
+        + LAMP;
+    Picture::new(scene).with("a.obj", text)
+}
+
+fn point(x: f64, y: f64, z: f64) -> String {
+    format!("{x:?} {y:?} {z:?}")
+}
+
+/// A wall of 2 × 1024 triangles: slivers of 1 : 10⁴ · 2⁻¹⁰ with all their height, or 32 × 32 squares.
+fn slivers() -> Row {
+    let wall = |columns: usize, lines: usize| {
+        let at = |column: usize, line: usize| {
+            point(8.0 * column as f64 / columns as f64 - 4.0, 6.0 * line as f64 / lines as f64 - 3.0, -5.0)
+        };
+        let points: Vec<String> =
+            (0..=lines).flat_map(|line| (0..=columns).map(move |column| at(column, line))).collect();
+        let squares =
+            (0..lines).flat_map(|line| (0..columns).map(move |column| line * (columns + 1) + column));
+        let faces =
+            squares.flat_map(|a| [[a, a + 1, a + columns + 2], [a, a + columns + 2, a + columns + 1]]);
+        of_mesh(mesh("obj", &points, &faces.collect::<Vec<_>>()), "")
+    };
+    let pairs = vec![(wall(16_384, 1), wall(128, 128))];
+    Row::alike("a wall of 32,768 slivers, each 1 : 12,000", pairs, 1e-3).timed()
+}
+
+/// Sixteen surfaces in one plane, of one material: as one of them.
+fn coplanar(kind: &str) -> Row {
+    let layers = |count: usize| match kind {
+        "mesh" => {
+            let points = [(-4.0, -3.0), (4.0, -3.0), (4.0, 3.0), (-4.0, 3.0)].map(|(x, y)| point(x, y, -5.0));
+            of_mesh(mesh("obj", &points, &[[0, 1, 2], [0, 2, 3]].repeat(count)), "")
+        }
+        _ => {
+            let layer = "[[quad]]\ncorner = [-4, -3, -5]\nu = [8, 0, 0]\nv = [0, 6, 0]\nmaterial = \"m\"\n";
+            Picture::new(
+                head(16, "") + CAMERA + "[materials]\nm = { diffuse = 0.6 }\n" + LAMP + &layer.repeat(count),
+            )
+        }
+    };
+    let what = if kind == "mesh" { "of a mesh" } else { "of quads" };
+    Row::alike(format!("16 layers {what} in one plane, as one"), vec![(layers(16), layers(1))], 0.0)
+}
+
+/// Fifty thousand needles across space, as long as the scene and a thousandth as thick, by a tree; the other tree is the twin.
+fn needles(accel: &str) -> Row {
+    let mut random = Random(5);
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    for number in 0..20_000 {
+        let mut inside = || [random.signed() * 3.0, random.signed() * 2.0, random.signed() * 2.0 - 6.0];
+        let (a, b) = (inside(), inside());
+        points.extend([a, b, [b[0] + 0.003, b[1] + 0.002, b[2]]].map(|[x, y, z]| point(x, y, z)));
+        faces.push([3 * number, 3 * number + 1, 3 * number + 2]);
+    }
+    let text = mesh("obj", &points, &faces);
+    let by = |accel: &str| of_mesh(text.clone(), &format!("accel = \"{accel}\""));
+    let other = if accel == "bvh" { "kdtree" } else { "bvh" };
+    Row::alike(format!("20,000 needles 1 : 1000, {accel} as {other}"), vec![(by(accel), by(other))], 0.0)
+}
+
+/// Spheres at places that look random; the twin's are so small that hardly any two overlap.
+fn overlapping(count: u32, accel: &str) -> Row {
+    let spheres = |radius: f64, accel: &str| {
+        let mut random = Random(9);
+        let mut scene =
+            head(1, &format!("accel = \"{accel}\"")) + CAMERA + "[materials]\nm = { diffuse = 0.6 }\n" + LAMP;
+        for _ in 0..count {
+            let (x, y, z) = (random.signed() * 4.0, random.signed() * 3.0, random.signed() * 3.0 - 8.0);
+            let _ = write!(
+                scene,
+                "[[sphere]]\ncenter = [{x:.6}, {y:.6}, {z:.6}]\nradius = {radius:?}\nmaterial = \"m\"\n"
+            );
+        }
+        Picture::new(scene)
+    };
+    // Twice the mean distance: every point is inside of about 30 spheres.
+    let spacing = (8.0 * 6.0 * 6.0 / f64::from(count)).cbrt();
+    let (wide, narrow) = (2.0 * spacing, 0.25 * spacing);
+    Row {
+        figure: super::super::row::Figure::Difference(0.0),
+        ..Row::alike(
+            format!("{count} spheres that overlap, beside as many that do not"),
+            vec![(spheres(wide, accel), spheres(narrow, accel))],
+            1.0,
+        )
+    }
+    .timed()
+}
+
+/// Spheres around one middle: as the outermost.
+fn nested(count: u32, accel: &str) -> Row {
+    let spheres = |count: u32| {
+        let (width, height) = if count > 10_000 { (4, 3) } else { (64, 48) };
+        let render = head(1, &format!("accel = \"{accel}\""));
+        let size = format!("width = {width}\nheight = {height}");
+        let mut scene = render.replace("width = 64\nheight = 48", &size)
+            + CAMERA
+            + "[materials]\nm = { diffuse = 0.6 }\n"
+            + LAMP;
+        for number in 0..count {
+            let radius = 1.5 * (1.0 - 0.9 * f64::from(number) / f64::from(count));
+            let _ = write!(scene, "[[sphere]]\ncenter = [0, 0, -5]\nradius = {radius:?}\nmaterial = \"m\"\n");
+        }
+        scene
+    };
+    let outermost = |scene: String| {
+        let mut parts = scene.match_indices("[[sphere]]").skip(1);
+        let end = parts.next().map_or(scene.len(), |(at, _)| at);
+        scene[..end].to_owned()
+    };
+    let all = spheres(count);
+    let pairs = vec![(Picture::new(all.clone()), Picture::new(outermost(all)))];
+    Row::alike(format!("{count} spheres in each other, {accel}, as the outermost"), pairs, 0.0)
+}
+
+/// A small generator.
+struct Random(u64);
+
+impl Random {
+    /// In [−1, 1).
+    fn signed(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64) / (1_u64 << 52) as f64 - 1.0
+    }
+}

@@ -1,0 +1,99 @@
+//! Lights of extreme size and power.
+
+use std::f64::consts::PI;
+
+use super::super::row::Figure;
+use super::{CAMERA, Extent, Picture, Row, head};
+
+pub(super) fn rows(_: Extent) -> Vec<Row> {
+    let mut rows = vec![tiny("sphere"), tiny("quad"), tiny("disk"), vast()];
+    for (name, light) in POWERS {
+        for times in [1e-9, 1e9] {
+            rows.push(
+                Row {
+                    figure: Figure::Difference(1.0 / times),
+                    ..Row::alike(
+                        format!("{name} of {times:e} times the power"),
+                        vec![(powered(light, times), powered(light, 1.0))],
+                        1e-6,
+                    )
+                }
+                .timed(),
+            );
+        }
+    }
+    rows
+}
+
+const POWERS: [(&str, &str); 6] = [
+    ("point light", "[[light]]\nposition = [1, 2, -3]\nintensity = POWER\n"),
+    ("spot", "[[light]]\ntype = \"spot\"\nposition = [1, 2, -3]\nlook_at = [0, -1, -5]\nintensity = POWER\n"),
+    ("sun", "[[light]]\ntype = \"directional\"\ndirection = [0, -1, -1]\nangle = 1\nirradiance = POWER\n"),
+    ("sky", "[environment]\ncolor = POWER\n"),
+    (
+        "quad lamp",
+        "[materials.lamp]\nemission = POWER\n[[quad]]\ncorner = [-1, 2, -5]\nu = [2, 0, 0]\nv = [0, 0, 1]\nmaterial = \"lamp\"\n",
+    ),
+    (
+        "sphere lamp",
+        "[materials.lamp]\nemission = POWER\n[[sphere]]\ncenter = [1, 1, -5]\nradius = 0.3\nmaterial = \"lamp\"\n",
+    ),
+];
+
+/// A floor and a ball.
+const THINGS: &str = r#"
+[materials.floor]
+diffuse = 0.6
+[[quad]]
+corner = [-4, -1, 0]
+u = [8, 0, 0]
+v = [0, 0, -9]
+material = "floor"
+[[sphere]]
+center = [0, -0.4, -5]
+radius = 0.6
+material = "floor"
+"#;
+
+fn powered(light: &str, power: f64) -> Picture {
+    Picture::new(head(64, "") + CAMERA + THINGS + &light.replace("POWER", &format!("{power:?}")))
+}
+
+/// A lamp of size 1e-9 above: a point light of its intensity, radiance × area seen. What is lit lies straight below, so that the
+/// cosine of a flat lamp is nearly one.
+fn tiny(kind: &str) -> Row {
+    let size = 1e-9;
+    // The radiance stays below the largest number.
+    let (radiance, area) = (1e16, if kind == "quad" { size * size } else { PI * size * size });
+    let lamp = match kind {
+        "sphere" => format!("[[sphere]]\ncenter = [0, 2, -5]\nradius = {size:?}\nmaterial = \"lamp\"\n"),
+        "quad" => format!(
+            "[[quad]]\ncorner = [0, 2, -5]\nu = [{size:?}, 0, 0]\nv = [0, 0, {size:?}]\nmaterial = \"lamp\"\n"
+        ),
+        _ => format!(
+            "[[disk]]\ncenter = [0, 2, -5]\nnormal = [0, -1, 0]\nradius = {size:?}\nmaterial = \"lamp\"\n"
+        ),
+    };
+    let receiver = "[materials.floor]\ndiffuse = 0.6\n[[quad]]\ncorner = [-0.04, 0, -4.96]\nu = [0.08, 0, 0]\nv = [0, 0, -0.08]\nmaterial = \"floor\"\n";
+    let camera = "[camera]\nposition = [0, 1, -4.9]\nlook_at = [0, 0, -5]\nfov = 3\n";
+    let picture = |light: String| Picture::new(head(64, "") + camera + receiver + &light);
+    let case = picture(format!("[materials.lamp]\ndiffuse = 0\nemission = {radiance:?}\n{lamp}"));
+    let twin = picture(format!("[[light]]\nposition = [0, 2, -5]\nintensity = {:?}\n", radiance * area));
+    Row::alike(format!("a {kind} lamp of size 1e-9, as a point light"), vec![(case, twin)], 1e-3).timed()
+}
+
+/// Under a quad of 2e9 everything above shines: E = πL, and a floor of reflectance 0.6 has 0.6 L.
+fn vast() -> Row {
+    let picture = |size: f64| {
+        let lamp = format!(
+            "[materials.lamp]\ndiffuse = 0\nemission = 1\n[[quad]]\ncorner = [{:?}, 2, {:?}]\nu = [{size:?}, 0, 0]\nv = [0, 0, {size:?}]\nmaterial = \"lamp\"\n",
+            -0.5 * size,
+            -0.5 * size
+        );
+        let floor = "[materials.floor]\ndiffuse = 0.6\n[[quad]]\ncorner = [-9, -1, 9]\nu = [18, 0, 0]\nv = [0, 0, -18]\nmaterial = \"floor\"\n";
+        let camera = "[camera]\nposition = [0, 0, 0]\nlook_at = [0, -1, -1]\n";
+        Picture::new(head(64, "") + camera + floor + &lamp)
+    };
+    Row::mean("under a quad lamp of size 2e9 a floor has its albedo", (picture(2e9), picture(2e3)), 0.6, 1e-2)
+        .timed()
+}

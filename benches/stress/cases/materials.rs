@@ -1,0 +1,51 @@
+//! Glass that bends nothing or much, highlights that are wide or narrow.
+
+use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
+
+pub(super) fn rows(_: Extent) -> Vec<Row> {
+    let ball = |ior: &str| {
+        format!(
+            "[materials.g]\ntype = \"glass\"\nior = {ior}\n[[sphere]]\ncenter = [0, 0, -4]\nradius = 1\nmaterial = \"g\"\n"
+        )
+    };
+    let clear = |ior: &str| (signs("", CAMERA, &ball(ior)), signs("", CAMERA, ""));
+    let white = |ior: &str| (furnace(64, CAMERA, &ball(ior)), furnace(64, CAMERA, &ball("1.5")));
+    vec![
+        Row::alike("a ball of ior 1, as nothing", vec![clear("1")], 1e-3),
+        Row::alike("a ball of ior 1.000001, as nothing", vec![clear("1.000001")], 1e-3),
+        Row::mean("a ball of ior 3 under light from all around", white("3"), 1.0, 1e-3).timed(),
+        Row::mean("a ball of ior 1 under light from all around", white("1"), 1.0, 1e-3).timed(),
+        Row::mean("a ball of ior 1.000001 under light from all around", white("1.000001"), 1.0, 1e-3).timed(),
+        wide_highlight(),
+        narrow_highlight("whitted"),
+        narrow_highlight("path"),
+    ]
+}
+
+/// The exponent 0 is 2/2π everywhere on the side of the reflected ray: as a diffuse surface, under a light at the eye.
+fn wide_highlight() -> Row {
+    let picture = |material: &str| {
+        let floor = format!(
+            "[materials.m]\n{material}\n[[quad]]\ncorner = [-3, -3, -5]\nu = [6, 0, 0]\nv = [0, 6, 0]\nmaterial = \"m\"\n"
+        );
+        Picture::new(head(64, "") + CAMERA + &floor + "[[light]]\nposition = [0, 0, 0]\nintensity = 9\n")
+    };
+    let pair = (picture("diffuse = 0\nspecular = 0.6\nshininess = 0"), picture("diffuse = 0.6"));
+    Row::alike("a highlight of exponent 0, as diffuse", vec![pair], 1e-5).timed()
+}
+
+/// The exponent 1e5 throws light back within 0.3°: as a mirror, under light from all around, times the cosine, here nearly 1.
+fn narrow_highlight(integrator: &str) -> Row {
+    let picture = |material: &str| {
+        let wall = format!(
+            "[materials.m]\n{material}\n[[quad]]\ncorner = [-3, -3, -5]\nu = [6, 0, 0]\nv = [0, 6, 0]\nmaterial = \"m\"\n"
+        );
+        let render = head(64, &format!("integrator = \"{integrator}\""));
+        Picture::new(render + CAMERA + "fov = 2\n[environment]\ncolor = 1\n" + &wall)
+    };
+    let pair = (
+        picture("diffuse = 0\nspecular = 0.9\nshininess = 1e5"),
+        picture("type = \"mirror\"\nreflectance = 0.9"),
+    );
+    Row::mean(format!("a highlight of exponent 1e5 by {integrator}, as a mirror"), pair, 0.9, 1e-3).timed()
+}

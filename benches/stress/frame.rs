@@ -1,0 +1,48 @@
+//! A scene in a frame: where its origin is and how long its unit of length.
+
+/// Origin and unit of length.
+#[derive(Clone, Copy)]
+pub(crate) struct Frame {
+    pub(crate) at: [f64; 3],
+    pub(crate) unit: f64,
+}
+
+/// Size of the scenes that are moved, in units.
+const SIZE: f64 = 8.0;
+
+impl Frame {
+    /// Nothing moved, nothing scaled.
+    pub(crate) const PLAIN: Self = Self { at: [0.0; 3], unit: 1.0 };
+
+    /// 2ᵏ times as large.
+    pub(crate) fn scaled(k: i32) -> Self {
+        Self { unit: 2.0_f64.powi(k), ..Self::PLAIN }
+    }
+
+    /// Moved by so many times the scene's size.
+    pub(crate) fn moved(sizes: f64) -> Self {
+        Self { at: [SIZE * sizes, -0.5 * SIZE * sizes, 0.25 * SIZE * sizes], ..Self::PLAIN }
+    }
+
+    /// A point. Coordinates are multiples of 1/1024, so that sums and products are exact.
+    pub(crate) fn point(self, x: f64, y: f64, z: f64) -> String {
+        let [x, y, z] = [x, y, z].map(|x| (x * 1024.0).round() / 1024.0 * self.unit);
+        let [at_x, at_y, at_z] = self.at;
+        format!("[{:?}, {:?}, {:?}]", at_x + x, at_y + y, at_z + z)
+    }
+
+    /// The way from one point to another.
+    pub(crate) fn way(self, x: f64, y: f64, z: f64) -> String {
+        Self { at: [0.0; 3], ..self }.point(x, y, z)
+    }
+
+    /// A length.
+    pub(crate) fn length(self, x: f64) -> String {
+        format!("{:?}", x * self.unit)
+    }
+
+    /// An intensity that gives the same light over distances of this frame.
+    pub(crate) fn intensity(self, x: f64) -> String {
+        format!("{:?}", x * self.unit * self.unit)
+    }
+}

@@ -1,0 +1,73 @@
+//! The program at the ends of what scenes may be: every case beside a plain twin, of which the right answer or the cost is known.
+//!
+//! `cargo bench --bench stress` renders all, prints the table and writes it to `benches/stress/table.md`; `-- WORD` only the rows
+//! that have the word, printed. It ends by 1 where a row is not within its bounds.
+
+#![allow(clippy::print_stdout)]
+
+mod cases;
+mod frame;
+#[allow(dead_code, reason = "options are for other scenes")]
+mod row;
+#[allow(dead_code, reason = "reports are for other readers")]
+mod run;
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use row::{Extent, Figure, Row};
+
+/// Renders of a row whose time is compared.
+const ROUNDS: u32 = 3;
+
+fn main() -> ExitCode {
+    let asked: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let is_asked = |row: &Row| asked.is_empty() || asked.iter().any(|word| row.name.contains(word.as_str()));
+    let mut table = HEAD.to_owned();
+    print!("{HEAD}");
+    let mut faulty = 0;
+    for row in cases::rows(Extent::Long).iter().filter(|row| is_asked(row)) {
+        let line = line(row, &mut faulty);
+        print!("{line}");
+        table += &line;
+    }
+    let _ = write!(table, "\n{faulty} rows are not within their bounds.\n");
+    println!("\n{faulty} rows are not within their bounds.");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/stress/table.md");
+    let is_written = !asked.is_empty() || std::fs::write(path, table).is_ok();
+    ExitCode::from(u8::from(faulty > 0 || !is_written))
+}
+
+const HEAD: &str = "# The program at the ends of what scenes may be
+
+`cargo bench --bench stress` writes this table. A difference is the relative root mean square error against the twin, the worst of
+the row's pictures; a mean is how far that of the picture is from the right answer. Seconds are those of all stages but reading and
+writing, on one thread, of the pictures of the row and of their twins; where the twin is as much work (a ratio is told), three times its
+time is the most. No row has a sample that is not finite, a crash or a hang unless it says so.
+
+| case | pictures | figure | | bound | s | twin's | ratio | |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- |
+";
+
+fn line(row: &Row, faulty: &mut u32) -> String {
+    let kind = match row.figure {
+        Figure::Difference(_) => "difference",
+        Figure::Mean(_) => "mean",
+    };
+    let rounds = if row.is_timed { ROUNDS } else { 1 };
+    let start = format!("| {} | {} | {kind} |", row.name, row.pairs.len());
+    match run::measure(row, rounds) {
+        Ok(measured) => {
+            let faults = measured.faults(row);
+            *faulty += u32::from(!faults.is_empty());
+            let [seconds, twins] = measured.seconds;
+            let ratio = if row.is_timed { format!("{:.2}", seconds / twins) } else { String::new() };
+            let (figure, bound, faults) = (measured.figure, row.bound, faults.join(", "));
+            format!("{start} {figure:.1e} | {bound:.0e} | {seconds:.3} | {twins:.3} | {ratio} | {faults} |\n")
+        }
+        Err(error) => {
+            *faulty += 1;
+            format!("{start} | {:.0e} | | | | **{}** |\n", row.bound, error.replace('\n', " "))
+        }
+    }
+}

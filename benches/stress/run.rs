@@ -1,0 +1,150 @@
+//! Render by the program and compare.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::row::{Figure, Picture, Row};
+
+/// A render that takes longer hangs.
+const LONGEST: Duration = Duration::from_secs(120);
+
+/// Times of its twin's seconds that a case may take.
+pub(crate) const MOST_SLOWER: f64 = 3.0;
+
+/// A rendered picture.
+#[derive(Clone)]
+pub(crate) struct Rendered {
+    pub(crate) pixels: Vec<f32>,
+    /// Of all stages but reading and writing.
+    pub(crate) seconds: f64,
+    pub(crate) non_finite: u64,
+    /// As it was written.
+    pub(crate) report: serde_json::Value,
+}
+
+/// What a row came to.
+pub(crate) struct Measured {
+    /// The worst figure.
+    pub(crate) figure: f64,
+    pub(crate) non_finite: u64,
+    /// In all, of the cases and of their twins.
+    pub(crate) seconds: [f64; 2],
+}
+
+impl Measured {
+    /// Whether the pictures are within their bound; whatever the time.
+    pub(crate) fn is_right(&self, row: &Row) -> bool {
+        self.figure <= row.bound && self.non_finite == 0
+    }
+
+    /// What is wrong with it; nothing is the goal.
+    pub(crate) fn faults(&self, row: &Row) -> Vec<&'static str> {
+        let slower = self.seconds[0] / self.seconds[1];
+        let faults = [
+            (!(self.figure <= row.bound), "over its bound"),
+            (self.non_finite > 0, "samples that are not finite"),
+            (row.is_timed && !(slower <= MOST_SLOWER), "too slow"),
+        ];
+        faults.into_iter().filter(|(holds, _)| *holds).map(|(_, what)| what).collect()
+    }
+}
+
+/// Render all of a row, `rounds` times in turns; the shortest times count.
+///
+/// # Errors
+/// The program failed, crashed or took too long.
+pub(crate) fn measure(row: &Row, rounds: u32) -> Result<Measured, String> {
+    let mut measured = Measured { figure: 0.0, non_finite: 0, seconds: [0.0; 2] };
+    let mut last: Option<(&Picture, Rendered)> = None;
+    for (case, twin) in &row.pairs {
+        let mut case_of = render(case)?;
+        let mut twin_of = match last.take() {
+            Some((picture, rendered)) if picture.scene == twin.scene && picture.options == twin.options => {
+                rendered
+            }
+            Some(_) | None => render(twin)?,
+        };
+        for _ in 1..rounds {
+            case_of.seconds = case_of.seconds.min(render(case)?.seconds);
+            twin_of.seconds = twin_of.seconds.min(render(twin)?.seconds);
+        }
+        // A NaN is the worst of all.
+        let figure = figure(row.figure, &case_of.pixels, &twin_of.pixels)?;
+        measured.figure = if figure <= measured.figure { measured.figure } else { figure };
+        measured.non_finite += case_of.non_finite + twin_of.non_finite;
+        measured.seconds[0] += case_of.seconds;
+        measured.seconds[1] += twin_of.seconds;
+        last = Some((twin, twin_of));
+    }
+    Ok(measured)
+}
+
+fn figure(figure: Figure, case: &[f32], twin: &[f32]) -> Result<f64, String> {
+    Ok(match figure {
+        Figure::Mean(right) => {
+            let mean = case.iter().map(|&x| f64::from(x)).sum::<f64>() / case.len() as f64;
+            (mean / right - 1.0).abs()
+        }
+        Figure::Difference(times) => {
+            if case.len() != twin.len() {
+                return Err("pictures of different sizes".to_owned());
+            }
+            let pairs = case.iter().zip(twin).map(|(&a, &b)| (f64::from(a) * times, f64::from(b)));
+            let off: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+            (off / twin.iter().map(|&b| f64::from(b).powi(2)).sum::<f64>()).sqrt()
+        }
+    })
+}
+
+/// Render once, on one thread.
+///
+/// # Errors
+/// The program failed, crashed or took too long.
+pub(crate) fn render(picture: &Picture) -> Result<Rendered, String> {
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    render_in(folder.path(), picture)
+}
+
+fn render_in(folder: &Path, picture: &Picture) -> Result<Rendered, String> {
+    let said = |error: std::io::Error| error.to_string();
+    fs::write(folder.join("scene.toml"), &picture.scene).map_err(said)?;
+    for (name, content) in &picture.files {
+        fs::write(folder.join(name), content).map_err(said)?;
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
+    command.current_dir(folder).args("scene.toml --once -o a.exr --report a.json --threads 1".split(' '));
+    let errors = fs::File::create(folder.join("said")).map_err(said)?;
+    command.args(picture.options.split_whitespace()).stdin(Stdio::null()).stderr(errors);
+    let (mut child, begin) = (command.spawn().map_err(said)?, Instant::now());
+    let status = loop {
+        if let Some(status) = child.try_wait().map_err(said)? {
+            break status;
+        }
+        if begin.elapsed() > LONGEST {
+            child.kill().and_then(|()| child.wait()).map_err(said)?;
+            return Err("hangs".to_owned());
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    if !status.success() {
+        return Err(format!("{status}: {}", fs::read_to_string(folder.join("said")).map_err(said)?));
+    }
+    let report = fs::read_to_string(folder.join("a.json")).map_err(said)?;
+    let report: serde_json::Value = serde_json::from_str(&report).map_err(|error| error.to_string())?;
+    let image = image::open(folder.join("a.exr")).map_err(|error| error.to_string())?;
+    Ok(Rendered {
+        pixels: image.to_rgb32f().into_raw(),
+        seconds: seconds(&report),
+        non_finite: report["counters"]["non_finite_samples"].as_u64().unwrap_or(u64::MAX),
+        report,
+    })
+}
+
+/// Seconds of the stages but parse and write.
+fn seconds(report: &serde_json::Value) -> f64 {
+    let stages = report["stages"].as_array().into_iter().flatten();
+    let counts = |stage: &&serde_json::Value| stage["name"] != "parse" && stage["name"] != "write";
+    stages.filter(counts).filter_map(|stage| stage["seconds"].as_f64()).sum()
+}

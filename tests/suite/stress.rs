@@ -1,0 +1,57 @@
+//! The cases of `cargo bench --bench stress`, the short ones, and the pairs of `cargo bench --bench skips`: pictures within their
+//! bounds of their twins, every sample finite, the same bits. Times are for the benchmarks.
+
+#[path = "../../benches/stress/cases/mod.rs"]
+mod cases;
+#[path = "../../benches/stress/frame.rs"]
+mod frame;
+#[path = "../../benches/skips/pairs.rs"]
+mod pairs;
+#[path = "../../benches/stress/row.rs"]
+#[allow(dead_code, reason = "times are for the benchmark")]
+mod row;
+#[path = "../../benches/stress/run.rs"]
+#[allow(dead_code, reason = "times are for the benchmark")]
+mod run;
+
+use row::Extent;
+
+#[test]
+fn the_ends_of_what_scenes_may_be_look_as_their_plain_twins() {
+    let rows = cases::rows(Extent::Short);
+    assert!(rows.len() > 60, "{} rows", rows.len());
+    let mut wrong = Vec::new();
+    for row in rows {
+        match run::measure(&row, 1) {
+            Ok(measured) if measured.is_right(&row) => {}
+            Ok(run::Measured { figure, non_finite, .. }) => {
+                wrong.push(format!(
+                    "{}: {figure:e}, more than {:e}, or not finite: {non_finite}",
+                    row.name, row.bound
+                ));
+            }
+            Err(error) => wrong.push(format!("{}: {error}", row.name)),
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn what_a_scene_does_not_use_changes_no_bit() {
+    let mut wrong = Vec::new();
+    for pair in pairs::pairs([32, 24, 4]) {
+        let [off, on] = [&pair.off, &pair.on].map(|picture| run::render(picture).expect(pair.name));
+        assert!(off.pixels.iter().any(|&x| x > 0.0), "{}: all is black", pair.name);
+        if !off.pixels.iter().map(|x| x.to_bits()).eq(on.pixels.iter().map(|x| x.to_bits())) {
+            wrong.push(format!("{}: other bits", pair.name));
+        }
+        if let Some((name, part)) = pair.skipped {
+            let stages = on.report["stages"].as_array().expect("stages");
+            let stage = stages.iter().find(|stage| stage["name"] == name).expect("the stage");
+            if stage["status"] != "skipped" || !stage["why"].as_str().is_some_and(|why| why.contains(part)) {
+                wrong.push(format!("{}: {stage}", pair.name));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
