@@ -105,6 +105,7 @@ impl Measure<'_> {
             samples(step.samples),
             error(step.relmse)
         ));
+        self.run.point(name, &step);
         Ok(step)
     }
 

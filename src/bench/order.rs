@@ -73,6 +73,17 @@ pub enum News {
     },
     /// A piece of work is done: a line for logs.
     Done(String),
+    /// A point of the plot: the pictures of a step are done.
+    Point {
+        /// The scene as named by the caller.
+        scene: String,
+        /// The method's name in tables.
+        method: String,
+        /// Median of the seconds of sending photons and tracing.
+        seconds: f64,
+        /// Median of relMSE.
+        relmse: f64,
+    },
     /// Warnings about a scene.
     Warnings(Vec<Diagnostic>),
 }

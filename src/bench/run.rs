@@ -7,7 +7,7 @@ use super::methods::methods;
 use super::order::{News, Order, ReferenceOrder, Steps, Trouble};
 use super::pace::Pace;
 use super::reference::{Amount, Maker, Reference, SEEDS, given};
-use super::results::{Results, SceneResult};
+use super::results::{Results, SceneResult, Step};
 use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::session::Session;
@@ -169,6 +169,11 @@ impl Run<'_> {
     pub(super) fn begins(&self, what: &str, left: Option<f64>) {
         let what = format!("{}: {what}", self.path.display());
         (self.tell)(News::Begins { what, left });
+    }
+
+    pub(super) fn point(&self, method: &str, step: &Step) {
+        let (scene, method) = (self.path.to_string_lossy().into_owned(), method.to_owned());
+        (self.tell)(News::Point { scene, method, seconds: step.seconds, relmse: step.relmse });
     }
 
     pub(super) fn done(&self, what: &str) {

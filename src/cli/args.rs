@@ -58,7 +58,8 @@ impl Args {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
             Some(Subcommand::Bench(bench)) => bench.color,
-            Some(Subcommand::New { .. } | Subcommand::Compare(_)) | None => self.render.color,
+            Some(Subcommand::Compare(compare)) => compare.color,
+            Some(Subcommand::New { .. }) | None => self.render.color,
         }
     }
 }
@@ -95,6 +96,14 @@ On linear values as they are: RMSE, max |a - b|, and relMSE = mean of (a - b)^2/
 without the 0.1 % of the pixels that have the largest errors. On what a display shows, clamped sRGB:
 PSNR; SSIM (Wang et al. 2004, on Rec. 709 luma); FLIP (Andersson et al. 2020, 67 pixels a degree).
 
+Bias is mean(a - b)/mean(b) of the luminance. EXR files of light that glimt rendered, whole, without photons and
+with two samples a pixel or more, hold the standard error of their mean luminance: z is the bias over the standard
+error that both give it. It asks for two seeds: with one, both pictures may have the same noise. The error is an
+estimate by the samples, between 0.7 and 1.5 times the true one.
+
+On a terminal the pictures are above the table, the difference as FLIP; where FLIP is below 0.1 everywhere, as
+|a - b| with its greatest value in white. --json shows none.
+
 Files of 8 and 16 bits are taken for sRGB, float files for linear; alpha is left out.
 
 Exit codes: 0 measured, and not above --max-relmse; 1 above it, or --diff could not be written;
@@ -114,9 +123,15 @@ pub struct CompareArgs {
     /// pale yellow for 1; exr, hdr: |a - b|, linear
     #[arg(long, value_name = "FILE")]
     pub diff: Option<PathBuf>,
-    /// One JSON object on stdout in place of the table; psnr_db is null where the pictures are equal
+    /// One JSON object on stdout in place of the table; psnr_db is null where the pictures are equal, as is what is not known
     #[arg(long)]
     pub json: bool,
+    /// Show both pictures and their difference above the table
+    #[arg(long, value_parser = one_of::<Pictures>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub pictures: Pictures,
+    /// Colours of the pictures and of messages; auto looks at the terminal and at NO_COLOR
+    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub color: ColorChoice,
 }
 
 /// A render's options; each overrides the scene for this run.
@@ -250,6 +265,18 @@ choice! {
         Json = "json",
         /// Nothing but errors and warnings.
         None = "none",
+    }
+}
+
+choice! {
+    /// Whether pictures are shown with the answer.
+    pub enum Pictures {
+        /// On a terminal of 30 columns or more.
+        Auto = "auto",
+        /// For 80 columns where there is no terminal.
+        On = "on",
+        /// Never.
+        Off = "off",
     }
 }
 

@@ -1,5 +1,7 @@
 //! `glimt compare`: the error of a picture against a reference, as a table, as JSON, as a picture.
 
+mod pictures;
+
 use std::path::Path;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -8,7 +10,7 @@ use serde::Serialize;
 use super::args::CompareArgs;
 use super::console::Console;
 use super::exit::Exit;
-use crate::compare::{self, Errors, Measured, PIXELS_PER_DEGREE, Pair};
+use crate::compare::{self, Bias, Errors, Measured, PIXELS_PER_DEGREE, Pair};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::output::write::{self, Guard};
@@ -30,10 +32,13 @@ fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Ex
     })?;
     warn_of_one_file(args, console);
     let measured = pool.install(|| compare::measure(&pair));
-    let summary = Summary::new(args, &pair, &measured.errors);
+    let errors = &measured.errors;
+    let bias = Bias::new(errors, [&args.a, &args.b].map(|path| output::mean_luminance_error(path)));
+    let summary = Summary::new(args, &pair, errors, bias);
     if args.json {
         say_json(&summary, console);
     } else {
+        pictures::show(&pool.install(|| pictures::lines(args, &pair, &measured)), console);
         say_table(&summary, console);
     }
     if let Some(diff) = diff {
@@ -151,15 +156,17 @@ struct Summary<'a> {
     psnr_db: f64,
     ssim: f64,
     flip: f64,
+    bias: Option<f64>,
+    bias_standard_error: Option<f64>,
+    bias_z: Option<f64>,
     max_relmse: Option<f64>,
     /// Whether relMSE is not above that.
     is_within: bool,
 }
 
 impl<'a> Summary<'a> {
-    fn new(args: &CompareArgs, pair: &Pair, errors: &'a Errors) -> Self {
-        let &Errors { rmse, relmse, relmse_trimmed, dropped_pixels, max, ref max_at, psnr_db, ssim, flip } =
-            errors;
+    fn new(args: &CompareArgs, pair: &Pair, errors: &'a Errors, bias: Bias) -> Self {
+        let &Errors { rmse, relmse, relmse_trimmed, dropped_pixels, max, psnr_db, ssim, flip, .. } = errors;
         Self {
             a: args.a.display().to_string(),
             b: args.b.display().to_string(),
@@ -170,10 +177,13 @@ impl<'a> Summary<'a> {
             relmse_trimmed,
             dropped_pixels,
             max,
-            max_at,
+            max_at: &errors.max_at,
             psnr_db,
             ssim,
             flip,
+            bias: bias.value,
+            bias_standard_error: bias.standard_error,
+            bias_z: bias.z,
             max_relmse: args.max_relmse,
             is_within: args.max_relmse.is_none_or(|most| relmse <= most),
         }
@@ -200,13 +210,13 @@ fn say_table(summary: &Summary<'_>, console: &Console) {
 }
 
 /// Name, value, unit, and what it is of.
-fn rows(summary: &Summary<'_>) -> [(&'static str, String, &'static str, String); 7] {
+fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
     let pixels = u64::from(summary.width) * u64::from(summary.height);
     let [x, y] = summary.max_at;
     let trimmed = format!("the same, without the worst 0.1 %: {} of {pixels} pixels", summary.dropped_pixels);
     let place = if summary.max > 0.0 { format!(", at pixel ({x}, {y})") } else { String::new() };
     let flip = format!("clamped sRGB, {PIXELS_PER_DEGREE} pixels a degree; mean, 0 to 1");
-    [
+    let mut rows = vec![
         ("RMSE", figure(summary.rmse), "", "linear".to_owned()),
         ("relMSE", figure(summary.relmse), "", "linear: mean of (a - b)²/(b² + 0.01)".to_owned()),
         ("relMSE, trimmed", figure(summary.relmse_trimmed), "", trimmed),
@@ -214,7 +224,24 @@ fn rows(summary: &Summary<'_>) -> [(&'static str, String, &'static str, String);
         ("PSNR", decibels(summary.psnr_db), "dB", "clamped sRGB".to_owned()),
         ("SSIM", format!("{:.6}", summary.ssim), "", "luma of clamped sRGB".to_owned()),
         ("FLIP", figure(summary.flip), "", flip),
-    ]
+    ];
+    if let Some(bias) = summary.bias {
+        let noise = summary.bias_standard_error.map_or_else(
+            || "the noise is not known".to_owned(),
+            |error| format!("standard error {}", figure(error)),
+        );
+        rows.push(("bias", signed(bias), "", format!("linear: mean(a - b)/mean(b) of luminance; {noise}")));
+    }
+    if let Some(z) = summary.bias_z {
+        let note = "bias over its standard error: far beyond 3, it is no noise";
+        rows.push(("bias, z", format!("{z:.2}"), "", note.to_owned()));
+    }
+    rows
+}
+
+fn signed(value: f64) -> String {
+    let sign = if value < 0.0 { "-" } else { "" };
+    format!("{sign}{}", figure(value.abs()))
 }
 
 /// Six digits that count.

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::Pair;
-use crate::math::Vec3;
-use crate::math::color::RELMSE_LEAST;
+use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
+use crate::math::{DVec2, Vec3};
 
 /// Of the pixels, one in so many is left out of the trimmed mean.
 const DROPPED_ONE_IN: usize = 1000;
@@ -16,6 +16,7 @@ pub(super) struct Linear {
     pub(super) dropped_pixels: u64,
     pub(super) max: f64,
     pub(super) max_at: [u32; 2],
+    pub(super) luminances: [f64; 2],
 }
 
 /// Sums over some pixels.
@@ -26,6 +27,8 @@ struct Sums {
     max: f64,
     /// Column and row of the first that has it.
     max_at: [u32; 2],
+    /// Of both pictures.
+    luminances: DVec2,
 }
 
 pub(super) fn measure(pair: &Pair) -> Linear {
@@ -34,7 +37,13 @@ pub(super) fn measure(pair: &Pair) -> Linear {
     let sums = rows.into_iter().enumerate().fold(Sums::default(), |sums, (y, row)| {
         let (max, max_at) =
             if row.max > sums.max { (row.max, [row.max_at[0], y as u32]) } else { (sums.max, sums.max_at) };
-        Sums { square: sums.square + row.square, relative: sums.relative + row.relative, max, max_at }
+        Sums {
+            square: sums.square + row.square,
+            relative: sums.relative + row.relative,
+            max,
+            max_at,
+            luminances: sums.luminances + row.luminances,
+        }
     });
     let dropped = pixels / DROPPED_ONE_IN;
     let relmse = sums.relative / pixels as f64;
@@ -45,6 +54,7 @@ pub(super) fn measure(pair: &Pair) -> Linear {
         dropped_pixels: dropped as u64,
         max: sums.max,
         max_at: sums.max_at,
+        luminances: (sums.luminances / pixels as f64).to_array(),
     }
 }
 
@@ -60,6 +70,8 @@ fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
         let difference = a.as_dvec3() - b.as_dvec3();
         sums.square += difference.length_squared();
         sums.relative += relative(a, b);
+        sums.luminances +=
+            DVec2::from([a, b].map(|color| color.as_dvec3().dot(LUMINANCE_WEIGHTS.as_dvec3())));
         let largest = difference.abs().max_element();
         if largest > sums.max {
             (sums.max, sums.max_at) = (largest, [x as u32, 0]);

@@ -4,6 +4,7 @@
 //! SSIM, FLIP. All sums are in double precision and in an order that no number of threads changes; work is shared in
 //! the pool that the caller is in.
 
+mod bias;
 mod colormap;
 mod diff;
 mod display;
@@ -14,6 +15,7 @@ mod plane;
 mod tiles;
 mod two;
 
+pub use bias::Bias;
 pub use diff::{absolute, heat};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
@@ -34,6 +36,8 @@ pub struct Errors {
     pub max: f64,
     /// Column and row, from 0 at the top left, of the first pixel that has it.
     pub max_at: [u32; 2],
+    /// Mean luminance of both, linear.
+    pub luminances: [f64; 2],
     /// Peak signal to noise ratio of clamped sRGB, dB; infinite for equal pictures.
     pub psnr_db: f64,
     /// Structural similarity of the luma of clamped sRGB, 1 for equal pictures.
@@ -63,6 +67,7 @@ pub fn measure(pair: &Pair) -> Measured {
         dropped_pixels: linear.dropped_pixels,
         max: linear.max,
         max_at: linear.max_at,
+        luminances: linear.luminances,
         psnr_db: display.psnr_db,
         ssim: display.ssim,
         flip: mean(&flip),

@@ -138,6 +138,25 @@ impl Film {
     /// Next to 0 where all samples of each pixel are alike; none where a pixel has fewer than two samples,
     /// of which nothing can be told.
     pub fn relative_error(&self) -> Option<f64> {
+        let (variances, means) = self.noise_sums()?;
+        let pixels = self.crop().area() as f64;
+        let error = (variances / pixels).sqrt();
+        // Of a black picture too.
+        let relative = if error == 0.0 { 0.0 } else { error / (means / pixels) };
+        Some(relative).filter(|relative| relative.is_finite())
+    }
+
+    /// The standard error of the mean luminance of a whole picture, whose pixels err apart from each other; none of a part, where
+    /// photons make the pixels err together, and where a pixel has fewer than two samples.
+    pub fn mean_luminance_error(&self) -> Option<f64> {
+        let is_whole = (self.crop().width, self.crop().height) == (self.width(), self.height());
+        let is_apart = self.convergence == Convergence::Stratified;
+        let (variances, _) = if is_whole && is_apart { self.noise_sums()? } else { return None };
+        Some(variances.sqrt() / self.crop().area() as f64).filter(|error| error.is_finite())
+    }
+
+    /// Sums over the pixels: of the variance of their luminance, and of their luminance.
+    fn noise_sums(&self) -> Option<(f64, f64)> {
         let (mut variances, mut means) = (0.0, 0.0);
         for tile in 0..self.tile_count() {
             if self.tile(tile).counts.is_empty() {
@@ -153,11 +172,7 @@ impl Film {
                 }
             }
         }
-        let pixels = self.crop().area() as f64;
-        let error = (variances / pixels).sqrt();
-        // Of a black picture too.
-        let relative = if error == 0.0 { 0.0 } else { error / (means / pixels) };
-        Some(relative).filter(|relative| relative.is_finite())
+        Some((variances, means))
     }
 
     /// The noise in a half of a cell; none where a pixel has fewer than two samples, and where there are no pixels in it.
@@ -271,6 +286,22 @@ mod tests {
         let error = film(&[&[1.0, 2.0, 3.0, 6.0]]).relative_error().expect("an estimate");
         let expected = ((0.5 * 0.5 / RATE + 1.5 * 1.5) / 2.0 / (RATE - 1.0)).sqrt() / 3.0;
         assert!((error - expected).abs() < 1e-12, "{error}");
+    }
+
+    #[test]
+    fn the_mean_of_a_picture_errs_less_than_its_pixels() {
+        // Variances 1/1.7 and 0.25/1.7 of two pixels.
+        let film = film(&[&[4.0, 6.0], &[0.5, 1.5]]);
+        let error = film.mean_luminance_error().expect("an estimate");
+        assert!((error - (1.25 / (RATE - 1.0)).sqrt() / 2.0).abs() < 1e-12, "{error}");
+        assert_eq!(
+            film.converging(Convergence::Independent).mean_luminance_error(),
+            None,
+            "photons are shared"
+        );
+        assert_eq!(self::film(&[&[4.0, 6.0], &[0.5]]).mean_luminance_error(), None);
+        let part = Film::new(4, 1, Some(Rect { x: 0, y: 0, width: 2, height: 1 })).expect("a film");
+        assert_eq!(part.mean_luminance_error(), None);
     }
 
     #[test]

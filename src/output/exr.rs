@@ -1,11 +1,15 @@
 //! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP.
 
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
 use ::exr::block::UncompressedBlock;
 use ::exr::block::writer::ChunksWriter;
 use ::exr::error::UnitResult;
 use ::exr::image::write::layers::{LayersWriter, WritableLayers};
 use ::exr::meta::MetaData;
-use ::exr::meta::attribute::{Chromaticities, Text};
+use ::exr::meta::attribute::{AttributeValue, Chromaticities, Text};
 use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2};
 use rayon::prelude::*;
 
@@ -13,6 +17,20 @@ use super::stoppable::Stoppable;
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_light, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
+
+/// The attribute with the standard error of the picture's mean luminance, a double.
+const MEAN_LUMINANCE_ERROR: &str = "glimtMeanLuminanceError";
+
+/// What an EXR file says of the standard error of its mean luminance. Only of a regular file: a pipe is read once.
+pub fn mean_luminance_error(path: &Path) -> Option<f64> {
+    let is_regular = path.metadata().is_ok_and(|found| found.is_file());
+    let file = if is_regular { File::open(path).ok()? } else { return None };
+    let meta = MetaData::read_from_buffered(BufReader::new(file), false).ok()?;
+    match meta.headers.first()?.own_attributes.other.get(&text(MEAN_LUMINANCE_ERROR)) {
+        Some(AttributeValue::F64(error)) => Some(*error).filter(|error| error.is_finite() && *error >= 0.0),
+        _ => None,
+    }
+}
 
 pub(super) fn encode(
     image: &RadianceImage,
@@ -75,12 +93,14 @@ const REC_709: Chromaticities = Chromaticities {
 };
 
 /// All metadata go into the standard `comments`, a line each: attributes of their own would come in the random order of
-/// the encoder's hash map, and the same picture would give different files.
+/// the encoder's hash map, and the same picture would give different files. There is one, which programs read.
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();
     let comments = (!lines.is_empty()).then(|| text(&lines.join("\n")));
-    LayerAttributes { software_name: Some(text(SOFTWARE)), comments, ..Default::default() }
+    let error = options.mean_luminance_error.map(AttributeValue::F64);
+    let other = error.map(|error| (text(MEAN_LUMINANCE_ERROR), error)).into_iter().collect();
+    LayerAttributes { software_name: Some(text(SOFTWARE)), comments, other, ..Default::default() }
 }
 
 /// The bytes of UTF-8, as other programs write and read them.

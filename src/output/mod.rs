@@ -20,6 +20,7 @@ pub mod write;
 use std::path::Path;
 
 pub use error::OutputError;
+pub use exr::mean_luminance_error;
 pub use format::{BitDepth, Format};
 pub use identity::FileIdentity;
 pub use origin::{holds_foreign_picture, holds_foreign_report};
@@ -43,6 +44,8 @@ pub struct EncodeOptions {
     /// Names and values (the scene, the settings), written into PNG text chunks and the comments of EXR, HDR and
     /// PPM files. The program and its version are always written.
     pub metadata: Vec<(String, String)>,
+    /// The standard error of the picture's mean luminance, where it is known: an attribute of EXR files.
+    pub mean_luminance_error: Option<f64>,
 }
 
 /// The bytes of a file of this format. The same picture and options give the same bytes.

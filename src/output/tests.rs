@@ -24,7 +24,7 @@ fn options(bit_depth: BitDepth) -> EncodeOptions {
         ("Source".to_owned(), "Grüße, 日本\nsecond line".to_owned()),
     ];
     let tone = ToneMapping { exposure_stops: -0.5, curve: Tonemap::Reinhard, ..Default::default() };
-    EncodeOptions { tone, bit_depth, metadata }
+    EncodeOptions { tone, bit_depth, metadata, mean_luminance_error: None }
 }
 
 fn decode(bytes: &[u8], format: image::ImageFormat) -> image::DynamicImage {
@@ -125,6 +125,22 @@ fn exr_tells_its_primaries_and_attributes() {
     assert_eq!(own.software_name.as_ref().expect("software").as_slice(), SOFTWARE.as_bytes());
     let comments = own.comments.as_ref().expect("comments").as_slice();
     assert_eq!(comments, "Scene: scenes/cornell.toml\nSource: Grüße, 日本 second line".as_bytes());
+}
+
+#[test]
+fn exr_keeps_the_error_of_its_mean_luminance() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.exr");
+    let write = |error, format| {
+        let options = EncodeOptions { mean_luminance_error: error, ..Default::default() };
+        std::fs::write(&path, encode(&picture(4, 4), &options, format).expect("a file")).expect("written");
+        mean_luminance_error(&path)
+    };
+    assert_eq!(write(Some(0.012_345_678_9), Format::Exr), Some(0.012_345_678_9));
+    assert_eq!(write(Some(f64::NAN), Format::Exr), None);
+    assert_eq!(write(None, Format::Exr), None);
+    assert_eq!(write(Some(0.5), Format::Png), None);
+    assert_eq!(mean_luminance_error(folder.path()), None);
 }
 
 #[test]

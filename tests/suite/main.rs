@@ -1,6 +1,7 @@
 //! The program as a whole: one crate, so that it links once.
 
 mod bench;
+mod bias;
 mod broken;
 mod bytes;
 mod closed_forms;

@@ -4,9 +4,10 @@ use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressDrawTarget};
 use serde_json::{Value, json};
 
+use super::chart::Lines;
 use crate::bench::{News, Results};
 use crate::cli::args::Progress;
 use crate::cli::console::Console;
@@ -17,6 +18,8 @@ use crate::scene::sanitize::visible;
 const INTERVAL: Duration = Duration::from_secs(10);
 /// Steps of the bar.
 const STEPS: u64 = 1000;
+/// Frames a second at most of the plot and the bar.
+const FRAMES: u8 = 8;
 
 /// Says how it goes on, in the way that was asked for.
 pub(super) struct Said {
@@ -31,7 +34,8 @@ pub(super) struct Said {
 }
 
 enum Way {
-    Bar(ProgressBar),
+    /// With the plot above it.
+    Bar(ProgressBar, Lines),
     Plain,
     Json,
     Silent,
@@ -41,8 +45,10 @@ impl Said {
     pub(super) fn new(progress: Progress, console: &Console) -> Self {
         let way = match progress {
             Progress::Auto if console.is_terminal => {
-                let bar = ProgressBar::new(STEPS);
-                Way::Bar(bar.with_style(style("{msg}\n  {wide_bar} {percent:>3}% {prefix}")))
+                let target = ProgressDrawTarget::stderr_with_hz(FRAMES);
+                let bar = ProgressBar::with_draw_target(Some(STEPS), target);
+                let bar = bar.with_style(style("{msg}\n  {wide_bar} {percent:>3}% {prefix}"));
+                Way::Bar(bar, Lines::default())
             }
             Progress::Auto | Progress::Plain => Way::Plain,
             Progress::Json => Way::Json,
@@ -65,11 +71,17 @@ impl Said {
                 match &self.way {
                     Way::Plain => self.console.say(&line),
                     Way::Json => object(&json!({ "event": "step", "what": line })),
-                    Way::Bar(_) | Way::Silent => {}
+                    Way::Bar(..) | Way::Silent => {}
+                }
+            }
+            News::Point { scene, method, seconds, relmse } => {
+                if let Way::Bar(_, lines) = &mut self.way {
+                    lines.add(&scene, &method, (seconds, relmse));
+                    self.show(false);
                 }
             }
             News::Warnings(warnings) => match &self.way {
-                Way::Bar(bar) => bar.suspend(|| self.console.diagnostics(&warnings)),
+                Way::Bar(bar, _) => bar.suspend(|| self.console.diagnostics(&warnings)),
                 Way::Plain | Way::Silent => self.console.diagnostics(&warnings),
                 Way::Json => {
                     let messages: Vec<&str> = warnings.iter().map(|one| one.message.as_str()).collect();
@@ -93,8 +105,11 @@ impl Said {
         }
         let to_go = left.map_or(String::new(), |left| format!("{} left", seconds(left)));
         match &self.way {
-            Way::Bar(bar) => {
-                bar.set_message(visible(&self.what).into_owned());
+            Way::Bar(bar, lines) => {
+                // Each time anew: the terminal may have another size.
+                let size = crossterm::terminal::size().unwrap_or_default();
+                let plot = lines.text(size, self.console.is_colored());
+                bar.set_message(plot + &visible(&self.what));
                 bar.set_prefix(to_go);
                 bar.set_position((self.fraction * STEPS as f64) as u64);
             }
@@ -115,7 +130,7 @@ impl Said {
 
     /// Clear what is not to stay.
     pub(super) fn end(&mut self) {
-        if let Way::Bar(bar) = &self.way {
+        if let Way::Bar(bar, _) = &self.way {
             bar.finish_and_clear();
         }
     }
@@ -143,7 +158,7 @@ impl Said {
 
     pub(super) fn written(&self, path: &Path, bytes: usize) {
         match self.way {
-            Way::Bar(_) | Way::Plain => self.console.say(&format!("wrote {}", path.display())),
+            Way::Bar(..) | Way::Plain => self.console.say(&format!("wrote {}", path.display())),
             Way::Json => {
                 object(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }));
             }

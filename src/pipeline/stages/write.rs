@@ -16,6 +16,7 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::SampleStats;
 use crate::film::stretch::Range;
+use crate::integrators::{Measure, Shown};
 use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
@@ -175,7 +176,10 @@ fn write_one(
 ) -> Result<u64, OutputError> {
     let tone = plan.tone.of_picture(image);
     let metadata = metadata(canvas, plan, tone.stretch.range());
-    let options = EncodeOptions { tone, bit_depth: BitDepth::try_from(plan.bit_depth)?, metadata };
+    let is_light = matches!(plan.settings.view.shown(), Shown::Light(Measure::Radiance(_)));
+    let mean_luminance_error = if is_light { canvas.film.mean_luminance_error() } else { None };
+    let bit_depth = BitDepth::try_from(plan.bit_depth)?;
+    let options = EncodeOptions { tone, bit_depth, metadata, mean_luminance_error };
     let bytes = output::encode(image, &options, Format::of(path)?, token)?;
     guarded(plan, inputs, path, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)

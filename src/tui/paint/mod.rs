@@ -12,6 +12,7 @@
 mod abilities;
 mod advice;
 mod candidates;
+mod lines;
 mod look;
 mod memory;
 mod moves;
@@ -33,6 +34,7 @@ use ratatui::layout::Rect;
 
 pub use self::abilities::can_repeat;
 pub use self::advice::{Advice, Moment, advise};
+pub use self::lines::in_lines;
 use self::memory::Memory;
 use self::picture::Budget;
 use self::screen::{Screen, Slice, Stroke};

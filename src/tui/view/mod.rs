@@ -11,7 +11,7 @@ mod panel;
 pub(super) mod preview;
 pub(super) mod ramp;
 mod stages;
-mod text;
+pub(super) mod text;
 pub(super) mod under;
 pub(super) mod views;
 

@@ -83,10 +83,11 @@ pub(in crate::tui) fn placement(state: &State, area: Rect) -> Option<Placement> 
 
 /// What colours are shown by.
 #[derive(Clone, Copy)]
-struct Inks<'a> {
-    depth: ColorDepth,
-    shades: &'a Shades,
-    is_light: bool,
+pub(in crate::tui) struct Inks<'a> {
+    pub(in crate::tui) depth: ColorDepth,
+    pub(in crate::tui) shades: &'a Shades,
+    /// Whether the terminal's background is.
+    pub(in crate::tui) is_light: bool,
 }
 
 impl<'a> Inks<'a> {
@@ -97,12 +98,35 @@ impl<'a> Inks<'a> {
 
 /// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colours of xterm.
 pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
-    let mut buffer = Buffer::empty(area);
-    let kind = in_cells(PreviewKind::of(choice, depth), depth);
     let shades = Shades::new(depth, &XTERM);
     let inks = Inks { depth, shades: &shades, is_light: false };
-    Placed::fit(picture, area, kind, 2.0, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
+    shown_by(picture, choice, inks, (area, 2.0))
+}
+
+/// The same with these inks, where cells are of another aspect ratio.
+pub(in crate::tui) fn shown_by(
+    picture: &Picture,
+    choice: PreviewChoice,
+    inks: Inks<'_>,
+    (area, cell_aspect): (Rect, f32),
+) -> Buffer {
+    let mut buffer = Buffer::empty(area);
+    let kind = in_cells(PreviewKind::of(choice, inks.depth), inks.depth);
+    Placed::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
     buffer
+}
+
+/// The columns and rows that a picture takes in half blocks or in characters, of those that there are.
+pub(in crate::tui) fn size_in_cells(
+    picture: &Picture,
+    depth: ColorDepth,
+    (columns, rows): (u16, u16),
+    cell_aspect: f32,
+) -> (u16, u16) {
+    let kind = PreviewKind::of(PreviewChoice::HalfBlock, depth);
+    let area = Rect::new(0, 0, columns, rows);
+    let cells = Placed::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
+    (cells.width, cells.height)
 }
 
 /// The picture at another size.

@@ -91,7 +91,7 @@ pub(super) fn put_right(buffer: &mut Buffer, area: Rect, text: &str, tone: Tone,
 }
 
 /// Columns that a text takes.
-pub(super) fn columns(text: &str) -> u16 {
+pub(in crate::tui) fn columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
 
@@ -107,7 +107,7 @@ pub(super) fn rest(area: Rect, used: u16) -> Rect {
 }
 
 /// What fits of a text, with an ellipsis where it is cut.
-pub(super) fn shortened(text: &str, room: u16) -> String {
+pub(in crate::tui) fn shortened(text: &str, room: u16) -> String {
     if columns(text) <= room {
         return text.to_owned();
     }

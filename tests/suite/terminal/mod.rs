@@ -1,5 +1,6 @@
 //! The live program in a pseudo-terminal, as a person sees it.
 
+mod answers;
 mod asking;
 mod blocks;
 mod camera;

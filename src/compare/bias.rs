@@ -1,0 +1,64 @@
+//! Whether a picture is brighter than its reference by more than their noise.
+
+use super::Errors;
+
+/// How much brighter a picture is than its reference, as a part of the reference's mean luminance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bias {
+    /// mean (a − b) / mean b; none where the reference is black.
+    pub value: Option<f64>,
+    /// Its standard error by the noise of both; none where one of them is not known.
+    pub standard_error: Option<f64>,
+    /// The one over the other; none without noise.
+    pub z: Option<f64>,
+}
+
+impl Bias {
+    /// With the standard errors of both mean luminances, where they are known. The noise of one picture must not depend on that of
+    /// the other.
+    pub fn new(errors: &Errors, standard_errors: [Option<f64>; 2]) -> Self {
+        let [a, b] = errors.luminances;
+        let error = match standard_errors {
+            [Some(a), Some(b)] => Some((a * a + b * b).sqrt()),
+            [_, None] | [None, Some(_)] => None,
+        };
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        Self {
+            value: finite((a - b) / b),
+            standard_error: error.and_then(|error| finite(error / b.abs())),
+            z: error.and_then(|error| finite((a - b) / error)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::compare::{Pair, measure};
+    use crate::film::RadianceImage;
+    use crate::math::Vec3;
+
+    fn errors(a: f32, b: f32) -> Errors {
+        let image =
+            |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::ZERO, Vec3::splat(value)] };
+        measure(&Pair::new([Path::new("a"), Path::new("b")], image(a), image(b)).expect("a pair")).errors
+    }
+
+    #[test]
+    fn it_is_the_difference_over_the_reference_and_over_the_noise_of_both() {
+        let bias = Bias::new(&errors(3.0, 2.0), [Some(0.3), Some(0.4)]);
+        let near = |value: Option<f64>, expected: f64| (value.expect("known") - expected).abs() < 1e-6;
+        assert!(near(bias.value, 0.5) && near(bias.standard_error, 0.5) && near(bias.z, 1.0), "{bias:?}");
+        assert!(near(Bias::new(&errors(1.0, 2.0), [Some(0.0), Some(0.1)]).z, -5.0));
+    }
+
+    #[test]
+    fn what_is_not_known_is_not_told() {
+        let bias = Bias::new(&errors(3.0, 2.0), [Some(0.3), None]);
+        assert_eq!((bias.standard_error, bias.z, bias.value.is_some()), (None, None, true));
+        assert_eq!(Bias::new(&errors(3.0, 3.0), [Some(0.0); 2]).z, None, "no noise and no difference");
+        assert_eq!(Bias::new(&errors(1.0, 0.0), [None; 2]).value, None, "a black reference");
+    }
+}

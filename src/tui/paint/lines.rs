@@ -1,0 +1,56 @@
+//! Cells as lines, for a terminal that is written to from the top to the bottom.
+
+use ratatui::buffer::{Buffer, Cell};
+use ratatui::style::Color;
+
+use super::pen::Pen;
+use super::shade::{Layer, Shade};
+
+/// The rows of a buffer, each with a line end and without the blanks before it. Each begins and ends with the terminal's own colours;
+/// without colours there is no escape sequence at all.
+pub fn in_lines(buffer: &Buffer, is_colored: bool) -> String {
+    let mut bytes = Vec::new();
+    for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {
+        let length = row.iter().rposition(is_seen).map_or(0, |last| last + 1);
+        let mut pen = Pen::RESET;
+        for cell in &row[..length] {
+            if is_colored {
+                pen.turn(&pen_of(cell).exactly(), &mut bytes);
+            }
+            bytes.extend_from_slice(cell.symbol().as_bytes());
+        }
+        pen.turn(&Pen::RESET.exactly(), &mut bytes);
+        bytes.push(b'\n');
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn is_seen(cell: &Cell) -> bool {
+    cell.symbol() != " " || cell.bg != Color::Reset
+}
+
+fn pen_of(cell: &Cell) -> Pen {
+    Pen {
+        fg: Shade::of(cell.fg, Layer::Foreground),
+        bg: Shade::of(cell.bg, Layer::Background),
+        modifier: cell.modifier,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ratatui::layout::Rect;
+    use ratatui::style::Style;
+
+    use super::*;
+
+    #[test]
+    fn each_line_ends_with_the_colours_of_the_terminal() {
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 6, 3));
+        buffer.set_string(0, 0, "ab", Style::new().fg(Color::Red));
+        buffer.set_string(2, 2, "▀", Style::new().fg(Color::Rgb(1, 2, 3)).bg(Color::Indexed(9)));
+        let colored = "\u{1b}[31mab\u{1b}[0m\n\n  \u{1b}[38;2;1;2;3;101m▀\u{1b}[0m\n";
+        assert_eq!(in_lines(&buffer, true), colored);
+        assert_eq!(in_lines(&buffer, false), "ab\n\n  ▀\n");
+    }
+}

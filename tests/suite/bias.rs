@@ -1,0 +1,101 @@
+//! The bias that `glimt compare` tells of EXR files, over its standard error.
+
+use serde_json::Value;
+
+use super::desk::Desk;
+
+/// A box with a lamp, open to the camera: most of its walls' light has bounced.
+const SCENE: &str = r#"[render]
+width = 24
+height = 16
+samples = 16
+integrator = "path"
+[camera]
+position = [0, 1, 4]
+look_at = [0, 0.7, 0]
+[materials]
+wall = { diffuse = [0.7, 0.7, 0.7] }
+lamp = { emission = [8, 8, 8] }
+[[sphere]]
+center = [0, 0.5, 0]
+radius = 0.5
+material = "wall"
+[[quad]]
+material = "wall"
+[[quad]]
+corner = [-2, -1, -1]
+u = [4, 0, 0]
+v = [0, 4, 0]
+material = "wall"
+[[quad]]
+corner = [-0.5, 2, -0.5]
+u = [1, 0, 0]
+v = [0, 0, 1]
+material = "lamp"
+"#;
+
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.write("box.toml", SCENE);
+    desk
+}
+
+fn render(desk: &Desk, name: &str, options: &str) {
+    let output = desk.run(&format!("box.toml --once --progress none -o {name} {options}"));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn compared(desk: &Desk, a: &str, b: &str) -> Value {
+    serde_json::from_slice(&desk.run(&format!("compare --json {a} {b}")).stdout).expect("JSON")
+}
+
+/// The estimate is between 0.7 and 1.5 times the true error, and the spread of 24 values is within a fifth of its own.
+#[test]
+fn seeds_that_differ_have_a_z_of_chance() {
+    const PAIRS: u32 = 24;
+    let desk = desk();
+    let z: Vec<f64> = (0..PAIRS)
+        .map(|pair| {
+            render(&desk, "a.exr", &format!("--seed {}", 2 * pair + 1));
+            render(&desk, "b.exr", &format!("--seed {}", 2 * pair + 2));
+            compared(&desk, "a.exr", "b.exr")["bias_z"].as_f64().expect("z")
+        })
+        .collect();
+    let deviation = (z.iter().map(|z| z * z).sum::<f64>() / f64::from(PAIRS)).sqrt();
+    assert!((0.5..1.8).contains(&deviation), "{deviation}: {z:?}");
+}
+
+#[test]
+fn light_that_is_missing_is_no_chance() {
+    let desk = desk();
+    render(&desk, "path.exr", "--seed 1");
+    render(&desk, "whitted.exr", "--seed 2 --integrator whitted");
+    let told = compared(&desk, "whitted.exr", "path.exr");
+    let get = |key: &str| told[key].as_f64().expect(key);
+    assert!(get("bias") < -0.05 && get("bias_z") < -10.0, "{told}");
+    assert!((get("bias") / get("bias_standard_error") / get("bias_z") - 1.0).abs() < 1e-9, "{told}");
+    let table = desk.run("compare whitted.exr path.exr").stdout;
+    assert!(String::from_utf8_lossy(&table).contains("\nbias, z "), "{}", String::from_utf8_lossy(&table));
+}
+
+#[test]
+fn what_has_no_noise_of_its_own_has_no_z() {
+    let desk = desk();
+    render(&desk, "path.exr", "--seed 1");
+    for options in [
+        "--samples 1",
+        "--crop 0,0,12,16",
+        "--integrator whitted --photons on",
+        "--view normal",
+        "--view samples",
+    ] {
+        render(&desk, "other.exr", &format!("--seed 2 {options}"));
+        let told = compared(&desk, "other.exr", "path.exr");
+        assert_eq!(
+            (&told["bias_standard_error"], &told["bias_z"]),
+            (&Value::Null, &Value::Null),
+            "{options}"
+        );
+        assert!(told["bias"].is_number(), "{options}");
+    }
+}

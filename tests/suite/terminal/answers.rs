@@ -1,0 +1,107 @@
+//! Commands that answer in lines, as a person sees them: pictures and plots among the words, no screen of their own.
+
+use nix::sys::signal::Signal;
+
+use super::pty::{Folder, GREEN, RED, SCENE, Terminal, cells};
+
+fn compared(options: &[&str], variables: &[(&str, &str)]) -> (Folder, Terminal) {
+    let folder = Folder::new();
+    folder.once(&[]);
+    std::fs::rename(folder.path("once.png"), folder.path("red.png")).expect("renamed");
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.once(&[]);
+    let mut command = vec![folder.program(), "compare", "once.png", "red.png"];
+    command.extend(options);
+    let mut terminal = folder.terminal_with(&command, variables);
+    assert_eq!(terminal.code(), 0);
+    terminal.wait_for("Better is");
+    (folder, terminal)
+}
+
+#[test]
+fn compare_shows_both_pictures_and_flip_above_the_table() {
+    let (_folder, terminal) = compared(&[], &[]);
+    terminal.look(|screen| {
+        let text = screen.contents();
+        let names = text.lines().find(|line| line.contains("once.png  ")).expect("names");
+        assert!(names.contains("red.png, the reference") && names.contains("FLIP"), "{text}");
+        let is = |cell: &vt100::Cell, channel: usize| match cell.fgcolor() {
+            vt100::Color::Rgb(r, g, b) => {
+                let most = [r, g, b][channel];
+                cell.contents() == "▀"
+                    && most > 50
+                    && [r, g, b].iter().filter(|c| **c > most / 2).count() == 1
+            }
+            vt100::Color::Default | vt100::Color::Idx(_) => false,
+        };
+        for channel in [0, 1] {
+            assert!(cells(screen).filter(|cell| is(cell, channel)).count() > 10, "{channel}: {text}");
+        }
+        assert!(!screen.alternate_screen() && !screen.hide_cursor());
+    });
+}
+
+#[test]
+fn compare_has_the_colours_of_the_terminal() {
+    let (_folder, terminal) = compared(&[], &[("COLORTERM", "")]);
+    terminal.look(|screen| {
+        assert!(cells(screen).any(|cell| matches!(cell.fgcolor(), vt100::Color::Idx(16..))));
+        assert!(!cells(screen).any(|cell| matches!(cell.fgcolor(), vt100::Color::Rgb(..))));
+    });
+    let (_folder, terminal) = compared(&[], &[("NO_COLOR", "1")]);
+    terminal.look(|screen| {
+        assert!(screen.contents().contains("red.png, the reference"), "{}", screen.contents());
+        assert!(cells(screen).all(|cell| cell.contents() != "▀" && cell.fgcolor() == vt100::Color::Default));
+    });
+    let (_folder, terminal) = compared(&["--pictures", "off"], &[]);
+    terminal.look(|screen| {
+        assert!(screen.contents().starts_with("once.png against"), "{}", screen.contents());
+        assert!(cells(screen).all(|cell| cell.contents() != "▀"));
+    });
+}
+
+fn measured(folder: &Folder, samples: &str) -> Terminal {
+    let command = [
+        folder.program(),
+        "bench",
+        "scene.toml",
+        "--samples",
+        samples,
+        "--reference-samples",
+        "64",
+        "--no-cache",
+    ];
+    folder.terminal_with(&command, &[])
+}
+
+fn has_plot(screen: &vt100::Screen) -> bool {
+    let text = screen.contents();
+    let is_braille = |c: char| ('\u{2801}'..='\u{28ff}').contains(&c);
+    text.contains("o path") && text.chars().any(is_braille)
+}
+
+#[test]
+fn bench_draws_its_plot_above_the_bar_and_takes_it_away() {
+    let folder = Folder::new();
+    let mut terminal = measured(&folder, "1,4,16,64,65536");
+    terminal.wait("the plot above the bar", |screen| has_plot(screen) && screen.contents().contains('%'));
+    terminal.resize(60, 20);
+    terminal.wait("the plot in a smaller terminal", has_plot);
+    terminal.signal(Signal::SIGINT);
+    assert_eq!(terminal.code(), 130);
+    terminal.wait_for("ended by SIGINT");
+    terminal.look(|screen| {
+        let last = screen.contents().lines().last().unwrap_or_default().to_owned();
+        assert!(last.contains("finished references are kept"), "{}", screen.contents());
+        assert!(!screen.alternate_screen() && !screen.hide_cursor());
+    });
+}
+
+#[test]
+fn bench_draws_its_plot_at_the_end() {
+    let folder = Folder::new();
+    let mut terminal = measured(&folder, "1,4");
+    assert_eq!(terminal.code(), 0);
+    terminal.wait("the plot", has_plot);
+    assert!(!terminal.text().contains('█'), "no bar is left\n{}", terminal.text());
+}
