@@ -153,11 +153,12 @@ def main():
     parser.add_argument("--passes", type=lambda text: [int(word) for word in text.split(",")])
     parser.add_argument("--reference", type=int, default=512)
     parser.add_argument("--glimt", default=ROOT / "target" / "release" / "glimt")
+    parser.add_argument("--side", type=int, default=256)
     asked = parser.parse_args()
     passes = asked.passes or powers(asked.most)
     dr.set_thread_count(THREADS)
     print(f"{'':12}{'':10}{'passes':>6}{'seconds':>10}{'relMSE':>11}{'slope':>8}{'mean':>11}")
-    square = (256, 256)
+    square = (asked.side, asked.side)
     by_paths = ["--integrator", "path"]
     if "caustic" in asked.names:
         subject = Subject(asked.glimt, CAUSTIC, square, asked.reference, True)

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Photons beside paths and Mitsuba: error against passes and seconds, and the mean of the picture beside that of paths.
 
-    python3 benches/photons/run.py [caustic] [box] [large] [--seeds N] [--most SAMPLES | --passes N,N,…] [--glimt BINARY]
+    python3 benches/photons/run.py [caustic] [box] [large] [--seeds N] [--most SAMPLES | --passes N,N,…] [--side PIXELS]
+        [--glimt BINARY]
 
 In the environment of ../mitsuba, which is made where it is not there. See compare.py.
 """

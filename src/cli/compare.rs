@@ -226,11 +226,10 @@ fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, Strin
         ("FLIP", figure(summary.flip), "", flip),
     ];
     if let Some(bias) = summary.bias {
-        let noise = summary.bias_standard_error.map_or_else(
-            || "the noise is not known".to_owned(),
-            |error| format!("standard error {}", figure(error)),
-        );
-        rows.push(("bias", signed(bias), "", format!("linear: mean(a - b)/mean(b) of luminance; {noise}")));
+        let noise = summary
+            .bias_standard_error
+            .map_or_else(|| "noise unknown".to_owned(), |error| format!("standard error {}", figure(error)));
+        rows.push(("bias", signed(bias), "", format!("linear: mean(a - b)/mean(b); {noise}")));
     }
     if let Some(z) = summary.bias_z {
         let note = "bias over its standard error: far beyond 3, it is no noise";
