@@ -17,12 +17,14 @@ mod signals;
 
 use std::ffi::OsString;
 use std::io::{self, Write};
+use std::path::Path;
 
 use clap::Parser;
 
 use self::args::{Args, Subcommand};
 use self::console::Console;
 pub use self::exit::Exit;
+use crate::scene::nearest::nearest;
 use crate::scene::sanitize::visible;
 
 /// Do what the command line says; gives the exit code.
@@ -55,6 +57,9 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
         console.note(error.print().and_then(|()| io::stdout().flush()));
         return console.end(Exit::DONE);
     }
+    if let Some(message) = second_scene(error).and_then(|_| unknown_command(arguments)) {
+        return console.fail(Exit::WRONG, &message);
+    }
     if let Some(second) = second_scene(error) {
         let message = format!("{second:?} is one scene too many: glimt renders one at a time");
         return console.fail(Exit::WRONG, &message);
@@ -68,6 +73,22 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
         _ => console.say(&error.render().to_string()),
     }
     Exit::WRONG
+}
+
+/// What is said of a first word that is neither a file nor looks like one: a command was meant.
+fn unknown_command(arguments: &[OsString]) -> Option<String> {
+    let first =
+        arguments.iter().skip(1).map(|word| word.to_string_lossy()).find(|word| !word.starts_with('-'))?;
+    if first.contains(['.', '/']) || Path::new(first.as_ref()).exists() {
+        return None;
+    }
+    let commands = <Args as clap::CommandFactory>::command();
+    let names: Vec<&str> = commands.get_subcommands().map(clap::Command::get_name).collect();
+    let help = match nearest(&first, names.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("there are {}", names.join(", ")),
+    };
+    Some(format!("there is no command {:?}, nor a scene of that name: {help}", visible(&first)))
 }
 
 /// The word behind the scene, where a command could stand, that is no command.

@@ -8,7 +8,7 @@ pub mod diagnostic;
 mod document;
 mod edit;
 pub mod fingerprint;
-mod nearest;
+pub mod nearest;
 mod read;
 pub mod report;
 pub mod sanitize;

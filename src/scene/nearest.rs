@@ -4,7 +4,7 @@ use strsim::osa_distance;
 
 /// The candidate that differs least from what was written, if it is near enough to be meant: at most one
 /// change in three characters, letter case and `-` for `_` not counted.
-pub(super) fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if written.len() > LONGEST {
         return None;

@@ -233,6 +233,16 @@ fn wrong_values_are_answered_with_what_is_expected() {
         let stderr = desk.expect(&format!("ball.toml --once {option}"), 2);
         assert!(stderr.contains(words), "{option}: {stderr}");
     }
+    for (call, words) in [
+        ("chekc ball.toml", "there is no command \"chekc\", nor a scene of that name: did you mean `check`?"),
+        (
+            "render ball.toml",
+            "there is no command \"render\", nor a scene of that name: there are check, new, compare, bench",
+        ),
+    ] {
+        let stderr = desk.expect(call, 2);
+        assert!(stderr.contains(words), "{call}: {stderr}");
+    }
     assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
 }
 
