@@ -70,9 +70,9 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
             ..pair("photons, by path", path(), path().by("--photons on"))
         },
         Pair {
-            skipped: Some(("photons", "mirrors or glass")),
+            skipped: Some(("photons", "max_depth")),
             ..pair(
-                "photons, direct light and nothing specular",
+                "photons, direct light alone",
                 scene("max_depth = 1", "", "", POINT),
                 scene("max_depth = 1", "", "", POINT).by("--photons on"),
             )

@@ -96,7 +96,7 @@ impl Convergence {
 
     /// Samples that bring the standard error of means of `count` samples to a part of itself.
     pub fn samples_to(self, part: f64, count: u32) -> u32 {
-        (f64::from(count) * libm::pow(part, -2.0 / self.power())).ceil() as u32
+        samples_by(self.power(), part, count)
     }
 
     /// The variance of a mean of `count` ≥ 2 samples by the squared step to the last power of two of them.
@@ -117,6 +117,11 @@ impl Convergence {
         };
         Some(self.pixel_variance(step, count))
     }
+}
+
+/// Samples that bring the standard error of means of `count` samples to a part of itself, where its square falls with this power of them.
+pub fn samples_by(power: f64, part: f64, count: u32) -> u32 {
+    (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
 
 /// How much noise there is in a half of a cell.
@@ -188,6 +193,15 @@ impl Film {
         let variance =
             self.convergence.variance(&tile.steps.squares, (number % CELLS, half), samples)? / pixels;
         Some(HalfNoise { variance, mean: sum / pixels, samples })
+    }
+
+    /// How many times smaller the last squared step of the pixels of a tile is than the one before, over all cells; none where there are
+    /// not two steps that tell.
+    pub fn tile_fall(&self, tile: usize) -> Option<f64> {
+        let squares = &self.tile(tile).steps.squares;
+        let sum = |level: usize| squares[level].iter().flatten().sum::<f64>();
+        let last = squares.len().checked_sub(2)? + 1;
+        Some(sum(last - 1) / sum(last)).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
     /// The noise in one half of all cells of a tile; none as in [`Film::half_noise`].

@@ -2,7 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{self, AxialFrame, Line, Stretch, across, at_turn, exact_t, radial, ring_shown, turn};
+use super::axial::{
+    self, AxialFrame, Line, Stretch, across, at_turn, exact_t, is_rounding, radial, ring_shown, turn,
+};
 use super::disk::{BORDER, Disk};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -39,7 +41,18 @@ impl Cone {
         let line = self.frame.line(ray);
         let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
         let ends = Stretch::between(&line, (0.0, 0), (base, 1))?;
-        axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped)
+        let starts_on = |part| self.starts_on(ray, part);
+        axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped, starts_on)
+    }
+
+    /// Whether a ray starts on a part, as far as rounding can tell.
+    fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
+        let local = self.frame.local(ray.origin);
+        let distance = match part {
+            0 => (local.truncate().length() * self.height - local.z * self.radius) / self.slant,
+            _ => local.z - self.height,
+        };
+        is_rounding(distance, self.reach())
     }
 
     /// Where the line is inside the side, extended beyond the base and, by its image, beyond the tip: |p| ≤ k|z|. The

@@ -32,12 +32,15 @@ impl RenderSettings {
         Self { render, photons, ..*self }
     }
 
-    /// Whether pictures by these settings show anything of photons.
+    /// Whether pictures by these settings show anything of photons. What a photon brings was scattered twice at least: by the
+    /// mirror or glass that it met, and where it is gathered.
     pub fn gathers(&self) -> bool {
         let shows = match self.view.shown() {
             Shown::FirstHit(number) => number == FirstHit::Photons,
             Shown::Light(Measure::ArrivingShare) => false,
-            Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Film(_) | Shown::Bounds => true,
+            Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Film(_) | Shown::Bounds => {
+                self.render.max_depth > 1
+            }
         };
         shows && self.heeded().photons.is_some()
     }

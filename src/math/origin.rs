@@ -1,6 +1,7 @@
 //! Where coordinates start that single precision is to hold.
 
 use super::DVec3;
+use super::float::power_of_two_below;
 
 /// Steps of origins in sizes of what is around them: so far off, single precision errs by a millionth of that size.
 const STEP: f64 = 64.0;
@@ -15,11 +16,6 @@ pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
     // Adding 0 makes −0 and 0 one.
     let origin = (place / step).round() * step + DVec3::ZERO;
     if step > 0.0 && origin.is_finite() { origin } else { DVec3::ZERO }
-}
-
-/// 0 where there is none.
-fn power_of_two_below(size: f64) -> f64 {
-    f64::from_bits(size.to_bits() & f64::INFINITY.to_bits())
 }
 
 #[cfg(test)]

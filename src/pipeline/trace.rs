@@ -10,6 +10,7 @@ use rayon::ThreadPool;
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_by};
+use crate::system::processor::seconds_of_thread;
 use crate::world::World;
 
 /// What renders a tile: see [`crate::integrators::render_tile`].
@@ -44,6 +45,14 @@ pub(super) struct Job {
     pub(super) samples: Range<u32>,
 }
 
+/// What a job took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Cost {
+    pub(super) rays: RayCounters,
+    /// Of one processor; nothing of a picture depends on it.
+    pub(super) seconds: f64,
+}
+
 impl Job {
     /// How many pixels there are.
     pub(super) fn pixel_count(&self) -> u64 {
@@ -52,13 +61,15 @@ impl Job {
 }
 
 impl Tracer<'_> {
-    fn trace(&self, job: &Job) -> Result<(TileSamples, RayCounters), Cancelled> {
+    fn trace(&self, job: &Job) -> Result<(TileSamples, Cost), Cancelled> {
         let Self { kernel, world, settings, token, photons, .. } = *self;
         let samples = job.samples.clone();
-        match photons {
+        let begin = seconds_of_thread();
+        let (samples, rays) = match photons {
             Some(_) => render_tile_by(photons, world, settings, job.pixels, samples, token),
             None => kernel(world, settings, job.pixels, samples, token),
-        }
+        }?;
+        Ok((samples, Cost { rays, seconds: seconds_of_thread() - begin }))
     }
 
     /// Do the jobs. `keep` takes the samples of every job that is finished on the thread that made them, in whose cache
@@ -71,7 +82,7 @@ impl Tracer<'_> {
         &self,
         jobs: &[Job],
         keep: impl Fn(&Job, TileSamples) -> K + Sync,
-        mut each: impl FnMut(Option<(&Job, K, RayCounters)>) -> bool,
+        mut each: impl FnMut(Option<(&Job, K, Cost)>) -> bool,
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
@@ -85,8 +96,8 @@ impl Tracer<'_> {
                     let _guard = StopOnPanic(stopped);
                     while !stopped.load(Ordering::Relaxed)
                         && let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed))
-                        && let Ok((samples, rays)) = self.trace(job)
-                        && sender.send((job, keep(job, samples), rays)).is_ok()
+                        && let Ok((samples, cost)) = self.trace(job)
+                        && sender.send((job, keep(job, samples), cost)).is_ok()
                     {}
                 });
             }

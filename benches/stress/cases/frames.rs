@@ -9,6 +9,9 @@ use super::{Extent, Picture, Row};
 /// What all moved pictures keep to.
 const MOVED: f64 = 1e-3;
 
+/// Of each pixel.
+const SAMPLES: u32 = 4;
+
 pub(super) fn rows(extent: Extent) -> Vec<Row> {
     let mut rows = Vec::new();
     let (steps, distances): (Vec<i32>, &[f64]) = match extent {
@@ -24,15 +27,18 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
         ("lens", "LENS"),
         ("64 lamps", "LAMPS"),
     ];
-    // With a tree of lights a last digit is another one at another scale, and a pick at another place: in the long run alone.
+    // Rounding at another place picks another lamp of a tree here and there, which is one sample of many: in the long run alone.
     let settings = settings.iter().filter(|(_, setting)| extent == Extent::Long || *setting != "LAMPS");
     for &(name, setting) in settings {
-        let scene = |frame: Frame| everything(frame, setting);
-        let twins = |frames: Vec<Frame>| frames.into_iter().map(|frame| (scene(frame), scene(Frame::PLAIN)));
-        let scaled = twins(steps.iter().map(|&k| Frame::scaled(k)).collect());
+        let moved_samples = if setting == "LAMPS" { 16 * SAMPLES } else { SAMPLES };
+        let twins = |frames: Vec<Frame>, samples| {
+            let scene = move |frame: Frame| everything(frame, setting, samples);
+            frames.into_iter().map(move |frame| (scene(frame), scene(Frame::PLAIN)))
+        };
+        let scaled = twins(steps.iter().map(|&k| Frame::scaled(k)).collect(), SAMPLES);
         rows.push(Row::alike(format!("everything × 2^−30 … 2^30, {name}"), scaled.collect(), 0.0));
         for &sizes in distances {
-            let moved = twins(vec![Frame::moved(sizes)]).collect();
+            let moved = twins(vec![Frame::moved(sizes)], moved_samples).collect();
             rows.push(Row::alike(format!("everything moved by {sizes:e} sizes, {name}"), moved, MOVED));
         }
     }
@@ -230,14 +236,14 @@ fn lights_of(frame: Frame, lights: &[&str]) -> String {
 }
 
 /// All shapes beside each other, some of them lamps, and lights.
-fn everything(frame: Frame, setting: &str) -> Picture {
+fn everything(frame: Frame, setting: &str, samples: u32) -> Picture {
     let (render, more) = match setting {
         "LENS" => ("", format!("aperture = {}\nfocus = {}", frame.length(0.0625), frame.length(5.0))),
         PHOTONS | "LAMPS" => ("", String::new()),
         other => (other, String::new()),
     };
     let mut scene =
-        super::head(4, &format!("background = [0.25, 0.25, 0.25]\n{render}")) + &camera(frame, &more);
+        super::head(samples, &format!("background = [0.25, 0.25, 0.25]\n{render}")) + &camera(frame, &more);
     if setting == PHOTONS {
         scene += "[photons]\nenabled = true\ncount = 5000\n";
     }

@@ -20,6 +20,9 @@ const MOST_STEPS: u32 = 200;
 /// Half the width of the neighbourhood of the axis in which slopes change their sign.
 const KINK: f64 = 1e-9;
 
+/// What rounding makes of g where it is 0, over the tube: twice that of the distance from the circle.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
 /// A line near a torus about z whose circle has radius 1.
 pub(super) struct UnitLine {
     /// The line's point nearest to the centre.
@@ -57,7 +60,8 @@ impl UnitLine {
         (half > 0.0 && enter < leave).then_some((enter, leave))
     }
 
-    /// The first place from `from` to `to` at which the line goes in or out.
+    /// The first place from `from` to `to` at which the line goes in or out. Where it starts on the surface, as far as rounding can
+    /// tell, it goes neither there.
     pub(super) fn first_crossing(&self, from: f64, to: f64) -> Option<f64> {
         if !(from < to) {
             return None;
@@ -65,6 +69,9 @@ impl UnitLine {
         let within = |s: f64| s.max(from).min(to);
         let inflections = self.inflections().map_or([to; 2], |cuts| cuts.map(within));
         let mut low = self.at(from);
+        if low.value.abs() <= ROUNDING * self.tube {
+            low.value = 0.0;
+        }
         let is_inside = low.value < 0.0 || low.value == 0.0 && low.slope < 0.0;
         for (end, is_convex) in [(inflections[0], true), (inflections[1], false), (to, true)] {
             if end > low.s {

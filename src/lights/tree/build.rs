@@ -6,6 +6,7 @@ use super::node::{Child, Node};
 use super::{LightTree, NOWHERE};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
+use crate::math::float::power_of_two_below;
 use crate::math::lanes::LANES;
 
 impl LightTree {
@@ -17,9 +18,10 @@ impl LightTree {
         let mut leaves: Vec<Leaf> = (0..).zip(lights).filter_map(Leaf::new).collect();
         // Lights of one space come together.
         leaves.sort_by_key(|leaf| leaf.bounds.space);
-        let power = leaves.iter().map(|leaf| leaf.bounds.power).sum();
+        let power: f64 = leaves.iter().map(|leaf| leaf.bounds.power).sum();
         let mut places = vec![NOWHERE; lights.len()];
-        let mut builder = Builder { nodes: Vec::new(), power, leaves: leaves.len() as u32, token };
+        let unit = power_of_two_below(power);
+        let mut builder = Builder { nodes: Vec::new(), unit, leaves: leaves.len() as u32, token };
         if leaves.is_empty() {
             return Ok(None);
         }
@@ -49,8 +51,8 @@ impl Leaf {
 
 struct Builder<'a> {
     nodes: Vec<Node>,
-    /// Of all lights.
-    power: f64,
+    /// Of powers. A power of two rounds nothing, so that a scaled scene has the same picks.
+    unit: f64,
     /// How many lights.
     leaves: u32,
     token: &'a CancelToken,
@@ -69,7 +71,7 @@ impl Builder<'_> {
             let (own, others) = rest.split_at_mut(count);
             rest = others;
             let Some(bounds) = LightBounds::around(own.iter().map(|leaf| &leaf.bounds)) else { continue };
-            node.set(i, &bounds, self.power);
+            node.set(i, &bounds, self.unit);
             node.first[i] = first;
             node.children[i] = match own {
                 [leaf] if is_over_lights => Child::Light(leaf.light),

@@ -15,7 +15,7 @@ pub struct Node {
     is_place: Lanes,
     /// 1 where light weakens with distance, else 0.
     weakens: Lanes,
-    /// Shares of the tree's power; 0 where there is no child.
+    /// In a unit of about the tree's power; 0 where there is no child.
     power: Lanes,
     /// One over four times the radii.
     spread: Lanes,
@@ -134,8 +134,8 @@ impl Node {
         }
     }
 
-    /// Set a child; `power` is that of the whole tree.
-    pub fn set(&mut self, i: usize, bounds: &LightBounds, power: f64) {
+    /// Set a child; `unit` is that of powers, about the power of the whole tree.
+    pub fn set(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
         let LightBounds { space, center, radius, power: own, cone } = bounds;
         set_lane(&mut self.center, i, center.as_vec3());
         let rounding = center.abs().max_element() * 2.0 * f64::from(f32::EPSILON);
@@ -145,7 +145,7 @@ impl Node {
             Space::Steady => (1.0, 0.0),
             Space::Beyond => (0.0, 0.0),
         };
-        self.power[i] = ((own / power) as f32).max(LEAST);
+        self.power[i] = ((own / unit) as f32).max(LEAST);
         self.spread[i] = 0.25 / self.radius[i].max(LEAST);
         self.is_plain &= *space == Space::Weakening && cone.cos <= -1.0;
         set_lane(&mut self.axis, i, cone.axis.as_vec3());

@@ -287,6 +287,31 @@ fn what_is_nearer_and_stronger_is_picked_in_proportion() {
 }
 
 #[test]
+fn picks_are_the_same_where_all_is_scaled_by_powers_of_two() {
+    let probabilities = |k: i32| {
+        let mut next = random::unit(5);
+        let (unit, power) = (2_f64.powi(k), 4_f32.powi(k));
+        let mut lights: Vec<Light> = (0..100)
+            .map(|_| {
+                let position = DVec3::new(next().into(), next().into(), next().into()) * unit;
+                let intensity = Vec3::splat(next()) * power;
+                Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
+            })
+            .collect();
+        // What comes from beyond has no place and no size.
+        let sun = DirectionalLight::new(Vec3::new(0.6, 0.8, 0.0), Vec3::splat(3.0), 0.0);
+        lights.push(Light::Directional(sun));
+        let tree = tree_of(&lights);
+        let point = (DVec3::new(0.3, -0.7, 0.2) * unit).as_vec3();
+        let cut = cut_for(&tree, point, Vec3::Y, NODES);
+        (0..101).map(|light| cut.probability(light).to_bits()).collect::<Vec<_>>()
+    };
+    for k in [-21, 3, 17] {
+        assert_eq!(probabilities(k), probabilities(0), "{k}");
+    }
+}
+
+#[test]
 fn bounds_around_lights_hold_all_of_them() {
     let mut next = random::unit(11);
     for _ in 0..200 {

@@ -5,7 +5,7 @@
 //! other half, whose samples are others; the noise of both is much the same. A little of the bias is left, as a half
 //! that has stopped tells the other no more: a tenth of it, which is a thirtieth of the noise where that is worst.
 
-use crate::film::{CELLS, Convergence, Film, HalfNoise};
+use crate::film::{CELLS, Convergence, Film, HalfNoise, samples_by};
 
 /// Samples before which noise is not asked for.
 pub(super) const LEAST: u32 = 16;
@@ -49,9 +49,53 @@ impl Goals {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
+    /// Expect what the samples so far tell, which are a power of two: by the noise of both halves of a tile, and by how it fell in the
+    /// tiles that are not decided. What is decided is decided otherwise.
+    fn foresee(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
+        let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
+        let is_open = |tile: &usize| {
+            let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
+            cells
+                .flat_map(|(goals, done)| goals.iter().zip(done))
+                .any(|(goal, done)| *goal == u32::MAX && *done == samples)
+        };
+        let tiles: Vec<usize> = (0..film.tile_count()).filter(is_open).collect();
+        let falls = tiles.iter().filter_map(|tile| film.tile_fall(*tile)).collect();
+        let power = power_of(film.convergence(), falls);
+        for tile in tiles {
+            let noise: Vec<HalfNoise> =
+                [0, 1].into_iter().filter_map(|half| film.tile_noise(tile, half)).collect();
+            let square = |one: &HalfNoise| {
+                let noise = relative(one, brightness);
+                noise * noise
+            };
+            let mean = noise.iter().map(square).sum::<f64>() / noise.len() as f64;
+            if !mean.is_finite() {
+                continue;
+            }
+            let wanted = match mean.sqrt() {
+                noise if noise > 0.0 => samples_by(power, AIM * error / noise, samples),
+                _ => samples,
+            };
+            let cells = self.expected.iter_mut().zip(&self.decided).zip(done).skip(CELLS * tile).take(CELLS);
+            for ((expected, decided), done) in cells {
+                for half in (0..2).filter(|half| decided[*half] == u32::MAX) {
+                    expected[half] = wanted.max(done[half]).max(LEAST);
+                }
+            }
+        }
+    }
+
     /// Decide for every half that has no goal yet and has now `samples`, a power of two, by the noise of the other one. `done` are
     /// the samples that all of them have. Before all have enough of them for the picture's brightness, nothing is decided.
     pub(super) fn judge(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
+        if samples >= LEAST {
+            self.decide(film, done, samples, error);
+        }
+        self.foresee(film, done, samples, error);
+    }
+
+    fn decide(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
         let open = |goals: &[u32; 2], done: &[u32; 2]| {
             (0..2).any(|half| goals[half] > done[half] && done[half] < LEAST)
         };
@@ -71,10 +115,10 @@ impl Goals {
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
                 let wanted = wanted(&noise, film.convergence(), brightness, error);
-                self.expected[cell][half] = wanted.max(done[half]);
                 // Where the other half has no more samples to come, nothing more will be known.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
+                    self.expected[cell][half] = self.decided[cell][half];
                 }
             }
         }
@@ -83,12 +127,23 @@ impl Goals {
 
 /// Samples that bring noise to the error asked for.
 fn wanted(noise: &HalfNoise, convergence: Convergence, brightness: f64, error: f64) -> u32 {
-    let HalfNoise { variance, mean, samples } = *noise;
-    let relative = variance.sqrt() / mean.max(LEAST_BRIGHTNESS * brightness);
+    let relative = relative(noise, brightness);
     if !(relative > 0.0) {
-        return samples;
+        return noise.samples;
     }
-    convergence.samples_to(AIM * error / relative, samples)
+    convergence.samples_to(AIM * error / relative, noise.samples)
+}
+
+/// Noise over the brightness that it is held against.
+fn relative(noise: &HalfNoise, brightness: f64) -> f64 {
+    noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * brightness)
+}
+
+/// The power of the samples with which variance falls: by the median of how it fell, between those of both kinds of samples.
+fn power_of(convergence: Convergence, mut falls: Vec<f64>) -> f64 {
+    falls.sort_by(f64::total_cmp);
+    let power = |fall: &f64| libm::log2(*fall).clamp(1.0, Convergence::Stratified.power());
+    falls.get(falls.len() / 2).map_or(convergence.power(), power)
 }
 
 #[cfg(test)]
@@ -141,6 +196,30 @@ mod tests {
         let goals = judged([(1.0, 1.0); 2], 16, 0.05);
         assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
         assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
+    }
+
+    #[test]
+    fn a_few_samples_tell_how_many_there_will_be() {
+        for samples in [2, 4, 8] {
+            let goals = judged([(1.0, 1.0); 2], samples, 0.01);
+            assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
+            // Independent samples of a standard deviation of √(1/12) take 833; if noise falls as in a film, by two of them 112.
+            assert!((60..2000).contains(&goals.expected(0, 0)), "{samples}: {}", goals.expected(0, 0));
+        }
+    }
+
+    #[test]
+    fn how_noise_fell_so_far_tells_how_it_will_fall() {
+        let stratified = Convergence::Stratified.power();
+        for (falls, power) in [
+            (vec![], stratified),
+            (vec![2.0, 1.0, 2.0], 1.0),
+            (vec![9.0, 4.0, 3.0], stratified),
+            (vec![100.0, 2.2, 2.3, 2.1, 1e-3], libm::log2(2.2)),
+        ] {
+            assert_eq!(power_of(Convergence::Stratified, falls.clone()), power, "{falls:?}");
+        }
+        assert_eq!(power_of(Convergence::Independent, vec![]), 1.0);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::super::plan::Plan;
-use super::super::trace::Job;
+use super::super::trace::{Cost, Job};
 use super::adaptive::Goals;
 use crate::film::{CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
 use crate::scene::fingerprint::Key;
@@ -19,6 +19,8 @@ pub(in crate::pipeline) struct Canvas {
     pub(super) done: Vec<[u32; 2]>,
     /// Rays of each cell.
     pub(super) rays: Vec<u64>,
+    /// Seconds of a processor that each took.
+    seconds: Vec<f64>,
     /// Samples that they are to have at most.
     pub(super) goals: Goals,
     /// A first picture at the size of the preview, shown where there are no samples yet.
@@ -53,6 +55,7 @@ impl Canvas {
             key,
             film: Arc::new(film),
             rays: vec![0; film_cells],
+            seconds: vec![0.0; film_cells],
             done,
             goals,
             base: None,
@@ -118,7 +121,7 @@ impl Canvas {
     /// Bytes that it takes.
     pub(super) fn memory_bytes(&self) -> u64 {
         let base = self.base.as_ref().map_or(0, |base| size_of_val(base.pixels.as_slice()) as u64);
-        let done = 3 * size_of_val(self.done.as_slice()) as u64;
+        let done = 4 * size_of_val(self.done.as_slice()) as u64;
         self.film.memory_bytes() + done + base + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
@@ -154,13 +157,14 @@ impl Canvas {
         jobs
     }
 
-    /// Note that a job is done, and the rays that it took; pixels times samples that it was.
-    pub(super) fn note(&mut self, job: &Job, rays: u64) -> u64 {
+    /// Note that a job is done, and what it took; pixels times samples that it was.
+    pub(super) fn note(&mut self, job: &Job, cost: &Cost) -> u64 {
+        let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
             let rect = self.film.cell_rect(cell);
-            if rect.is_some_and(|rect| rect.intersection(&job.pixels.rect) == Some(rect)) {
-                self.rays[cell] +=
-                    rays * rect.map_or(0, |rect| rect.area() as u64) / job.pixels.rect.area() as u64;
+            if let Some(rect) = rect.filter(|rect| rect.intersection(&job.pixels.rect) == Some(*rect)) {
+                self.rays[cell] += rays * rect.area() as u64 / job.pixels.rect.area() as u64;
+                self.seconds[cell] += seconds * rect.area() as f64;
                 match job.pixels.part {
                     Part::All => self.done[cell] = [job.samples.end; 2],
                     Part::Half(half) => self.done[cell][half] = job.samples.end,
@@ -182,7 +186,47 @@ impl Canvas {
 
     /// Pixels times samples that there will be, as far as that is known, of some at most.
     pub(super) fn units_to_come(&self, most: u32) -> u64 {
-        self.units_of(|tile, half| self.goals.expected(tile, half).min(most))
+        self.units_of(|cell, half| self.to_come(cell, half, most))
+    }
+
+    /// Seconds of a processor that it took, and those of the whole render as far as that is known, of some samples at most. What a
+    /// sample takes in a cell is told by those that it has; where it has none, by the others.
+    pub(super) fn work(&self, most: u32) -> [f64; 2] {
+        let units = |cell: usize, samples: [u32; 2]| -> f64 {
+            let unit = |half| self.film.half_pixel_count(cell, half) as f64 * f64::from(samples[half]);
+            unit(0) + unit(1)
+        };
+        let (mut done, mut of, mut total, mut others) = (0.0, 0.0, 0.0, 0.0);
+        for cell in (0..self.done.len()).filter(|cell| self.film.cell_rect(*cell).is_some()) {
+            let had = units(cell, self.done[cell]);
+            let to_have = units(cell, [0, 1].map(|half| self.to_come(cell, half, most)));
+            if had > 0.0 {
+                let seconds = self.seconds[cell];
+                (done, of, total) = (done + seconds, of + had, total + seconds * to_have / had);
+            } else {
+                others += to_have;
+            }
+        }
+        // Before anything is known all samples are alike.
+        let others = if of > 0.0 { others * done / of } else { others };
+        [done, (total + others).max(done)]
+    }
+
+    /// Samples of the pixels that have most, now and in the end as far as that is known: as many passes of photons are sent.
+    pub(super) fn passes(&self, most: u32) -> [u32; 2] {
+        let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
+            self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
+        };
+        [most_of(&|cell, half| self.done[cell][half]), most_of(&|cell, half| self.to_come(cell, half, most))]
+    }
+
+    /// Whether it is known about how many samples there will be, where noise decides that.
+    pub(super) fn is_foreseen(&self) -> bool {
+        self.halves().all(|(cell, half)| self.goals.expected(cell, half) < u32::MAX)
+    }
+
+    fn to_come(&self, cell: usize, half: usize, most: u32) -> u32 {
+        self.goals.expected(cell, half).min(most)
     }
 
     fn units_of(&self, samples_of: impl Fn(usize, usize) -> u32) -> u64 {
@@ -197,4 +241,41 @@ impl Canvas {
 fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrators::RayCounters;
+    use crate::scene::fingerprint::Fingerprint;
+
+    #[test]
+    fn work_to_come_costs_in_each_tile_what_it_cost_so_far() {
+        let film = Film::new(64, 32, None).expect("a film");
+        let cells = film.cell_count();
+        let mut canvas = Canvas {
+            key: Fingerprint::new("test").finish(),
+            film: Arc::new(film),
+            done: vec![[0; 2]; cells],
+            rays: vec![0; cells],
+            seconds: vec![0.0; cells],
+            goals: Goals::none(cells),
+            base: None,
+            previewer: None,
+            is_passing: false,
+            ended_by: None,
+        };
+        let mut note = |tile: usize, samples: Range<u32>, seconds: f64| {
+            let pixels = Pixels::from(canvas.film.tile_rect(tile).expect("a tile"));
+            let job = Job { tile, pixels, samples };
+            canvas.note(&job, &Cost { rays: RayCounters::default(), seconds });
+            canvas.work(8).map(|seconds| (seconds * 1e6).round() * 1e-6)
+        };
+        // Of the other one nothing is known: it is like the first.
+        assert_eq!(note(0, 0..4, 1.0), [1.0, 4.0]);
+        assert_eq!(note(1, 0..2, 10.0), [11.0, 42.0]);
+        assert_eq!(note(1, 2..8, 30.0), [41.0, 42.0]);
+        assert_eq!(canvas.passes(8), [8, 8]);
+        assert_eq!(canvas.passes(16), [8, 16]);
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::super::pace::Work;
 use super::super::protocol::NoiseProgress;
 use super::adaptive::LEAST;
 use crate::film::Film;
@@ -15,16 +16,8 @@ const STEP: f64 = 1.5;
 #[derive(Debug)]
 pub(super) struct Outlook {
     due: Instant,
-    /// And pixels times samples that there were.
-    told: Option<(f64, u64)>,
-}
-
-/// Where a render is: pixels times samples done and to do in all, and those a second.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Work {
-    pub(super) done: u64,
-    pub(super) total: u64,
-    pub(super) rate: Option<f64>,
+    /// And the work that was done.
+    told: Option<(f64, f64)>,
 }
 
 impl Outlook {
@@ -33,7 +26,7 @@ impl Outlook {
     }
 
     /// Look again, where it is time: pixels have `samples` at least, a power of two of them.
-    pub(super) fn look(&mut self, film: &Film, samples: u32, done: u64) {
+    pub(super) fn look(&mut self, film: &Film, samples: u32, done: f64) {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
@@ -42,9 +35,9 @@ impl Outlook {
     }
 
     /// What is to be expected, where something was told.
-    pub(super) fn at(&self, film: &Film, work: Work) -> Option<NoiseProgress> {
-        let (noise, done) = self.told?;
-        Some(expected(noise * fall(film, work.done as f64 / done as f64), work, |part| fall(film, part)))
+    pub(super) fn at(&self, film: &Film, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
+        let (noise, done) = self.told.filter(|(_, done)| *done > 0.0)?;
+        Some(expected(noise * fall(film, work.done / done), work, rate, |part| fall(film, part)))
     }
 }
 
@@ -53,17 +46,20 @@ fn fall(film: &Film, times: f64) -> f64 {
     libm::pow(times, -0.5 * film.convergence().power())
 }
 
-/// The noise now, the next round level below it, or what it will be in the end where that comes first, and when.
-fn expected(now: f64, work: Work, fall: impl Fn(f64) -> f64) -> NoiseProgress {
-    let Work { done, total, rate } = work;
-    let to_go = total.saturating_sub(done) as f64;
-    let end = now * fall(total.max(done) as f64 / done.max(1) as f64);
+/// The noise now, the next round level below it, or what it will be in the end where that comes first, and when, by work a second.
+fn expected(now: f64, work: Work, rate: Option<f64>, fall: impl Fn(f64) -> f64) -> NoiseProgress {
+    let Work { done, total, aside: [aside, _] } = work;
+    let total = total.unwrap_or(f64::INFINITY).max(done);
+    let to_go = total - done;
+    let end = now * fall(total / done.max(f64::MIN_POSITIVE));
     let level = level_below(now / STEP).max(end);
-    let next = rate.filter(|_| to_go > 0.0 && now > 0.0).map(|rate| {
+    let next = rate.filter(|rate| to_go > 0.0 && now > 0.0 && *rate > 0.0).map(|rate| {
         // The power by which the noise falls, from twice the samples.
         let power = -libm::log2(fall(2.0));
-        let units = done as f64 * (libm::pow(now / level, 1.0 / power) - 1.0);
-        (level, units.min(to_go) / rate)
+        let more = done * (libm::pow(now / level, 1.0 / power) - 1.0);
+        // What goes on aside takes its part of the time from here on too.
+        let seconds_of_done = done / rate;
+        (level, more.min(to_go) / rate * (1.0 + aside / seconds_of_done))
     });
     NoiseProgress { now, next }
 }
@@ -97,19 +93,21 @@ mod tests {
     #[test]
     fn the_next_level_comes_when_so_many_samples_are_done() {
         // 2.1 % after 100 of 10,000 units, 10 a second: 1 % takes 4.41 times as many.
-        let work = Work { done: 100, total: 10_000, rate: Some(10.0) };
-        let (level, seconds) = expected(0.021, work, root).next.expect("a level");
+        let work = Work { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
+        let (level, seconds) = expected(0.021, work, Some(10.0), root).next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
     }
 
     #[test]
     fn a_render_that_ends_first_says_what_is_left_then() {
-        let work = Work { done: 100, total: 200, rate: Some(10.0) };
-        let (level, seconds) = expected(0.021, work, root).next.expect("a level");
+        let work = Work { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
+        let (level, seconds) = expected(0.021, work, Some(10.0), root).next.expect("a level");
         assert!((level - 0.021 / 2.0_f64.sqrt()).abs() < 1e-12 && (seconds - 10.0).abs() < 1e-6);
-        let over = Work { done: 200, total: 200, rate: Some(10.0) };
-        assert_eq!(expected(0.021, over, root), NoiseProgress { now: 0.021, next: None });
-        let unknown = Work { rate: None, ..work };
-        assert_eq!(expected(0.021, unknown, root).next, None);
+        let over = Work { done: 200.0, ..work };
+        assert_eq!(expected(0.021, over, Some(10.0), root), NoiseProgress { now: 0.021, next: None });
+        assert_eq!(expected(0.021, work, None, root).next, None);
+        // As much time goes by aside as at work.
+        let half = Work { aside: [10.0, 10.0], ..work };
+        assert_eq!(expected(0.021, half, Some(10.0), root).next.map(|(_, seconds)| seconds), Some(20.0));
     }
 }

@@ -82,6 +82,12 @@ impl PhotonStore {
         ((MOST_ALIVE_BYTES / size) as u32).clamp(1, MOST_ALIVE)
     }
 
+    /// Seconds that a pass takes to send; 0 where none was sent.
+    pub(super) fn seconds_of_pass(&self) -> f64 {
+        let Sent { passes, seconds, .. } = self.sent.get();
+        if self.are_sent() && passes > 0 { seconds / passes as f64 } else { 0.0 }
+    }
+
     /// The maps of some samples; `tick` is called every now and then.
     ///
     /// # Errors
@@ -199,7 +205,10 @@ pub(in crate::pipeline) fn photons(
         };
     };
     if !settings.gathers() {
-        return skipped("this view shows nothing of them");
+        return skipped(match settings.render.max_depth {
+            0 | 1 => "max_depth ends light before it",
+            _ => "this view shows nothing of them",
+        });
     }
     let key = key(of_photons);
     if let Some(store) = cache.get(key) {

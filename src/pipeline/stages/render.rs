@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::super::pace::{Clock, Pace};
+use super::super::pace::{Clock, Pace, Work};
 use super::super::plan::Plan;
 use super::super::protocol::{PreviewSize, RenderProgress, Section};
 use super::super::sink::Sink;
@@ -17,7 +17,7 @@ use super::super::trace::{Job, Tracer, next_pass};
 use super::adaptive::LEAST;
 use super::canvas::Canvas;
 use super::films::Films;
-use super::outlook::{Outlook, Work};
+use super::outlook::Outlook;
 use super::photons::{PhotonStore, Sending};
 use super::preview::Screen;
 use super::spread::next_round;
@@ -121,6 +121,10 @@ struct Painter<'a> {
     /// Of an earlier render.
     units_before: u64,
     total_units: u64,
+    /// Seconds in which photons were sent.
+    sending_seconds: f64,
+    /// When the last of them began to be sent, while they are.
+    sending_since: Option<f64>,
     rays: RayCounters,
     /// Whether some pixels have no sample yet: until they have, nothing but a cancel ends the render.
     is_first: bool,
@@ -134,13 +138,16 @@ impl<'a> Painter<'a> {
         let units = canvas.units();
         let total_units = canvas.units_to_come(rendering.plan.settings.render.samples);
         let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
+        let [done, _] = canvas.work(0);
         Self {
             is_first: !canvas.is_covered(),
             canvas,
             rendering,
             screen: Screen { bounds, plan: rendering.plan, sink: rendering.sink },
             clock: Clock::start(),
-            pace: Pace::new(units, total_units),
+            pace: Pace::new(done),
+            sending_seconds: 0.0,
+            sending_since: None,
             outlook: Outlook::new(),
             fraction: 0.0,
             units,
@@ -205,7 +212,6 @@ impl<'a> Painter<'a> {
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
                 self.canvas.judge(target, error.into());
                 self.total_units = self.canvas.units_to_come(most);
-                self.pace.expect(self.total_units);
             }
         }
         Ok(())
@@ -214,7 +220,8 @@ impl<'a> Painter<'a> {
     /// At the noise, where it is time.
     fn look(&mut self) {
         let least = self.canvas.samples(u32::MAX);
-        self.outlook.look(&self.canvas.film, least, self.units);
+        let [done, _] = self.canvas.work(0);
+        self.outlook.look(&self.canvas.film, least, done);
     }
 
     /// All tiles of a part that have fewer samples than `target`.
@@ -241,7 +248,12 @@ impl<'a> Painter<'a> {
     fn maps(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
         let Rendering { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
-        Ok(photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?)
+        let begin = self.clock.seconds(token.is_paused());
+        self.sending_since = Some(begin);
+        let maps = photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?;
+        self.sending_since = None;
+        self.sending_seconds += self.clock.seconds(token.is_paused()) - begin;
+        Ok(maps)
     }
 
     /// Samples that the halves of each cell are to have next, where there is a budget of time: some where they lower the error most.
@@ -289,9 +301,9 @@ impl<'a> Painter<'a> {
         let film = Arc::clone(&self.canvas.film);
         let keep = |job: &Job, samples: TileSamples| film.add(job.tile, &samples);
         tracer.run(&jobs, keep, |result| {
-            if let Some((job, (), rays)) = result {
-                self.units += self.canvas.note(job, rays.all());
-                self.rays += rays;
+            if let Some((job, (), cost)) = result {
+                self.units += self.canvas.note(job, &cost);
+                self.rays += cost.rays;
             }
             self.tick();
             !self.is_over_time
@@ -320,7 +332,8 @@ impl<'a> Painter<'a> {
 
     fn say_progress(&mut self, is_last: bool) {
         let elapsed_seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
-        let (mut fraction, mut eta_seconds) = self.pace.at(elapsed_seconds, self.units);
+        let work = self.work(elapsed_seconds);
+        let (mut fraction, mut eta_seconds) = self.pace.at(elapsed_seconds, work);
         if let Some(budget) = self.rendering.plan.time_seconds {
             // The first pass is finished whatever the budget is.
             let of_first = eta_seconds.map_or(0.0, |eta| eta * self.share_of_first());
@@ -331,15 +344,30 @@ impl<'a> Painter<'a> {
         }
         self.fraction = if is_last { 1.0 } else { self.fraction.max(fraction) };
         let pixels = self.canvas.film.crop().area() as u64;
-        let work = Work { done: self.units, total: self.total_units, rate: self.pace.rate() };
         self.rendering.sink.progress(RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
             eta_seconds: if is_last { Some(0.0) } else { eta_seconds },
             samples: (self.units / pixels) as u32,
             total_samples: self.total_units.div_ceil(pixels) as u32,
-            noise: self.outlook.at(&self.canvas.film, work),
+            noise: self.outlook.at(&self.canvas.film, work, self.pace.rate()),
         });
+    }
+
+    /// How far all is after some seconds; nobody knows to where before noise was judged, where it decides that.
+    fn work(&self, elapsed_seconds: f64) -> Work {
+        let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
+        let is_known = !(error > 0.0) || self.canvas.is_foreseen();
+        let [done, total] = self.canvas.work(most);
+        let [passes, all_passes] = self.canvas.passes(most);
+        let of_pass = self.rendering.photons.map_or(0.0, PhotonStore::seconds_of_pass);
+        let of_this = self.sending_since.map_or(0.0, |since| elapsed_seconds - since);
+        let to_come = f64::from(all_passes.saturating_sub(passes)) * of_pass - of_this;
+        Work {
+            done,
+            total: is_known.then_some(total),
+            aside: [self.sending_seconds + of_this, to_come.max(0.0)],
+        }
     }
 
     /// Of the work that is left, the part that the first pass is.

@@ -1,0 +1,26 @@
+//! What work takes of a processor.
+
+use nix::time::{ClockId, clock_gettime};
+
+/// Seconds that this thread has had of a processor: those of others, and those in which it was held, do not count. 0 where the system
+/// does not tell.
+pub(crate) fn seconds_of_thread() -> f64 {
+    let Ok(time) = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID) else { return 0.0 };
+    time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    #[test]
+    fn sleep_is_no_work() {
+        let (begin, before) = (Instant::now(), seconds_of_thread());
+        std::thread::sleep(Duration::from_millis(30));
+        let slept = seconds_of_thread() - before;
+        while seconds_of_thread() - before <= slept + 0.01 {}
+        assert!(begin.elapsed().as_secs_f64() >= slept + 0.03, "{slept}");
+    }
+}
