@@ -6,7 +6,7 @@ use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
 const WHITE: &str =
     "[materials.w]\ndiffuse = 1\n[[sphere]]\ncenter = [0, 0, -5]\nradius = 1\nmaterial = \"w\"\n";
 
-pub(super) fn rows(extent: Extent) -> Vec<Row> {
+pub(super) fn rows(_: Extent) -> Vec<Row> {
     let mut rows = Vec::new();
     let plain = signs("", CAMERA, "");
     rows.push(

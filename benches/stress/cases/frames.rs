@@ -27,10 +27,12 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
         ("lens", "LENS"),
         ("64 lamps", "LAMPS"),
     ];
-    // Rounding at another place picks another lamp of a tree here and there, which is one sample of many: in the long run alone.
+    // Rounding at another place picks another lamp of a tree, or photon of a kernel, here and there, which is one sample of many: lamps
+    // in the long run alone, with more samples.
     let settings = settings.iter().filter(|(_, setting)| extent == Extent::Long || *setting != "LAMPS");
     for &(name, setting) in settings {
-        let moved_samples = if setting == "LAMPS" { 16 * SAMPLES } else { SAMPLES };
+        let is_picking = setting == PHOTONS || setting == "LAMPS";
+        let moved_samples = if is_picking && extent == Extent::Long { 16 * SAMPLES } else { SAMPLES };
         let twins = |frames: Vec<Frame>, samples| {
             let scene = move |frame: Frame| everything(frame, setting, samples);
             frames.into_iter().map(move |frame| (scene(frame), scene(Frame::PLAIN)))
