@@ -102,6 +102,17 @@ fn scrolling_is_offered_where_there_is_something_to_scroll() {
 }
 
 #[test]
+fn the_help_leaves_no_cut_words_beside_it() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    desk.press('?');
+    let text = desk.text();
+    let beside = |line: &str| line.split(['╭', '╰']).next().is_some_and(|left| left.trim().is_empty());
+    let edges: Vec<&str> = text.lines().filter(|line| line.contains(['╭', '╰'])).collect();
+    assert!(edges.len() == 2 && edges.into_iter().all(beside), "{text}");
+}
+
+#[test]
 fn the_way_out_of_the_help_is_told_before_its_pages() {
     let mut desk = Desk::with(state(40, 12));
     desk.press('?');
