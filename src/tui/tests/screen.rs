@@ -478,7 +478,7 @@ fn what_the_last_picture_took_is_in_words_where_there_is_room() {
 fn noise_has_two_digits() {
     let mut desk = Desk::new();
     desk.finish(RED);
-    desk.state.report.as_mut().expect("a report").image.error = Some(0.4343);
+    desk.state.report.as_mut().expect("a report").image.error = Some(0.4312);
     assert!(desk.text().contains("43 % in all"), "{}", desk.text());
 }
 
