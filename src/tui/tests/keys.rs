@@ -243,12 +243,15 @@ fn what_is_of_use_now_stands_beside_the_toggles() {
     assert!(bottom(&mut desk).contains("space go on"), "{}", bottom(&mut desk));
     desk.finish(RED);
     assert!(bottom(&mut desk).contains("tab picture") && !bottom(&mut desk).contains("space"));
+    desk.press('s');
+    desk.finish(RED);
     desk.event(Event::Resize(window(200, 60)));
     for binding in KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::TogglePause) {
         let hint = format!("{} {}", binding.label, binding.hint);
         assert!(bottom(&mut desk).contains(&hint), "{hint:?} is not in {}", bottom(&mut desk));
     }
-    desk.worker(done(1, vec![diagnostic(Severity::Warning, "unused")], false));
+    let generation = desk.state.generation;
+    desk.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false));
     assert!(bottom(&mut desk).contains("e 1 warning"));
     desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
     assert!(bottom(&mut desk).contains("esc close"), "{}", bottom(&mut desk));

@@ -122,6 +122,8 @@ fn small_windows_are_usable() {
         let text = desk.text();
         assert!(text.contains("● rendering") && text.contains("50 %"), "{text}");
         assert!(text.contains("? help") && text.contains("s soft"), "{text}");
+        desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(4567.0)) });
+        assert!(desk.text().contains("50 %"), "how far it is before how long: {}", desk.text());
         rendered(&mut desk, (640, 480));
         let share = cells_of(&mut desk, RED) as f64 / most_cells((columns, rows), (640, 480));
         assert!(share >= 0.7, "{share:.3}\n{}", desk.text());

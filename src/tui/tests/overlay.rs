@@ -4,7 +4,7 @@ use crossterm::event::KeyCode;
 
 use super::{RED, cells_of};
 use crate::pipeline::protocol::{self, Failure};
-use crate::pipeline::settings::View;
+use crate::pipeline::settings::{Effective, View};
 use crate::scene::diagnostic::{Diagnostic, Place, Severity};
 use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
@@ -86,6 +86,40 @@ fn the_help_can_be_read_in_a_small_window() {
 }
 
 #[test]
+fn scrolling_is_offered_where_there_is_something_to_scroll() {
+    for (rows, is_long) in [(24, true), (60, false)] {
+        let mut desk = Desk::with(state(80, rows));
+        desk.press('?');
+        assert!(desk.text().contains("esc close"), "{}", desk.text());
+        assert_eq!(desk.text().contains("j k scroll"), is_long, "{}", desk.text());
+    }
+    for (faults, is_long) in [(9, true), (1, false)] {
+        let mut desk = Desk::new();
+        desk.fail((0..faults).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+        assert!(desk.text().contains("esc close"), "{}", desk.text());
+        assert_eq!(desk.text().contains("j k scroll"), is_long, "{}", desk.text());
+    }
+}
+
+#[test]
+fn the_help_leaves_no_cut_words_beside_it() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    desk.press('?');
+    let text = desk.text();
+    let beside = |line: &str| line.split(['╭', '╰']).next().is_some_and(|left| left.trim().is_empty());
+    let edges: Vec<&str> = text.lines().filter(|line| line.contains(['╭', '╰'])).collect();
+    assert!(edges.len() == 2 && edges.into_iter().all(beside), "{text}");
+}
+
+#[test]
+fn the_way_out_of_the_help_is_told_before_its_pages() {
+    let mut desk = Desk::with(state(40, 12));
+    desk.press('?');
+    assert!(desk.text().contains("esc close"), "{}", desk.text());
+}
+
+#[test]
 fn views_are_listed_and_chosen_by_digits() {
     for (columns, rows) in [(80, 24), (120, 40), (120, 24), (40, 12), (30, 8)] {
         let mut desk = Desk::with(state(columns, rows));
@@ -164,9 +198,13 @@ fn errors_come_before_warnings_and_one_fault_is_told_once_with_its_places() {
 
 #[test]
 fn errors_lie_beside_the_picture_where_there_is_room() {
-    for (columns, rows, is_beside) in [(160, 40, true), (80, 60, true), (80, 24, false)] {
+    for (columns, rows, width, is_beside) in
+        [(160, 40, 640, true), (80, 60, 640, true), (80, 24, 480, true), (80, 24, 640, false)]
+    {
         let mut desk = Desk::with(state(columns, rows));
         desk.finish(RED);
+        let settings = Box::new(Effective { width, height: 480, ..settings() });
+        desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera() });
         let before = cells_of(&mut desk, RED);
         desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
         assert!(desk.text().contains("error: unknown key `heigth`"), "{}", desk.text());

@@ -216,7 +216,8 @@ fn what_was_clicked_is_told_in_full_in_a_small_window() {
         answer(&mut desk, Some(thing()));
         let text = desk.text().replace('\n', " ");
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        for words in ["cornell.toml:47", "glass", "3.9 away", "L (0.5, 0.5, 0.5)", "n (0, 1, 0)"] {
+        for words in ["cornell.toml:47", "glass", "3.9 away", "radiance (0.5, 0.5, 0.5)", "normal (0, 1, 0)"]
+        {
             assert!(words.split(' ').all(|word| text.contains(word)), "{words}: {}", desk.text());
         }
         desk.press('y');
@@ -280,8 +281,16 @@ fn an_older_picture_is_said_to_be_older_in_the_first_line() {
     desk.press('b');
     let first = |desk: &mut Desk| desk.text().lines().next().map(str::to_owned).unwrap_or_default();
     assert!(first(&mut desk).contains("◂ older") && first(&mut desk).contains("picture 1 of 2"));
+    // A key that means nothing takes the message away.
+    desk.press('y');
+    let text = desk.text();
+    assert!(text.contains("b newest") && text.contains("n N older, newer"), "the ways on: {text}");
+    assert!(!text.contains("samples") && !text.contains("render 1"), "that is of the newest one: {text}");
+    desk.event(Event::Resize(window(30, 8)));
+    assert!(first(&mut desk).contains("1 of 2"), "{}", desk.text());
+    desk.event(Event::Resize(window(80, 24)));
     desk.press('b');
-    assert!(first(&mut desk).contains("✓ done"));
+    assert!(first(&mut desk).contains("✓ done") && desk.text().contains("samples"), "{}", desk.text());
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::tui::color::ColorDepth;
 use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::keymap::KEYMAP;
-use crate::tui::state::PreviewKind;
+use crate::tui::state::{FrameReport, PreviewKind};
 
 #[test]
 fn the_picture_is_in_half_blocks_in_the_middle_of_its_area() {
@@ -444,6 +444,42 @@ fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
         desk.state.effective.as_mut().expect("settings").samples = samples;
         assert!(desk.text().contains(words), "{words}: {}", desk.text());
     }
+}
+
+#[test]
+fn the_way_back_is_offered_once_and_where_something_was_changed() {
+    let mut desk = Desk::with(state(200, 60));
+    desk.finish(RED);
+    let keys = |desk: &mut Desk| desk.text().lines().last().map(str::to_owned).unwrap_or_default();
+    assert!(!keys(&mut desk).contains("0 "), "{}", keys(&mut desk));
+    desk.press('s');
+    desk.finish(RED);
+    assert!(keys(&mut desk).contains("0 reset"), "{}", keys(&mut desk));
+    desk.press('l');
+    desk.finish(RED);
+    let keys = keys(&mut desk);
+    assert!(keys.contains("0 camera moved") && !keys.contains("0 reset"), "{keys}");
+}
+
+#[test]
+fn what_the_last_picture_took_is_in_words_where_there_is_room() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    // All stages alike leave no room for it.
+    desk.state.stages = Default::default();
+    desk.state.edits = 1;
+    desk.state.frame = Some(FrameReport { bytes: 30_500, round_trip: Some(Duration::from_millis(150)) });
+    assert!(desk.text().contains("31 kB sent, answered in 150 ms"), "{}", desk.text());
+    desk.event(Event::Resize(window(30, 20)));
+    assert!(desk.text().contains("31 kB 150 ms"), "{}", desk.text());
+}
+
+#[test]
+fn noise_has_two_digits() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.state.report.as_mut().expect("a report").image.error = Some(0.4312);
+    assert!(desk.text().contains("43 % in all"), "{}", desk.text());
 }
 
 #[test]

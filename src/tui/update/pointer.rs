@@ -148,7 +148,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
 
 /// Shape and name, line, material, distance, place, colour, normal.
 fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
-    let light = color.map(|color| format!("L {}", numbers(color.map(f64::from))));
+    let light = color.map(|color| format!("radiance {}", numbers(color.map(f64::from))));
     let Some(thing) = thing else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
     };
@@ -164,7 +164,7 @@ fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
         format!("at {}", numbers(*position)),
     ];
     facts.extend(light);
-    facts.push(format!("n {}{back}", numbers(normal.map(f64::from))));
+    facts.push(format!("normal {}{back}", numbers(normal.map(f64::from))));
     facts
 }
 
@@ -205,8 +205,8 @@ mod tests {
                 "glass crystal",
                 "3.82 away",
                 "at (0.214, 0.5, -33.1)",
-                "L (0.61, 1235, 0)",
-                "n (0, 1, 0)"
+                "radiance (0.61, 1235, 0)",
+                "normal (0, 1, 0)"
             ]
         );
         assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);

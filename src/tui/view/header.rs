@@ -38,7 +38,8 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
             keymap::of(Action::PictureAlone).map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_right(buffer, room, &back, Tone::Faint, state.depth);
     }
-    room.width -= put_right(buffer, room, &figures(state), Tone::Strong, state.depth);
+    let fitting = figures(state).into_iter().find(|words| columns(words) <= room.width);
+    room.width -= put_right(buffer, room, &fitting.unwrap_or_default(), Tone::Strong, state.depth);
     room.width = room.width.saturating_sub(1);
     if room.width >= LEAST_NAME {
         name(state, room, buffer);
@@ -114,31 +115,33 @@ fn close_up(state: &State) -> String {
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
-/// How far it is, or what came of it.
-fn figures(state: &State) -> String {
+/// How far it is, or what came of it; in full and in short.
+fn figures(state: &State) -> Vec<String> {
     if let Some((number, count, time)) = state.history.place() {
-        return format!("picture {number} of {count}, {}", ago(state.now.saturating_duration_since(time)));
+        let place = format!("{number} of {count}");
+        let age = ago(state.now.saturating_duration_since(time));
+        return vec![format!("picture {place}, {age}"), place];
     }
     match (state.activity, &state.report, &state.progress) {
         (Activity::Running { .. }, _, Some(progress)) => {
             let done = format!("{} %", percent(progress.fraction));
             let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
-            match eta {
-                _ if state.paused => done,
-                Some(eta) => format!("{done}  ETA {}", running(eta)),
-                None => format!("{done}  ETA …"),
-            }
+            let eta = eta.map_or("…".to_owned(), running);
+            if state.paused { vec![done] } else { vec![format!("{done}  ETA {eta}"), done] }
         }
         (Activity::Running { .. }, _, None) => {
-            at_work(state).map_or(String::new(), |name| format!("{name}…"))
+            at_work(state).map(|name| format!("{name}…")).into_iter().collect()
         }
-        (Activity::Done, _, _) if state.unchanged => format!("unchanged · run {}", state.renders),
+        (Activity::Done, _, _) if state.unchanged => {
+            vec![format!("unchanged · run {}", state.renders), "unchanged".to_owned()]
+        }
         (Activity::Done, Some(report), _) => {
-            format!("{} · run {}", seconds(report.seconds), state.renders)
+            let time = seconds(report.seconds);
+            vec![format!("{time} · run {}", state.renders), time]
         }
-        (Activity::Waiting, _, _) => "for the file to be whole".to_owned(),
-        (Activity::Broken, _, _) => errors(state),
-        (Activity::Done | Activity::Cancelled, _, _) => String::new(),
+        (Activity::Waiting, _, _) => vec!["for the file to be whole".to_owned()],
+        (Activity::Broken, _, _) => vec![errors(state)],
+        (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
     }
 }
 

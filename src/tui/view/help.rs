@@ -4,6 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::widgets::{Block, BorderType, Clear, Widget};
 
+use super::layout::Layout;
 use super::text::{Tone, columns, put, row, wrapped};
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 use crate::tui::state::State;
@@ -29,6 +30,11 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         title = format!(" keys {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
+    // Lines of words that it covers in part would be cut without a mark.
+    let Layout { header, under, .. } = Layout::of(state);
+    for line in [header, under].into_iter().filter(|line| line.intersects(area)) {
+        Clear.render(line.intersection(buffer.area), buffer);
+    }
     if inner != area {
         let border = Tone::Faint.style(state.depth);
         let title_style = Tone::Strong.style(state.depth);

@@ -12,7 +12,7 @@ use crate::scene::description::Integrator;
 use crate::scene::report::summary;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
-use crate::tui::state::{Activity, State};
+use crate::tui::state::{Activity, State, Toggles};
 
 /// A key, and what is said of it in full and in short.
 struct Hint {
@@ -129,19 +129,28 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         of.map(|it| Hint::new(it.label, it.hint)).collect()
     };
     let closing = || overlay(&[Overlay::Close]);
+    // The keys that scroll, where something is out of sight.
+    let scrolling = |last: usize, keys: &[Overlay]| if last > 0 { overlay(keys) } else { Vec::new() };
     if state.help.open {
-        return (overlay(&[Overlay::LineDown, Overlay::PageDown, Overlay::Close]), Vec::new());
+        let (_, last) = super::help::extent(state);
+        let lines = scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing());
+        return (lines.chain(scrolling(last, &[Overlay::PageDown])).collect(), Vec::new());
     }
     let mut urgent = Vec::new();
     if state.views.is_some() {
         urgent.extend([Hint::new("1-9", "choose")].into_iter().chain(closing()));
     } else if state.pane.open {
-        urgent.extend(overlay(&[Overlay::LineDown]).into_iter().chain(closing()));
+        let (_, last) = super::diagnostics::extent(state);
+        urgent.extend(scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(unseen(state));
     let named = |action, words| keymap::of(action).map(|it| Hint::new(it.label, words));
     if state.problems.is_some() || state.picked.is_some() {
         urgent.extend(named(Action::Edit, "edit"));
+    }
+    if state.history.is_open() {
+        urgent.extend(named(Action::BeforeAfter, "newest"));
+        urgent.extend(named(Action::OlderPicture, "older, newer"));
     }
     if state.toggles.camera.is_any() {
         urgent.extend(named(Action::KeepCamera, "keep"));
@@ -167,7 +176,11 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.is_running();
-    let others = KEYMAP.iter().filter(is_other).filter(is_idle).map(|it| Hint::new(it.label, it.hint));
+    // It is told above with what it takes back.
+    let is_of_use = state.toggles != Toggles::default() && state.changes().is_empty();
+    let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
+    let others =
+        KEYMAP.iter().filter(is_other).filter(is_idle).filter(is_back).map(|it| Hint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
 }
 

@@ -36,8 +36,8 @@ pub(super) const ENTRY_WIDTH: u16 = 26;
 const SIDE_HEIGHT: u16 = 4;
 /// The part of its cells that the picture keeps beside a panel; where it is less there is none.
 const KEPT: f32 = 0.9;
-/// A panel from this size on holds errors as well.
-const TEXT_SIZE: (u16, u16) = (44, 8);
+/// A panel from one of these sizes on holds errors as well: what is narrow has to be high.
+const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
 /// Rows of errors over the picture, if there are so many.
 const PANE_HEIGHT: u16 = 12;
 
@@ -78,8 +78,8 @@ impl Layout {
             Some(_) if is_alone => (rest, Rect::ZERO),
             Some(shape) => divided(rest, shape),
         };
-        let (width, height) = TEXT_SIZE;
-        let has_room = layout.panel.width >= width && layout.panel.height >= height;
+        let holds = |(width, height)| layout.panel.width >= width && layout.panel.height >= height;
+        let has_room = TEXT_SIZES.into_iter().any(holds);
         layout.pane = if has_room { layout.panel } else { lower_part(rest) };
         layout
     }

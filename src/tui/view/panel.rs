@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use super::layout::{ENTRY_WIDTH, Layout};
 use super::message;
 use super::stages::{self, Line};
-use super::text::{Tone, bytes, columns, gauge, percent, put, row, shortened, wrapped};
+use super::text::{Tone, bytes, columns, gauge, percent, put, row, share, shortened, wrapped};
 use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::scene::report::summary;
@@ -43,6 +43,10 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 fn lines(state: &State, width: u16) -> Vec<Line> {
     let is_done = matches!(state.activity, Activity::Done);
     let mut lines = inspected(state, width);
+    // The stages and results are not those of an older picture.
+    if state.history.is_open() {
+        return lines;
+    }
     // The stages of a broken scene are of nothing that is to be seen.
     if !is_done && !is_broken(state) {
         lines.extend(Stage::ALL.iter().map(|stage| stages::line(state, *stage, width)));
@@ -112,7 +116,7 @@ fn results(state: &State) -> Vec<Line> {
                 format!("{} to {}", samples.min, samples.max)
             },
         ));
-        lines.extend(report.image.error.map(|error| fact("noise", format!("{:.2} % in all", error * 100.0))));
+        lines.extend(report.image.error.map(|error| fact("noise", format!("{} in all", share(error)))));
         lines.extend(state.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
             // Tiles with as many samples as there may be are perhaps not there yet.
             let is_reached = samples.max < it.samples;

@@ -21,7 +21,8 @@ const LEAST_BAR: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
-    if message::is_said(state, layout) {
+    // What the newest picture took says nothing of an older one.
+    if message::is_said(state, layout) || state.history.is_open() {
         return;
     }
     match state.activity {
@@ -116,7 +117,8 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
         put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.depth);
         return;
     }
-    let used = put_right(buffer, free, &frame(state), Tone::Faint, state.depth);
+    let fitting = frame(state).into_iter().find(|words| columns(words) <= free.width);
+    let used = put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.depth);
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
     let seen = seen(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
     put_right(buffer, free, &seen, Tone::Faint, state.depth);
@@ -136,10 +138,12 @@ pub(super) fn hint(state: &State) -> String {
     format!("save {} and it is rendered again", visible(&name))
 }
 
-/// What the last picture took on its way: its size, and how long the terminal takes to answer.
-fn frame(state: &State) -> String {
-    let Some(frame) = state.frame else { return String::new() };
+/// What the last picture took on its way: its size, and how long the terminal takes to answer; in full and in short.
+fn frame(state: &State) -> Vec<String> {
+    let Some(frame) = state.frame else { return Vec::new() };
     let size = format!("{} kB", frame.bytes.div_ceil(1000));
-    let answer = frame.round_trip.map_or(String::new(), |time| format!(" {} ms", time.as_millis().max(1)));
-    size + &answer
+    match frame.round_trip.map(|time| time.as_millis().max(1)) {
+        Some(time) => vec![format!("{size} sent, answered in {time} ms"), format!("{size} {time} ms"), size],
+        None => vec![format!("{size} sent"), size],
+    }
 }

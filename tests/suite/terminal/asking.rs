@@ -39,7 +39,7 @@ fn the_crosshair_says_all_that_is_there() {
     let mut terminal = terminal(&folder, &centred(), &[]);
     terminal.press("\r");
     let place = format!("scene.toml:{}", line_of_ball());
-    for words in ["sphere \"apple\"", &place, "phong ball", "3 away", "at (", "L (", "n ("] {
+    for words in ["sphere \"apple\"", &place, "phong ball", "3 away", "at (", "radiance (", "normal ("] {
         terminal.wait_for(words);
     }
     // The next key takes it away; a click says what is elsewhere, which is the crosshair then.
