@@ -200,6 +200,7 @@ fn no_output_is_an_input_or_another_output() {
     let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
     desk.write("skin.toml", format!("{textured}\n[textures.skin]\nfile = \"skin.ppm\"\n"));
     symlink("box.toml", desk.path("link.csv")).expect("a link");
+    symlink("skin.ppm", desk.path("skin.csv")).expect("a link");
     for (line, words) in [
         (
             "box.toml --csv box.toml",
@@ -212,8 +213,8 @@ fn no_output_is_an_input_or_another_output() {
         ),
         ("box.toml --plot a.png", "cannot write a.png: the plot is an SVG; use a name that ends in .svg"),
         (
-            "skin.toml --csv skin.ppm",
-            "cannot write skin.ppm: it is a file that skin.toml is made of; name another file",
+            "skin.toml --csv skin.csv",
+            "cannot write skin.csv: it is a file that skin.toml is made of; name another file",
         ),
     ] {
         let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
@@ -222,6 +223,21 @@ fn no_output_is_an_input_or_another_output() {
     assert_eq!(desk.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
     let (_, stderr) = bench(&desk, "box.toml --csv none/a.csv", 1);
     assert!(stderr.contains("the directory none does not exist"), "{stderr}");
+}
+
+#[test]
+fn nothing_is_said_of_a_picture_that_is_not_written() {
+    let desk = desk();
+    let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
+    // The picture that a render would write is the scene's texture, by its default name and by `output`.
+    for (name, output) in [("skin.toml", ""), ("other.toml", "output = \"skin.png\"\n")] {
+        let scene = textured.replace("[render]\n", &format!("[render]\n{output}"));
+        desk.write(name, format!("{scene}\n[textures.skin]\nfile = \"skin.png\"\n"));
+        image::RgbImage::new(2, 2).save(desk.path("skin.png")).expect("saved");
+        let line = "--samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
+        let (_, stderr) = bench(&desk, &format!("{name} {line}"), 0);
+        assert_eq!(stderr, "", "{name}");
+    }
 }
 
 #[test]

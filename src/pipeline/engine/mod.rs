@@ -148,7 +148,8 @@ impl Engine {
         let outcome = self.outcome(request, sink, meanwhile);
         let is_broken = matches!(outcome, Err(Stop::Failed(Failure::Scene(_))));
         sink.send(match outcome {
-            Ok(Outcome { report, warnings, unchanged }) => {
+            Ok(Outcome { report, conflicts, warnings, unchanged }) => {
+                let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
             Err(Stop::Cancelled) => Event::Cancelled { generation },
@@ -195,8 +196,8 @@ impl Engine {
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
         let unchanged = shown(self) == before && settled(Stage::Render) && settled(Stage::Write);
-        let warnings = [findings.conflicts, findings.warnings].concat();
-        Ok(Outcome { report, warnings, unchanged })
+        let Findings { conflicts, warnings, .. } = findings;
+        Ok(Outcome { report, conflicts, warnings, unchanged })
     }
 
     /// Show the picture as it is at another size, outside of a request.
