@@ -281,6 +281,33 @@ fn names(desk: &Desk) -> Vec<String> {
 }
 
 #[test]
+fn a_dash_is_standard_output_where_that_is_free() {
+    let desk = Desk::new();
+    let output = desk.run("ball.toml --once --report - --progress none");
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), b"".as_slice()));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(report["image"]["path"], "ball.png");
+    for (call, words) in [
+        (
+            "ball.toml --report -",
+            "--report - is standard output, which has the picture: name a file, or use --once",
+        ),
+        ("ball.toml --once -o -", "cannot write -: it has no ending that says its format"),
+        ("bench ball.toml --csv -", "--csv - is standard output, which has the tables: name a file"),
+        ("bench ball.toml --json -", "--json - is standard output, which has the tables: name a file"),
+        ("bench ball.toml --plot -", "use a name that ends in .svg"),
+        ("compare ball.png ball.png --diff -", "cannot write -: it has no ending that says its format"),
+    ] {
+        let stderr = desk.expect(call, 2);
+        assert!(stderr.contains(words), "{call}: {stderr}");
+    }
+    assert_eq!(names(&desk), ["ball.png", "ball.toml"]);
+    // By its path it is a file like others.
+    desk.expect("ball.toml --once --report ./-", 0);
+    assert!(desk.bytes("-").starts_with(b"{"));
+}
+
+#[test]
 fn help_fits_and_names_every_option() {
     let desk = Desk::new();
     for line in ["--help", "-h", "check --help", "new --help"] {

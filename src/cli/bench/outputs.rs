@@ -7,6 +7,7 @@ use crate::bench::{Results, csv, plot};
 use crate::cli::args::BenchArgs;
 use crate::cli::console::Console;
 use crate::cli::exit::Exit;
+use crate::cli::lower::STANDARD;
 use crate::control::CancelToken;
 use crate::output::write::{self, Guard};
 use crate::output::{self, FileIdentity, OutputError};
@@ -54,6 +55,11 @@ impl Outputs {
     fn check(&self, index: usize, path: &Path, kind: Kind) -> Result<(), OutputError> {
         self.may_replace(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+        if path == Path::new(STANDARD) && !matches!(kind, Kind::Plot) {
+            let (option, ..) = self.files[index];
+            let reason = format!("{option} {STANDARD} is standard output, which has the tables: name a file");
+            return Err(OutputError::Refused { reason });
+        }
         if matches!(kind, Kind::Plot) && !is_svg {
             let reason =
                 format!("cannot write {}: the plot is an SVG; use a name that ends in .svg", path.display());
