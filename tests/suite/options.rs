@@ -308,6 +308,46 @@ fn a_dash_is_standard_output_where_that_is_free() {
 }
 
 #[test]
+fn results_that_cannot_be_written_are_told_and_a_reader_that_has_enough_is_not() {
+    let desk = Desk::new();
+    for seed in [1, 2] {
+        desk.expect(&format!("ball.toml --once --progress none --seed {seed} -o {seed}.exr"), 0);
+    }
+    let bench = "bench ball.toml --samples 1 --reference-samples 4 --seeds 1 --no-cache --integrator path --progress none";
+    for line in [
+        "new -",
+        "check ball.toml",
+        "compare 1.exr 2.exr",
+        "compare 1.exr 2.exr --json",
+        bench,
+        "--help",
+        "--version",
+        "check --help",
+        "ball.toml --once --progress none --report -",
+    ] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("a device");
+        let output = desk.glimt(line).stdout(full).output().expect("it runs");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
+        assert!(
+            stderr.contains("no space left on device") && stderr.lines().count() == 1,
+            "{line}: {stderr}"
+        );
+        let mut process = desk.glimt(line);
+        let mut child = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        let is_report = line.contains("--report");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(
+            (output.status.code(), stderr.is_empty()),
+            (Some(i32::from(is_report)), !is_report),
+            "{line}: {stderr}"
+        );
+    }
+}
+
+#[test]
 fn help_fits_and_names_every_option() {
     let desk = Desk::new();
     for line in ["--help", "-h", "check --help", "new --help"] {
