@@ -21,9 +21,10 @@ pub(super) use self::orders::{Meanwhile, Orders};
 use self::outcome::Outcome;
 use self::unfinished::Unfinished;
 use super::cache::{Memo, Pool};
+use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
-use super::plan::{Plan, cores, plan, warnings};
+use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
 use super::settings::Overrides;
@@ -285,9 +286,8 @@ impl Engine {
         })?;
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-        for warning in warnings(&plan.scene, &plan.settings) {
-            findings.warn(&parsed.loaded, 0..0, warning);
-        }
+        let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
+        findings.warnings.extend(cautions);
         let eye = Eye::new(&plan.scene, parsed.orbiter, &request.overrides.camera);
         let (settings, camera) = (Box::new(plan.effective.clone()), eye.viewpoint());
         table.sink.send(Event::Settings { generation: request.generation, settings, camera });
@@ -441,11 +441,10 @@ impl Engine {
             let mut wanted = needed(loaded, &found);
             add_declared(loaded, &mut wanted);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
-            let plan = plan(&loaded.scene, path, &Overrides::default())
+            let overrides = Overrides::default();
+            let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-            for warning in warnings(&plan.scene, &plan.settings) {
-                findings.warn(loaded, 0..0, warning);
-            }
+            findings.warnings.extend(cautions(loaded, &plan.scene, &plan.settings, &overrides));
             if plan.named_by == NamedBy::Scene {
                 let inputs = inputs(&parsed, &found, &findings);
                 findings.errors.extend(conflicts(&plan, &inputs));
