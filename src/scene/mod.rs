@@ -146,6 +146,11 @@ pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     document::lower(&Source::file(text), path)
 }
 
+/// Whether a file is a mesh by its name.
+pub fn is_mesh(path: &Path) -> bool {
+    document::is_mesh(path)
+}
+
 /// The commented scene that a new file starts with.
 pub fn starter() -> &'static str {
     include_str!("starter.toml")

@@ -267,7 +267,8 @@ fn targets_are_told_before_the_work() {
         assert!(stderr.contains(words), "{option}: {stderr}");
     }
     let stderr = desk.expect("new nowhere/x.toml", 1);
-    assert!(stderr.contains("cannot write nowhere/x.toml: no such file or directory;"), "{stderr}");
+    let words = "cannot write nowhere/x.toml: the directory nowhere does not exist; create it or choose another place";
+    assert!(stderr.contains(words), "{stderr}");
     assert_eq!(names(&desk), ["ball.toml", "full.png"]);
 }
 
@@ -278,6 +279,26 @@ fn names(desk: &Desk) -> Vec<String> {
         entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
     names.sort();
     names
+}
+
+#[test]
+fn a_new_scene_is_named_like_one() {
+    let desk = Desk::new();
+    for (name, what) in [
+        ("a.png", "a picture"),
+        ("a.EXR", "a picture"),
+        ("a.webp", "a picture"),
+        ("a.obj", "a mesh"),
+        ("a.glb", "a mesh"),
+    ] {
+        let stderr = desk.expect(&format!("new {name}"), 2);
+        let words = format!("error: {name} is the name of {what}; scenes end in .toml: glimt new a.toml\n");
+        assert_eq!(stderr, words);
+    }
+    assert_eq!(names(&desk), ["ball.toml"]);
+    for name in ["a.toml", "b", "c.scene", "d.TOML"] {
+        desk.expect(&format!("new {name}"), 0);
+    }
 }
 
 #[test]
