@@ -52,6 +52,11 @@ impl Console {
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
     }
 
+    /// Lines on stderr, one after the other.
+    pub(super) fn say_lines(&self, text: &str) {
+        text.trim_end().lines().for_each(|line| self.say(line));
+    }
+
     /// A line on stdout.
     pub(super) fn answer(&self, text: &str) {
         self.text(&format!("{}\n", visible(text)));

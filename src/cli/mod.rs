@@ -70,7 +70,7 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
         Err(error) if error.use_stderr() => {
             let _ = error.print();
         }
-        _ => console.say(&error.render().to_string()),
+        _ => console.say_lines(&error.render().to_string()),
     }
     Exit::WRONG
 }

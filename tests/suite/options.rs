@@ -302,6 +302,19 @@ fn a_new_scene_is_named_like_one() {
 }
 
 #[test]
+fn a_usage_error_keeps_its_lines_whatever_was_typed() {
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    let mut process = desk.glimt("ball.toml --once --set");
+    process.arg(std::ffi::OsStr::from_bytes(b"\xff\x1b[2J=3"));
+    let output = process.output().expect("it runs");
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr.lines().count() > 2 && stderr.contains("\nUsage: ") && !stderr.contains('␊'), "{stderr}");
+    assert!(stderr.chars().all(|one| !one.is_control() || one == '\n'), "{stderr:?}");
+}
+
+#[test]
 fn a_dash_is_standard_output_where_that_is_free() {
     let desk = Desk::new();
     let output = desk.run("ball.toml --once --report - --progress none");
