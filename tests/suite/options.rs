@@ -315,6 +315,31 @@ fn a_usage_error_keeps_its_lines_whatever_was_typed() {
 }
 
 #[test]
+fn a_word_that_is_no_file_is_taken_for_a_command() {
+    let desk = Desk::new();
+    for (call, words) in [
+        (
+            "schema",
+            "there is no command \"schema\", nor a scene of that name: there are check, new, compare, bench",
+        ),
+        ("man", "there is no command \"man\", nor a scene of that name"),
+        ("merge out.png a.png b.png", "there is no command \"merge\", nor a scene of that name"),
+        ("completions zsh", "there is no command \"completions\", nor a scene of that name"),
+        ("chek --once", "did you mean `check`?"),
+        ("--once compar", "did you mean `compare`?"),
+    ] {
+        let stderr = desk.expect(call, 2);
+        assert!(stderr.contains(words) && stderr.lines().count() == 1, "{call}: {stderr}");
+    }
+    // What may be a file is one that is not there.
+    for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
+        assert!(desk.expect(call, 2).contains("there is no such scene file"), "{call}");
+    }
+    desk.write("schema", SCENE);
+    desk.expect("schema --once -o a.png", 0);
+}
+
+#[test]
 fn a_dash_is_standard_output_where_that_is_free() {
     let desk = Desk::new();
     let output = desk.run("ball.toml --once --report - --progress none");
