@@ -221,8 +221,39 @@ fn no_output_is_an_input_or_another_output() {
         assert!(stderr.starts_with(&format!("error: {words}")), "{stderr}");
     }
     assert_eq!(desk.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
+    // The name of the file is forgotten: what stands next is taken for it.
+    for (line, words) in [
+        (
+            "--csv ball.toml",
+            "it is there already and no table, such as a.csv; name another file with --csv FILE",
+        ),
+        (
+            "--json ball.toml box.toml",
+            "it is there already and holds no results, such as a.json; name another",
+        ),
+    ] {
+        let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
+        assert!(stderr.starts_with("error: cannot write ball.toml: ") && stderr.contains(words), "{stderr}");
+    }
+    assert_eq!(desk.bytes("ball.toml"), super::desk::SCENE.as_bytes());
     let (_, stderr) = bench(&desk, "box.toml --csv none/a.csv", 1);
     assert!(stderr.contains("the directory none does not exist"), "{stderr}");
+}
+
+#[test]
+fn a_file_that_cannot_be_written_does_not_cost_the_others() {
+    let desk = desk();
+    symlink("/dev/full", desk.path("full.csv")).expect("a link");
+    let line =
+        "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
+    let (_, stderr) = bench(&desk, &format!("{line} --csv full.csv --json a.json --plot a.svg"), 1);
+    assert!(stderr.starts_with("error: cannot write full.csv: no space left on device"), "{stderr}");
+    assert!(stderr.lines().count() == 1 && errors(&json(&desk, "a.json")).len() == 1, "{stderr}");
+    assert!(desk.path("a.svg").is_file());
+    // Results take the place of results, whatever they are called.
+    for _ in 0..2 {
+        bench(&desk, &format!("{line} --json results --csv table"), 0);
+    }
 }
 
 #[test]
