@@ -2,7 +2,8 @@
 
 use super::results::Results;
 
-const HEAD: &str =
+/// The first line, with its end.
+pub const HEAD: &str =
     "scene,width,height,method,step,seed,samples,seconds,setup_seconds,relmse,reference_noise\r\n";
 
 /// The text of the file.

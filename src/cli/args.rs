@@ -156,7 +156,7 @@ pub struct RenderArgs {
     /// Bits per channel of PNG files: 8 or 16
     #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = bit_depth, help_heading = "Output")]
     pub bit_depth: Option<u8>,
-    /// Write settings, timings and counters of the render as JSON
+    /// Write settings, timings and counters of the render as JSON; with --once, - is stdout
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub report: Option<PathBuf>,
 

@@ -9,6 +9,7 @@ use super::exit::Exit;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::{Style, render};
 use crate::scene::sanitize::visible;
+use crate::system::in_words;
 use crate::tui::ColorChoice;
 
 /// The two streams.
@@ -51,6 +52,11 @@ impl Console {
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
     }
 
+    /// Lines on stderr, one after the other.
+    pub(super) fn say_lines(&self, text: &str) {
+        text.trim_end().lines().for_each(|line| self.say(line));
+    }
+
     /// A line on stdout.
     pub(super) fn answer(&self, text: &str) {
         self.text(&format!("{}\n", visible(text)));
@@ -74,9 +80,8 @@ impl Console {
     /// How the program ends: it failed where an answer did not get through.
     pub(super) fn end(&self, exit: Exit) -> Exit {
         match self.lost.take() {
-            Some(error) if exit == Exit::DONE => {
-                self.fail(Exit::FAILED, &format!("the answer cannot be written to stdout: {error}"))
-            }
+            Some(error) if exit == Exit::DONE => self
+                .fail(Exit::FAILED, &format!("the answer cannot be written to stdout: {}", in_words(&error))),
             Some(_) | None => exit,
         }
     }

@@ -9,9 +9,10 @@ use super::exit::Exit;
 use super::lower::Order;
 use crate::pipeline::protocol::{Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
-use crate::pipeline::watch::Watcher;
+use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::NO_SUCH_FILE;
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::sanitize::visible;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
 /// How long the end waits for a picture that is being written, after a signal; after a key until a person is told what it waits for.
@@ -194,7 +195,13 @@ fn await_scene(problem: &mut Diagnostic) {
     if problem.message == NO_SUCH_FILE {
         let typo = problem.help.take().filter(|help| help.starts_with("did you mean"));
         let typo = typo.map_or(String::new(), |typo| format!("; {typo}"));
-        problem.help = Some(format!("it is rendered as soon as it is there{typo}"));
+        problem.help = Some(match missing_folder(&problem.path) {
+            Some(folder) => format!(
+                "the folder {} is not there; the scene is rendered as soon as both are{typo}",
+                visible(&folder.to_string_lossy())
+            ),
+            None => format!("it is rendered as soon as it is there{typo}"),
+        });
     }
 }
 
@@ -214,6 +221,12 @@ mod tests {
             problem.help.expect("a way out")
         };
         assert_eq!(said("room.toml"), "it is rendered as soon as it is there");
+        let name = "gone/room.toml";
+        assert!(
+            said(name).ends_with("/gone is not there; the scene is rendered as soon as both are"),
+            "{}",
+            said(name)
+        );
         std::fs::write(folder.path().join("rooms.toml"), "").expect("written");
         assert!(said("room.toml").contains("as soon as it is there; did you mean"));
         std::fs::write(folder.path().join("room.toml"), "").expect("written");

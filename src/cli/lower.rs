@@ -1,11 +1,14 @@
 //! From what was typed to what it means.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::args::{Progress, RenderArgs};
 use crate::output::Format;
 use crate::pipeline::settings::Overrides;
 use crate::tui::{ColorChoice, PreviewChoice};
+
+/// Standard output, where it stands for a file.
+pub(super) const STANDARD: &str = "-";
 
 /// What is to be done.
 #[derive(Clone, Debug)]
@@ -25,7 +28,14 @@ pub(super) struct Order {
 /// What is wrong with them, in words with the way out.
 pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     check_outputs(&args.outputs)?;
-    let overrides = args.overrides();
+    let mut overrides = args.overrides();
+    if overrides.report.as_deref() == Some(Path::new(STANDARD)) {
+        if !args.once {
+            let why = "which has the picture: name a file, or use --once";
+            return Err(format!("--report {STANDARD} is standard output, {why}"));
+        }
+        overrides.report = Some("/dev/stdout".into());
+    }
     let scene = args.scene.ok_or("no scene is given; see glimt --help")?;
     Ok(Order {
         scene,

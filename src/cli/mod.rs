@@ -42,8 +42,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         Some(Subcommand::Bench(args)) => bench::run(&args, &console),
         None => match lower::lower(args.render) {
-            Ok(order) if order.is_once => once::run(&order, &console),
-            Ok(order) => live::run(order, &console),
+            Ok(order) => match no_command(&order.scene) {
+                Some(message) => console.fail(Exit::WRONG, &message),
+                None if order.is_once => once::run(&order, &console),
+                None => live::run(order, &console),
+            },
             Err(message) => console.fail(Exit::WRONG, &message),
         },
     };
@@ -70,16 +73,20 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
         Err(error) if error.use_stderr() => {
             let _ = error.print();
         }
-        _ => console.say(&error.render().to_string()),
+        _ => console.say_lines(&error.render().to_string()),
     }
     Exit::WRONG
 }
 
 /// What is said of a first word that is neither a file nor looks like one: a command was meant.
 fn unknown_command(arguments: &[OsString]) -> Option<String> {
-    let first =
-        arguments.iter().skip(1).map(|word| word.to_string_lossy()).find(|word| !word.starts_with('-'))?;
-    if first.contains(['.', '/']) || Path::new(first.as_ref()).exists() {
+    no_command(Path::new(arguments.iter().skip(1).find(|word| !word.to_string_lossy().starts_with('-'))?))
+}
+
+/// The same of a word where a scene stands.
+fn no_command(word: &Path) -> Option<String> {
+    let first = word.to_string_lossy();
+    if first.contains(['.', '/']) || first.starts_with('-') || word.symlink_metadata().is_ok() {
         return None;
     }
     let commands = <Args as clap::CommandFactory>::command();

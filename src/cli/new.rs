@@ -6,13 +6,16 @@ use std::path::Path;
 
 use super::console::Console;
 use super::exit::Exit;
-use crate::output::{FileIdentity, OutputError};
-use crate::scene::starter;
+use crate::output::{self, FileIdentity, Format, OutputError};
+use crate::scene::{is_mesh, starter};
 
 pub(super) fn run(file: &Path, console: &Console) -> Exit {
     if file == Path::new("-") {
         console.text(starter());
         return Exit::DONE;
+    }
+    if let Some(message) = misnamed(file) {
+        return console.fail(Exit::WRONG, &message);
     }
     let name = file.display();
     match create(file, starter().as_bytes()) {
@@ -29,9 +32,34 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
             console.fail(Exit::WRONG, &format!("{name} {what}, and is left as it is"))
         }
         Err(source) => {
-            let error = OutputError::File { path: file.to_owned(), source };
+            // Whoever can say more of the place comes first.
+            let of_place = output::check_place(file).err();
+            let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
             console.fail(Exit::FAILED, &error.to_string())
         }
+    }
+}
+
+/// What is said of a name that a picture or a mesh has: nobody would find the scene in it, and a render writes pictures.
+fn misnamed(file: &Path) -> Option<String> {
+    let what = match () {
+        () if is_mesh(file) => "a mesh",
+        () if is_picture(file) => "a picture",
+        () => return None,
+    };
+    let scene = file.with_extension("toml");
+    Some(format!(
+        "{} is the name of {what}; scenes end in .toml: glimt new {}",
+        file.display(),
+        scene.display()
+    ))
+}
+
+/// Whether a name is that of a picture, of a format that glimt writes or will.
+fn is_picture(file: &Path) -> bool {
+    match Format::of(file) {
+        Ok(_) | Err(OutputError::NotAvailable { .. }) => true,
+        Err(_) => false,
     }
 }
 

@@ -23,7 +23,7 @@ pub use error::OutputError;
 pub use exr::mean_luminance_error;
 pub use format::{BitDepth, Format};
 pub use identity::FileIdentity;
-pub use origin::{holds_foreign_picture, holds_foreign_report};
+pub use origin::{holds_foreign_picture, holds_foreign_report, holds_foreign_table};
 
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
@@ -74,23 +74,24 @@ pub fn encode(
     bytes
 }
 
-/// Whether a picture can be written here, as far as can be told without writing: told before the work rather than
-/// after it. Gives the format that the ending names.
+/// Whether a picture can be written here, as far as can be told before the work rather than after it. Leaves nothing
+/// behind. Gives the format that the ending names.
 ///
 /// # Errors
-/// An ending that names no format; a missing directory; a target that is a directory or that may not be written.
+/// An ending that names no format; a directory that is missing or takes no files; a target that is a directory or that may
+/// not be written.
 pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::of(path)?;
-    place::find(path)?;
+    place::check(path)?;
     Ok(format)
 }
 
-/// Whether any file can be written here, as far as can be told without writing.
+/// Whether any file can be written here, as far as can be told before the work.
 ///
 /// # Errors
 /// As [`check_target`], but for the ending.
 pub fn check_place(path: &Path) -> Result<(), OutputError> {
-    place::find(path).map(|_| ())
+    place::check(path)
 }
 
 /// A component as float files hold it: the light of a picture is neither negative nor infinite.

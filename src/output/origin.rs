@@ -21,8 +21,22 @@ pub fn holds_foreign_picture(path: &Path) -> bool {
 /// Whether a file is there that would be replaced and is nothing that a report may replace: an earlier report, an empty
 /// file, any file that ends in `.json`.
 pub fn holds_foreign_report(path: &Path) -> bool {
-    let is_json = |path: &Path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    !is_json(path) && replaced(path).is_some_and(|file| !file.is_some_and(is_own_report))
+    !has_ending(path, "json") && replaced(path).is_some_and(|file| !file.is_some_and(is_own_report))
+}
+
+/// Whether a file is there that would be replaced and is no table: neither empty, nor with this first line, nor one that
+/// ends in `.csv`.
+pub fn holds_foreign_table(path: &Path, first_line: &str) -> bool {
+    let is_own = |file: File| {
+        let mut start = Vec::new();
+        let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
+        is_read && (start.is_empty() || start == first_line.as_bytes())
+    };
+    !has_ending(path, "csv") && replaced(path).is_some_and(|file| !file.is_some_and(is_own))
+}
+
+fn has_ending(path: &Path, wanted: &str) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
 }
 
 /// The regular file that a write would replace, open if it can be read.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::unistd::{AccessFlags, access};
 
-use super::OutputError;
+use super::{OutputError, temporary};
 
 /// As many links as Linux follows.
 const LINKS: usize = 40;
@@ -47,6 +47,25 @@ pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
         (target, None) => new_file(path, target),
         (_, Some(metadata)) if metadata.is_symlink() => Ok(Place::InPlace(path.to_owned())),
         (target, Some(metadata)) => existing(path, target, metadata),
+    }
+}
+
+/// [`find`] before the work: also whether the directory takes a file at all.
+pub(super) fn check(path: &Path) -> Result<(), OutputError> {
+    match find(path)? {
+        Place::File(target) => {
+            let directory = target.directory();
+            temporary::probe(directory).map_err(|error| match error.kind() {
+                // It was there a moment ago: this is how /proc says it.
+                ErrorKind::NotFound if directory.is_dir() => OutputError::Target {
+                    path: path.to_owned(),
+                    why: format!("the directory {} takes no files", directory.display()),
+                    way_out: "choose another place",
+                },
+                _ => OutputError::file(path, error),
+            })
+        }
+        Place::InPlace(_) => Ok(()),
     }
 }
 

@@ -69,6 +69,25 @@ impl Drop for Temporary {
     }
 }
 
+/// Whether a file can be made in a directory, found by making one that has no name, or where that is not possible, one that
+/// is removed at once: a directory may allow writing and take no files all the same, such as /proc.
+pub(super) fn probe(directory: &Path) -> io::Result<()> {
+    if nameless(directory).is_ok() {
+        return Ok(());
+    }
+    Temporary::create(directory, OsStr::new("probe"), 0o600).map(drop)
+}
+
+#[cfg(target_os = "linux")]
+fn nameless(directory: &Path) -> io::Result<()> {
+    OpenOptions::new().write(true).mode(0o600).custom_flags(OFlag::O_TMPFILE.bits()).open(directory).map(drop)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn nameless(_: &Path) -> io::Result<()> {
+    Err(ErrorKind::Unsupported.into())
+}
+
 /// Removes the temporary files that writers left in a directory when they were killed. Files of living writers are
 /// locked and stay, and so do those that are kept. What cannot be removed stays too: it is no reason not to write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
@@ -150,6 +169,16 @@ mod tests {
         remove_stale(directory.path(), &|_| false);
         assert!(living.path.exists() && other.exists());
         assert!(!stale.exists());
+    }
+
+    #[test]
+    fn a_probe_leaves_nothing() {
+        let directory = tempfile::tempdir().expect("a directory");
+        probe(directory.path()).expect("it takes files");
+        assert_eq!(fs::read_dir(directory.path()).expect("a directory").count(), 0);
+        assert!(probe(&directory.path().join("none")).is_err());
+        #[cfg(target_os = "linux")]
+        assert!(probe(Path::new("/proc")).is_err());
     }
 
     #[test]

@@ -7,6 +7,7 @@
 
 mod answers;
 mod cache;
+mod cautions;
 mod check;
 mod engine;
 mod errands;

@@ -11,7 +11,7 @@ use crate::film::{Quantity, Rect};
 use crate::integrators::{FirstHit, Measure, PhotonSettings, RenderSettings, Shown};
 use crate::math::Vec3;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Falloff, Integrator, Light, MaterialKind, Photons, Scene, Tonemap};
+use crate::scene::description::{Accel, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Everything that a request's later stages go by.
@@ -72,64 +72,12 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
 }
 
 /// Photons that a pass may send: what it stores must have room.
-const MOST_PHOTONS: u64 = 4_000_000;
+pub(super) const MOST_PHOTONS: u64 = 4_000_000;
 
 /// How photons are sent and gathered.
 fn photons(asked: &Photons) -> PhotonSettings {
     let Photons { enabled: _, count, radius, bounces } = *asked;
     PhotonSettings { count: count.clamp(1, MOST_PHOTONS) as u32, radius: radius as f32, bounces }
-}
-
-/// What a person should know of the integrator that was asked for.
-pub(super) fn warnings(scene: &Scene, settings: &RenderSettings) -> Vec<String> {
-    let RenderSettings { render, photons, .. } = &settings.heeded();
-    let is_path = match render.integrator {
-        Integrator::Path => true,
-        Integrator::Whitted => false,
-    };
-    let is_specular = |index: usize| match scene.materials[index].kind {
-        MaterialKind::Mirror { .. } | MaterialKind::Glass { .. } => true,
-        MaterialKind::Phong { .. } => false,
-    };
-    let specular = || scene.objects.iter().filter_map(|object| object.material).any(is_specular);
-    let mut warnings = Vec::new();
-    if is_path && !scene.lights.is_empty() && specular() {
-        warnings.push(
-            "path finds no light of a [[light]] without size that passes mirror or glass before it meets a surface: \
-             what they would throw on it stays dark"
-                .to_owned(),
-        );
-    }
-    if photons.is_some() && specular() && scene.lights.iter().any(is_steady) {
-        warnings.push(
-            "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces"
-                .to_owned(),
-        );
-    }
-    if photons.is_none() && settings.view == View::Photons {
-        warnings.push("the view `photons` shows nothing: photons are off, or `path` renders".to_owned());
-    }
-    if photons.is_some() && scene.photons.count > MOST_PHOTONS {
-        warnings.push(format!(
-            "a pass sends {MOST_PHOTONS} photons at most, for their memory: `count` is larger"
-        ));
-    }
-    if render.clamp > 0.0 {
-        warnings.push(format!(
-            "`clamp` {} makes the picture less noisy, but too dark: it is biased",
-            render.clamp
-        ));
-    }
-    warnings
-}
-
-/// Whether distance does not weaken a light.
-fn is_steady(light: &Light) -> bool {
-    match light {
-        Light::Point(light) => light.falloff == Falloff::None,
-        Light::Spot(light) => light.point.falloff == Falloff::None,
-        Light::Directional(_) => false,
-    }
 }
 
 /// A scene may be large: it is copied only where it has to be another one.

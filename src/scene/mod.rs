@@ -46,6 +46,19 @@ pub struct Loaded {
     pub warnings: Vec<Diagnostic>,
     /// Files that the scene file names, where the call sets anything: other ones may be read in their place.
     pub named: Vec<PathBuf>,
+    /// Where the values of settings stand.
+    pub settings: Vec<Setting>,
+}
+
+/// The place of a value in a table of settings.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setting {
+    /// The name of the table: `render` or `photons`.
+    pub table: &'static str,
+    /// The key.
+    pub key: String,
+    /// Bytes of the text, and of what the call sets.
+    pub span: Range<usize>,
 }
 
 /// The text of a scene file as it is now.
@@ -77,6 +90,12 @@ impl Loaded {
         before.bytes().filter(|byte| *byte == b'\n').count() + 1
     }
 
+    /// Where a setting gets its value: in the file or in what the call sets; none: nowhere.
+    pub fn setting(&self, table: &str, key: &str) -> Option<Range<usize>> {
+        let is_it = |setting: &&Setting| setting.table == table && setting.key == key;
+        self.settings.iter().find(is_it).map(|setting| setting.span.clone())
+    }
+
     /// A diagnostic at a place of this scene file, for what shows only later: a mesh without a usable face, a
     /// texture that does not decode.
     pub fn diagnostic_at(
@@ -98,6 +117,8 @@ pub struct Outcome {
     pub scene: Option<Scene>,
     /// Errors and warnings, in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
+    /// Where the values of settings stand.
+    pub settings: Vec<Setting>,
 }
 
 /// Reads and validates a scene file, with values in place of its own: texts of the form `TABLE.KEY=VALUE`.
@@ -108,11 +129,12 @@ pub struct Outcome {
 pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let text = read::text(path).map_err(|problem| vec![*problem])?;
     let source = Source::with_sets(text, sets)?;
-    let Outcome { scene, diagnostics } = document::lower(&source, path);
+    let Outcome { scene, diagnostics, settings } = document::lower(&source, path);
     match scene {
         Some(scene) => {
             let named = if sets.is_empty() { Vec::new() } else { document::named_files(source.text(), path) };
-            Ok(Loaded { scene: Arc::new(scene), source, path: path.to_owned(), warnings: diagnostics, named })
+            let (scene, path) = (Arc::new(scene), path.to_owned());
+            Ok(Loaded { scene, source, path, warnings: diagnostics, named, settings })
         }
         None => Err(diagnostics),
     }
@@ -122,6 +144,11 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
 /// searched for beside `path`, which names the scene in diagnostics and is not read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     document::lower(&Source::file(text), path)
+}
+
+/// Whether a file is a mesh by its name.
+pub fn is_mesh(path: &Path) -> bool {
+    document::is_mesh(path)
 }
 
 /// The commented scene that a new file starts with.

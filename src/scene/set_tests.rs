@@ -11,7 +11,7 @@ use super::{Outcome, Source, document, parse};
 fn with_sets(text: &str, sets: &[&str]) -> Result<Scene, Vec<Diagnostic>> {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     let source = Source::with_sets(format!("{text}\n{CAMERA}").into(), &sets)?;
-    let Outcome { scene, diagnostics } = document::lower(&source, Path::new("scene.toml"));
+    let Outcome { scene, diagnostics, .. } = document::lower(&source, Path::new("scene.toml"));
     scene.ok_or(diagnostics)
 }
 

@@ -130,6 +130,8 @@ pub(super) enum Signal {
     Quit,
     /// SIGHUP, or the terminal is gone without one.
     Hangup,
+    /// One that ends every program that does not know it, by its number.
+    Other(i32),
     /// SIGTSTP.
     Suspend,
     /// SIGCONT.

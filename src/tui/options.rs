@@ -72,6 +72,11 @@ impl ExitStatus {
     pub const INTERRUPTED: Self = Self(130);
     /// SIGTERM.
     pub const TERMINATED: Self = Self(143);
+
+    /// A signal of this number.
+    pub fn signal(number: i32) -> Self {
+        Self(u8::try_from(128 + number).unwrap_or(1))
+    }
 }
 
 /// How the front end ended.

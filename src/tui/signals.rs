@@ -12,7 +12,10 @@ use std::time::Duration;
 
 use nix::sys::signal::{Signal as Number, kill};
 use nix::unistd::{Pid, getpid, getppid, getsid};
-use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};
+use signal_hook::consts::{
+    SIGALRM, SIGCONT, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM,
+    SIGWINCH, SIGXCPU,
+};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level;
 
@@ -27,6 +30,11 @@ const RESCUE: Duration = Duration::from_millis(100);
 /// How often the terminal is looked at.
 const WATCH: Duration = Duration::from_millis(500);
 
+/// Those that mean something to the front end.
+const MEANT: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
+/// Those that mean nothing to it and end a program all the same: the terminal is given back before that.
+const OTHERS: [i32; 7] = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO];
+
 /// Hears signals until it is dropped; after that they do what they do by default.
 pub(super) struct Listener {
     over: Arc<AtomicBool>,
@@ -36,7 +44,7 @@ impl Listener {
     /// Starts to listen; what is heard goes to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
-        let mut signals = Signals::new([SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH])?;
+        let mut signals = Signals::new(MEANT.iter().chain(&OTHERS))?;
         let ear = Ear { over: Arc::clone(&over), events: events.clone() };
         thread::Builder::new().name("signals".to_owned()).spawn(move || {
             for number in signals.forever() {
@@ -95,6 +103,7 @@ impl Ear {
             SIGHUP => Signal::Hangup,
             SIGTSTP => Signal::Suspend,
             SIGWINCH => Signal::Resize,
+            other if OTHERS.contains(&other) => Signal::Other(other),
             _ => Signal::Continue,
         };
         self.tell(signal);
@@ -127,6 +136,7 @@ fn ends(signal: Signal) -> Option<ExitStatus> {
         Signal::Terminate => Some(ExitStatus::TERMINATED),
         Signal::Quit => Some(ExitStatus::ABORTED),
         Signal::Hangup => Some(ExitStatus::HANGUP),
+        Signal::Other(number) => Some(ExitStatus::signal(number)),
         Signal::Suspend | Signal::Continue | Signal::Resize => None,
     }
 }
@@ -174,6 +184,7 @@ mod tests {
         assert_eq!(ends(Signal::Terminate), Some(ExitStatus(143)));
         assert_eq!(ends(Signal::Quit), Some(ExitStatus(131)));
         assert_eq!(ends(Signal::Hangup), Some(ExitStatus(129)));
+        assert_eq!(ends(Signal::Other(SIGUSR1)), Some(ExitStatus(128 + SIGUSR1 as u8)));
         assert_eq!(ends(Signal::Suspend), None);
         assert_eq!(ends(Signal::Continue), None);
         assert_eq!(ends(Signal::Resize), None);

@@ -200,6 +200,7 @@ fn no_output_is_an_input_or_another_output() {
     let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
     desk.write("skin.toml", format!("{textured}\n[textures.skin]\nfile = \"skin.ppm\"\n"));
     symlink("box.toml", desk.path("link.csv")).expect("a link");
+    symlink("skin.ppm", desk.path("skin.csv")).expect("a link");
     for (line, words) in [
         (
             "box.toml --csv box.toml",
@@ -212,16 +213,62 @@ fn no_output_is_an_input_or_another_output() {
         ),
         ("box.toml --plot a.png", "cannot write a.png: the plot is an SVG; use a name that ends in .svg"),
         (
-            "skin.toml --csv skin.ppm",
-            "cannot write skin.ppm: it is a file that skin.toml is made of; name another file",
+            "skin.toml --csv skin.csv",
+            "cannot write skin.csv: it is a file that skin.toml is made of; name another file",
         ),
     ] {
         let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
         assert!(stderr.starts_with(&format!("error: {words}")), "{stderr}");
     }
     assert_eq!(desk.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
+    // The name of the file is forgotten: what stands next is taken for it.
+    for (line, words) in [
+        (
+            "--csv ball.toml",
+            "it is there already and no table, such as a.csv; name another file with --csv FILE",
+        ),
+        (
+            "--json ball.toml box.toml",
+            "it is there already and holds no results, such as a.json; name another",
+        ),
+    ] {
+        let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
+        assert!(stderr.starts_with("error: cannot write ball.toml: ") && stderr.contains(words), "{stderr}");
+    }
+    assert_eq!(desk.bytes("ball.toml"), super::desk::SCENE.as_bytes());
     let (_, stderr) = bench(&desk, "box.toml --csv none/a.csv", 1);
     assert!(stderr.contains("the directory none does not exist"), "{stderr}");
+}
+
+#[test]
+fn a_file_that_cannot_be_written_does_not_cost_the_others() {
+    let desk = desk();
+    symlink("/dev/full", desk.path("full.csv")).expect("a link");
+    let line =
+        "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
+    let (_, stderr) = bench(&desk, &format!("{line} --csv full.csv --json a.json --plot a.svg"), 1);
+    assert!(stderr.starts_with("error: cannot write full.csv: no space left on device"), "{stderr}");
+    assert!(stderr.lines().count() == 1 && errors(&json(&desk, "a.json")).len() == 1, "{stderr}");
+    assert!(desk.path("a.svg").is_file());
+    // Results take the place of results, whatever they are called.
+    for _ in 0..2 {
+        bench(&desk, &format!("{line} --json results --csv table"), 0);
+    }
+}
+
+#[test]
+fn nothing_is_said_of_a_picture_that_is_not_written() {
+    let desk = desk();
+    let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
+    // The picture that a render would write is the scene's texture, by its default name and by `output`.
+    for (name, output) in [("skin.toml", ""), ("other.toml", "output = \"skin.png\"\n")] {
+        let scene = textured.replace("[render]\n", &format!("[render]\n{output}"));
+        desk.write(name, format!("{scene}\n[textures.skin]\nfile = \"skin.png\"\n"));
+        image::RgbImage::new(2, 2).save(desk.path("skin.png")).expect("saved");
+        let line = "--samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
+        let (_, stderr) = bench(&desk, &format!("{name} {line}"), 0);
+        assert_eq!(stderr, "", "{name}");
+    }
 }
 
 #[test]

@@ -256,8 +256,154 @@ fn targets_are_told_before_the_work() {
         let stderr = desk.expect(&format!("ball.toml --once --samples 4000000000 {option}"), 1);
         assert!(stderr.contains("cannot write") && !stderr.contains("os error"), "{option}: {stderr}");
     }
+    let long = format!("-o {}.png", "n".repeat(300));
+    let stderr = desk.expect(&format!("ball.toml --once --samples 4000000000 {long}"), 1);
+    assert!(stderr.contains("choose a shorter name"), "{stderr}");
+    #[cfg(target_os = "linux")]
+    for option in ["-o /proc/a.png", "-o /sys/a.png", "--report /proc/r.json", "--report /sys/r.json"] {
+        let stderr = desk.expect(&format!("ball.toml --once --samples 4000000000 {option}"), 1);
+        let words =
+            if option.contains("/proc") { "the directory /proc takes no files" } else { "permission denied" };
+        assert!(stderr.contains(words), "{option}: {stderr}");
+    }
     let stderr = desk.expect("new nowhere/x.toml", 1);
-    assert!(stderr.contains("cannot write nowhere/x.toml: no such file or directory;"), "{stderr}");
+    let words = "cannot write nowhere/x.toml: the directory nowhere does not exist; create it or choose another place";
+    assert!(stderr.contains(words), "{stderr}");
+    assert_eq!(names(&desk), ["ball.toml", "full.png"]);
+}
+
+/// What lies in the folder, sorted.
+fn names(desk: &Desk) -> Vec<String> {
+    let entries = fs::read_dir(desk.0.path()).expect("a folder");
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_new_scene_is_named_like_one() {
+    let desk = Desk::new();
+    for (name, what) in [
+        ("a.png", "a picture"),
+        ("a.EXR", "a picture"),
+        ("a.webp", "a picture"),
+        ("a.obj", "a mesh"),
+        ("a.glb", "a mesh"),
+    ] {
+        let stderr = desk.expect(&format!("new {name}"), 2);
+        let words = format!("error: {name} is the name of {what}; scenes end in .toml: glimt new a.toml\n");
+        assert_eq!(stderr, words);
+    }
+    assert_eq!(names(&desk), ["ball.toml"]);
+    for name in ["a.toml", "b", "c.scene", "d.TOML"] {
+        desk.expect(&format!("new {name}"), 0);
+    }
+}
+
+#[test]
+fn a_usage_error_keeps_its_lines_whatever_was_typed() {
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    let mut process = desk.glimt("ball.toml --once --set");
+    process.arg(std::ffi::OsStr::from_bytes(b"\xff\x1b[2J=3"));
+    let output = process.output().expect("it runs");
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr.lines().count() > 2 && stderr.contains("\nUsage: ") && !stderr.contains('␊'), "{stderr}");
+    assert!(stderr.chars().all(|one| !one.is_control() || one == '\n'), "{stderr:?}");
+}
+
+#[test]
+fn a_word_that_is_no_file_is_taken_for_a_command() {
+    let desk = Desk::new();
+    for (call, words) in [
+        (
+            "schema",
+            "there is no command \"schema\", nor a scene of that name: there are check, new, compare, bench",
+        ),
+        ("man", "there is no command \"man\", nor a scene of that name"),
+        ("merge out.png a.png b.png", "there is no command \"merge\", nor a scene of that name"),
+        ("completions zsh", "there is no command \"completions\", nor a scene of that name"),
+        ("chek --once", "did you mean `check`?"),
+        ("--once compar", "did you mean `compare`?"),
+    ] {
+        let stderr = desk.expect(call, 2);
+        assert!(stderr.contains(words) && stderr.lines().count() == 1, "{call}: {stderr}");
+    }
+    // What may be a file is one that is not there.
+    for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
+        assert!(desk.expect(call, 2).contains("there is no such scene file"), "{call}");
+    }
+    desk.write("schema", SCENE);
+    desk.expect("schema --once -o a.png", 0);
+}
+
+#[test]
+fn a_dash_is_standard_output_where_that_is_free() {
+    let desk = Desk::new();
+    let output = desk.run("ball.toml --once --report - --progress none");
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), b"".as_slice()));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(report["image"]["path"], "ball.png");
+    for (call, words) in [
+        (
+            "ball.toml --report -",
+            "--report - is standard output, which has the picture: name a file, or use --once",
+        ),
+        ("ball.toml --once -o -", "cannot write -: it has no ending that says its format"),
+        ("bench ball.toml --csv -", "--csv - is standard output, which has the tables: name a file"),
+        ("bench ball.toml --json -", "--json - is standard output, which has the tables: name a file"),
+        ("bench ball.toml --plot -", "use a name that ends in .svg"),
+        ("compare ball.png ball.png --diff -", "cannot write -: it has no ending that says its format"),
+    ] {
+        let stderr = desk.expect(call, 2);
+        assert!(stderr.contains(words), "{call}: {stderr}");
+    }
+    assert_eq!(names(&desk), ["ball.png", "ball.toml"]);
+    // By its path it is a file like others.
+    desk.expect("ball.toml --once --report ./-", 0);
+    assert!(desk.bytes("-").starts_with(b"{"));
+}
+
+#[test]
+fn results_that_cannot_be_written_are_told_and_a_reader_that_has_enough_is_not() {
+    let desk = Desk::new();
+    for seed in [1, 2] {
+        desk.expect(&format!("ball.toml --once --progress none --seed {seed} -o {seed}.exr"), 0);
+    }
+    let bench = "bench ball.toml --samples 1 --reference-samples 4 --seeds 1 --no-cache --integrator path --progress none";
+    for line in [
+        "new -",
+        "check ball.toml",
+        "compare 1.exr 2.exr",
+        "compare 1.exr 2.exr --json",
+        bench,
+        "--help",
+        "--version",
+        "check --help",
+        "ball.toml --once --progress none --report -",
+    ] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("a device");
+        let output = desk.glimt(line).stdout(full).output().expect("it runs");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
+        assert!(
+            stderr.contains("no space left on device") && stderr.lines().count() == 1,
+            "{line}: {stderr}"
+        );
+        let mut process = desk.glimt(line);
+        let mut child = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        let is_report = line.contains("--report");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(
+            (output.status.code(), stderr.is_empty()),
+            (Some(i32::from(is_report)), !is_report),
+            "{line}: {stderr}"
+        );
+    }
 }
 
 #[test]
@@ -370,15 +516,33 @@ fn all_trees_give_the_same_picture_of_every_scene_with_meshes() {
 }
 
 #[test]
-fn an_answer_that_finds_no_room_is_an_error() {
-    let desk = Desk::new();
-    for line in ["--help", "--version", "new -", "check ball.toml"] {
-        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("the device");
-        let mut process = std::process::Command::new(assert_cmd::cargo::cargo_bin("glimt"));
-        process.current_dir(desk.0.path()).args(line.split_whitespace()).stdout(full);
-        let output = process.output().expect("it runs");
-        let stderr = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
-        assert!(stderr.contains("cannot be written to stdout: No space left"), "{line}: {stderr}");
+fn warnings_point_to_what_asked_for_them() {
+    let desk = room();
+    let lit = format!("{ROOM}\n[[light]]\n");
+    desk.write("room.toml", &lit);
+    let call = "room.toml --once -o picture.ppm --progress none";
+    let path = "warning: path finds no light of a [[light]]";
+    for (options, place) in [
+        (
+            "--integrator path",
+            "= help: this comes of `--integrator path`, or of the key `i`, not of the scene",
+        ),
+        ("--set render.integrator=path", "--> --set:1:21"),
+    ] {
+        let stderr = desk.expect(&format!("{call} {options}"), 0);
+        assert!(stderr.contains(path) && stderr.contains(place), "{options}: {stderr}");
+        assert!(!stderr.contains("room.toml"), "{options}: {stderr}");
     }
+    let stderr = desk.expect(&format!("{call} --integrator path --clamp 2 --set camera.fov=50"), 0);
+    assert!(stderr.contains("this comes of `--clamp 2`, not of the scene"), "{stderr}");
+    let stderr = desk.expect(&format!("{call} --view photons"), 0);
+    assert!(
+        stderr.contains("this comes of `--view photons`, or of the key `v`, not of the scene"),
+        "{stderr}"
+    );
+    desk.write("room.toml", lit.replace("seed = 3\n", "seed = 3\nintegrator = \"path\"\nclamp = 2\n"));
+    let stderr = desk.expect(call, 0);
+    assert!(stderr.contains("--> room.toml:6:14") && stderr.contains("--> room.toml:7:9"), "{stderr}");
+    let stderr = String::from_utf8(desk.run("check room.toml").stderr).expect("UTF-8");
+    assert!(stderr.contains("--> room.toml:6:14") && stderr.contains("--> room.toml:7:9"), "{stderr}");
 }

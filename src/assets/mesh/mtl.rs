@@ -17,7 +17,11 @@ pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>,
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
     let mut text = String::with_capacity(bytes.len());
-    for (index, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
+    let whole = String::from_utf8_lossy(&bytes);
+    // Lines of old end in carriage returns alone.
+    let end = if whole.contains('\n') { '\n' } else { '\r' };
+    for (index, line) in whole.split_terminator(end).enumerate() {
+        let line = line.strip_suffix('\r').unwrap_or(line);
         let line = without_comment(line);
         check(line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
         text.push_str(line);

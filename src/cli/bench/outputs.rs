@@ -7,9 +7,10 @@ use crate::bench::{Results, csv, plot};
 use crate::cli::args::BenchArgs;
 use crate::cli::console::Console;
 use crate::cli::exit::Exit;
+use crate::cli::lower::STANDARD;
 use crate::control::CancelToken;
 use crate::output::write::{self, Guard};
-use crate::output::{self, FileIdentity, OutputError};
+use crate::output::{self, FileIdentity, OutputError, holds_foreign_report, holds_foreign_table};
 
 /// What is written, and what must not be.
 pub(super) struct Outputs {
@@ -54,6 +55,11 @@ impl Outputs {
     fn check(&self, index: usize, path: &Path, kind: Kind) -> Result<(), OutputError> {
         self.may_replace(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+        if path == Path::new(STANDARD) && !matches!(kind, Kind::Plot) {
+            let (option, ..) = self.files[index];
+            let reason = format!("{option} {STANDARD} is standard output, which has the tables: name a file");
+            return Err(OutputError::Refused { reason });
+        }
         if matches!(kind, Kind::Plot) && !is_svg {
             let reason =
                 format!("cannot write {}: the plot is an SVG; use a name that ends in .svg", path.display());
@@ -66,7 +72,7 @@ impl Outputs {
     fn may_replace(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let Some(identity) = FileIdentity::of(real) else { return Ok(()) };
         let is_it = |path: &Path| FileIdentity::of(path).as_ref() == Some(&identity);
-        let (option, path, _) = &self.files[index];
+        let (option, path, kind) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(
                 "cannot write {}: it is {what}; name another file with {option} FILE",
@@ -77,9 +83,18 @@ impl Outputs {
         if let Some((what, _)) = self.inputs.iter().find(|(_, input)| is_it(input)) {
             return refused(what);
         }
-        match self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
-            Some((other, ..)) => refused(&format!("the file of {other}")),
-            None => Ok(()),
+        if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
+            return refused(&format!("the file of {other}"));
+        }
+        // `--csv scene.toml` has its file's name left out.
+        match kind {
+            Kind::Csv if holds_foreign_table(path, csv::HEAD) => {
+                refused("there already and no table, such as a.csv")
+            }
+            Kind::Json if holds_foreign_report(path) => {
+                refused("there already and holds no results, such as a.json")
+            }
+            Kind::Csv | Kind::Json | Kind::Plot => Ok(()),
         }
     }
 
@@ -97,20 +112,28 @@ impl Outputs {
         Ok(Some((name, results)))
     }
 
-    /// All of them.
+    /// All of them; one that cannot be written does not keep the others from it.
     pub(super) fn write(&self, results: &Results, said: &Said, console: &Console) -> Result<(), Exit> {
-        for (index, (_, path, kind)) in self.files.iter().enumerate() {
-            let bytes = content(*kind, results).map_err(|why| {
-                console.fail(Exit::FAILED, &format!("cannot write {}: {why}", path.display()))
-            })?;
-            let may_replace = |real: &Path| self.may_replace(index, real);
-            let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-            let guard = Guard { is_kept: &is_kept, may_replace: &may_replace };
-            write::atomic_until(path, &bytes, &guard, &CancelToken::new())
-                .map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
-            said.written(path, bytes.len());
-        }
-        Ok(())
+        let written = (0..self.files.len()).map(|index| {
+            let (_, path, _) = &self.files[index];
+            let written = self.write_one(index, results);
+            let bytes = written.map_err(|why| console.fail(Exit::FAILED, &why))?;
+            said.written(path, bytes);
+            Ok(())
+        });
+        written.collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// Gives its bytes; the error says why not.
+    fn write_one(&self, index: usize, results: &Results) -> Result<usize, String> {
+        let (_, path, kind) = &self.files[index];
+        let bytes =
+            content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
+        let may_replace = |real: &Path| self.may_replace(index, real);
+        let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace };
+        let written = write::atomic_until(path, &bytes, &guard, &CancelToken::new());
+        written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
 }
 

@@ -21,9 +21,10 @@ pub(super) use self::orders::{Meanwhile, Orders};
 use self::outcome::Outcome;
 use self::unfinished::Unfinished;
 use super::cache::{Memo, Pool};
+use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
-use super::plan::{Plan, cores, plan, warnings};
+use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
 use super::settings::Overrides;
@@ -148,7 +149,8 @@ impl Engine {
         let outcome = self.outcome(request, sink, meanwhile);
         let is_broken = matches!(outcome, Err(Stop::Failed(Failure::Scene(_))));
         sink.send(match outcome {
-            Ok(Outcome { report, warnings, unchanged }) => {
+            Ok(Outcome { report, conflicts, warnings, unchanged }) => {
+                let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
             Err(Stop::Cancelled) => Event::Cancelled { generation },
@@ -195,8 +197,8 @@ impl Engine {
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
         let unchanged = shown(self) == before && settled(Stage::Render) && settled(Stage::Write);
-        let warnings = [findings.conflicts, findings.warnings].concat();
-        Ok(Outcome { report, warnings, unchanged })
+        let Findings { conflicts, warnings, .. } = findings;
+        Ok(Outcome { report, conflicts, warnings, unchanged })
     }
 
     /// Show the picture as it is at another size, outside of a request.
@@ -284,9 +286,8 @@ impl Engine {
         })?;
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-        for warning in warnings(&plan.scene, &plan.settings) {
-            findings.warn(&parsed.loaded, 0..0, warning);
-        }
+        let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
+        findings.warnings.extend(cautions);
         let eye = Eye::new(&plan.scene, parsed.orbiter, &request.overrides.camera);
         let (settings, camera) = (Box::new(plan.effective.clone()), eye.viewpoint());
         table.sink.send(Event::Settings { generation: request.generation, settings, camera });
@@ -440,11 +441,10 @@ impl Engine {
             let mut wanted = needed(loaded, &found);
             add_declared(loaded, &mut wanted);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
-            let plan = plan(&loaded.scene, path, &Overrides::default())
+            let overrides = Overrides::default();
+            let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-            for warning in warnings(&plan.scene, &plan.settings) {
-                findings.warn(loaded, 0..0, warning);
-            }
+            findings.warnings.extend(cautions(loaded, &plan.scene, &plan.settings, &overrides));
             if plan.named_by == NamedBy::Scene {
                 let inputs = inputs(&parsed, &found, &findings);
                 findings.errors.extend(conflicts(&plan, &inputs));

@@ -13,6 +13,8 @@ use crate::scene::diagnostic::Diagnostic;
 /// Of a request that was done.
 pub(super) struct Outcome {
     pub(super) report: Report,
+    /// Why nothing is written.
+    pub(super) conflicts: Vec<Diagnostic>,
     /// What is probably not meant.
     pub(super) warnings: Vec<Diagnostic>,
     /// Whether neither the picture nor its view changed.
@@ -31,7 +33,8 @@ impl Engine {
         meanwhile: &Meanwhile<'_>,
     ) -> Result<Rendered, Unrendered> {
         match self.outcome(request, sink, meanwhile) {
-            Ok(Outcome { report, warnings, unchanged: _ }) => {
+            // Who asks for a picture in memory writes none.
+            Ok(Outcome { report, conflicts: _, warnings, unchanged: _ }) => {
                 let canvas = self.films.current();
                 let gone = || Unrendered::Failed(Failure::Work("the film is gone".to_owned()));
                 let canvas = canvas.ok_or_else(gone)?;

@@ -1,7 +1,9 @@
 //! The folders in which watched files are, and the system's hints of what happens there.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::ffi::OsString;
+use std::fs;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -27,9 +29,17 @@ pub(super) struct Folders {
     /// None where hints are not wanted or cannot be had.
     watcher: Option<RecommendedWatcher>,
     names: Arc<Mutex<HashSet<OsString>>>,
-    watched: HashSet<PathBuf>,
-    /// Whether every folder is watched.
-    is_complete: bool,
+    /// All folders that are to be watched, and whether each is on another machine, which says nothing.
+    wanted: HashMap<PathBuf, bool>,
+    /// Those that are, and which ones they were then.
+    watched: HashMap<PathBuf, Identity>,
+}
+
+/// Device and number of a folder: another one may take its name.
+type Identity = (u64, u64);
+
+fn identity(folder: &Path) -> Option<Identity> {
+    fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
 impl Folders {
@@ -43,12 +53,12 @@ impl Folders {
             }
         };
         let watcher = if poll { None } else { notify::recommended_watcher(handler).ok() };
-        Self { watcher, names, watched: HashSet::new(), is_complete: true }
+        Self { watcher, names, wanted: HashMap::new(), watched: HashMap::new() }
     }
 
     /// Whether changes of all files are told by themselves.
     pub(super) fn gives_hints(&self) -> bool {
-        self.watcher.is_some() && self.is_complete
+        self.watcher.is_some() && self.watched.len() == self.wanted.len()
     }
 
     /// Watch the folders of these files: of the name, and of what it leads to if it is a link.
@@ -66,32 +76,61 @@ impl Folders {
                 add(&canonical);
             }
         }
+        // That a folder itself goes is said by its own name.
+        let own = folders
+            .iter()
+            .filter_map(|folder| folder.canonicalize().ok()?.file_name().map(ToOwned::to_owned));
+        names.extend(own);
         *self.names.lock().unwrap_or_else(PoisonError::into_inner) = names;
-        let Some(watcher) = &mut self.watcher else { return };
-        for gone in self.watched.difference(&folders) {
-            // It may have been removed: then there is nothing to end.
-            let _ = watcher.unwatch(gone);
-        }
-        self.watched.retain(|folder| folders.contains(folder));
-        self.is_complete = true;
-        for folder in folders {
-            let is_watched = self.watched.contains(&folder)
-                || (!is_remote(&folder) && watcher.watch(&folder, RecursiveMode::NonRecursive).is_ok());
-            self.is_complete &= is_watched;
-            if is_watched {
-                self.watched.insert(folder);
-            }
-        }
+        let is_gone = |folder: &PathBuf| !folders.contains(folder);
+        self.release(is_gone);
+        self.wanted = folders.into_iter().map(|folder| (folder.clone(), is_remote(&folder))).collect();
+        self.watch_wanted();
     }
 
-    /// A hint was missed: a folder may have been replaced by another one of its name.
+    /// Watch those again whose names other folders have now, and those that are back.
+    pub(super) fn renew_lost(&mut self) {
+        let lost: HashSet<PathBuf> = self
+            .watched
+            .iter()
+            .filter(|(folder, known)| identity(folder) != Some(**known))
+            .map(|(folder, _)| folder.clone())
+            .collect();
+        self.release(|folder| lost.contains(folder));
+        self.watch_wanted();
+    }
+
+    /// A hint was missed: none of them may be watched as it should be.
     pub(super) fn renew(&mut self) {
+        self.release(|_| true);
+        self.watch_wanted();
+    }
+
+    fn release(&mut self, is_released: impl Fn(&PathBuf) -> bool) {
         let Some(watcher) = &mut self.watcher else { return };
-        self.watched.retain(|folder| {
-            // Not watched any more is what is wanted.
-            let _ = watcher.unwatch(folder);
-            watcher.watch(folder, RecursiveMode::NonRecursive).is_ok()
+        self.watched.retain(|folder, _| {
+            let stays = !is_released(folder);
+            if !stays {
+                // It may have been removed: then there is nothing to end.
+                let _ = watcher.unwatch(folder);
+            }
+            stays
         });
+    }
+
+    fn watch_wanted(&mut self) {
+        let Some(watcher) = &mut self.watcher else { return };
+        for (folder, is_remote) in &self.wanted {
+            if *is_remote || self.watched.contains_key(folder) {
+                continue;
+            }
+            // Looked at before: one that changes in between is then seen as another one.
+            if let Some(identity) = identity(folder)
+                && watcher.watch(folder, RecursiveMode::NonRecursive).is_ok()
+            {
+                self.watched.insert(folder.clone(), identity);
+            }
+        }
     }
 }
 

@@ -4,7 +4,8 @@
 //! of what a link leads to; what happens there is taken as a hint only. The files' contents are compared, and only a
 //! difference counts. A file that was closed after writing or renamed into its place is looked at at once; one that
 //! is still being written, after a short quiet. Where hints cannot be had (network file systems, no watches left)
-//! the contents' time stamps are looked at several times a second, and every two seconds everywhere.
+//! the contents' time stamps are looked at several times a second, and every two seconds everywhere. So they are while
+//! a folder is gone, the working folder too, until one of its name is there.
 //!
 //! A program may write in pieces. So what was said of a file is followed by [`News::Settled`] once nothing more is to be
 //! expected: whoever finds the file broken waits for that before saying so.
@@ -12,6 +13,7 @@
 pub mod content;
 mod folders;
 mod growth;
+mod home;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -22,6 +24,7 @@ use std::time::{Duration, Instant};
 use self::content::{Content, Contents, FileRead};
 use self::folders::{Folders, Hint};
 use self::growth::Growth;
+pub use self::home::missing_folder;
 use crate::control::CancelToken;
 
 /// Between two looks where hints are had.
@@ -111,6 +114,7 @@ impl Watcher {
         waits: Waits,
         say: impl FnMut(News) + Send + 'static,
     ) -> std::io::Result<Self> {
+        home::remember();
         let (orders, received) = mpsc::channel();
         let hints = orders.clone();
         let folders = Folders::new(poll, move |hint| {
@@ -118,7 +122,8 @@ impl Watcher {
             let _ = hints.send(Message::Hint(hint));
         });
         let growth = Growth::new(waits);
-        let watch = Watch { folders, contents, files: HashMap::new(), growth, pending: Vec::new(), say };
+        let (files, pending) = Default::default();
+        let watch = Watch { folders, is_home: true, contents, files, growth, pending, say };
         std::thread::Builder::new().name("glimt-watch".to_owned()).spawn(move || watch.run(&received))?;
         Ok(Self { orders })
     }
@@ -138,6 +143,8 @@ impl Drop for Watcher {
 
 struct Watch<F> {
     folders: Folders,
+    /// Whether the working folder is there.
+    is_home: bool,
     contents: Arc<Contents>,
     /// What the files held when that was last said, or when they were last read, whichever is later; and when.
     files: HashMap<PathBuf, (Content, Instant)>,
@@ -161,7 +168,7 @@ impl<F: FnMut(News)> Watch<F> {
     }
 
     fn next_look(&self) -> Instant {
-        let pause = if self.folders.gives_hints() { HEARTBEAT } else { POLL };
+        let pause = if self.is_home && self.folders.gives_hints() { HEARTBEAT } else { POLL };
         let unhinted = Instant::now() + pause;
         self.growth.due().map_or(unhinted, |due| due.min(unhinted))
     }
@@ -188,6 +195,8 @@ impl<F: FnMut(News)> Watch<F> {
 
     /// It is time for a look, by the signs or without any.
     fn look(&mut self, now: Instant) {
+        self.is_home = home::is_there();
+        self.folders.renew_lost();
         let found = self.differences();
         let is_said = !self.is_early(&found, now);
         if is_said {

@@ -195,6 +195,42 @@ fn a_missing_file_is_watched_until_it_comes_and_said_when_it_goes() {
 }
 
 #[test]
+fn a_folder_that_is_removed_and_made_again_is_watched_as_before() {
+    let scratch = Scratch::new(false);
+    let (folder, path) = (scratch.path("sub"), scratch.path("sub/a.toml"));
+    let make = |content: &str| {
+        fs::create_dir(&folder).expect("a folder");
+        fs::write(&path, content).expect("written");
+    };
+    make("0");
+    scratch.watch(&[&path]);
+    fs::remove_dir_all(&folder).expect("removed");
+    scratch.expect_one();
+    // While it is gone nobody says so again.
+    scratch.expect_none();
+    make("1");
+    scratch.expect_one();
+    scratch.three_saves(|content| fs::write(&path, content).expect("written"));
+}
+
+#[test]
+fn another_folder_of_the_same_name_is_watched_by_its_hints() {
+    let scratch = impatient();
+    let (folder, path) = (scratch.path("sub"), scratch.path("sub/a.toml"));
+    fs::create_dir(&folder).expect("a folder");
+    fs::write(&path, "0").expect("written");
+    scratch.watch(&[&path]);
+    // The same file in it: nothing has changed.
+    fs::create_dir(scratch.path("new")).expect("a folder");
+    fs::write(scratch.path("new/a.toml"), "0").expect("written");
+    fs::rename(&folder, scratch.path("old")).expect("renamed");
+    fs::rename(scratch.path("new"), &folder).expect("renamed");
+    std::thread::sleep(HEARTBEAT + SETTLE);
+    scratch.expect_none();
+    scratch.three_saves(|content| fs::write(&path, content).expect("written"));
+}
+
+#[test]
 fn a_change_between_reading_and_watching_is_seen() {
     let scratch = Scratch::new(false);
     let path = scratch.path("b.toml");

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use super::description::{Camera, Scene};
 use super::source::Source;
-use super::{MAX_FILE_BYTES, Outcome, toml};
+use super::{MAX_FILE_BYTES, Outcome, Setting, toml};
 use crate::math::Vec3;
 use context::{Context, Issue};
 use table::Table;
@@ -37,19 +37,39 @@ pub(super) fn lower(source: &Source, path: &Path) -> Outcome {
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         let help = "`glimt new FILE` writes a scene to start from";
         context.report(Issue::error(0..0, "the scene file is empty").help(help));
-        return Outcome { scene: None, diagnostics: context.finish(&[]) };
+        return Outcome { scene: None, diagnostics: context.finish(&[]), settings: Vec::new() };
     }
     if text.len() as u64 > MAX_FILE_BYTES {
         let message = format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20);
         context.report(Issue::error(0..0, message));
-        return Outcome { scene: None, diagnostics: context.finish(&[]) };
+        return Outcome { scene: None, diagnostics: context.finish(&[]), settings: Vec::new() };
     }
     let (document, errors) = toml::parse(text);
     let broken_lines = syntax::report(&context, errors);
     let document = sets::put(&context, source, document);
     let scene = scene(&Table::root(&context, document.root()));
     let has_errors = context.has_errors();
-    Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines) }
+    let settings = settings(&document);
+    Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines), settings }
+}
+
+/// The places of the values in the tables that hold settings.
+fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
+    let values = |table: &'static str| {
+        let entries = document.root().get(table).and_then(|found| match found.value.item() {
+            toml::Item::Table(entries) => Some(entries),
+            toml::Item::String(_)
+            | toml::Item::Integer { .. }
+            | toml::Item::Float(_)
+            | toml::Item::Boolean(_)
+            | toml::Item::Datetime
+            | toml::Item::Array(_) => None,
+        });
+        let of =
+            move |one: toml::KeyValue<'_>| Setting { table, key: one.key.to_owned(), span: one.value.span() };
+        entries.into_iter().flat_map(move |entries| entries.iter().map(of).collect::<Vec<_>>())
+    };
+    ["render", "photons"].into_iter().flat_map(values).collect()
 }
 
 /// The camera of a scene, if that is right.

@@ -193,6 +193,7 @@ fn signalled(signal: Signal) -> Effect {
         Signal::Terminate => Effect::Quit(ExitStatus::TERMINATED),
         Signal::Quit => Effect::Quit(ExitStatus::ABORTED),
         Signal::Hangup => Effect::Quit(ExitStatus::HANGUP),
+        Signal::Other(number) => Effect::Quit(ExitStatus::signal(number)),
         Signal::Suspend => Effect::Suspend,
         Signal::Continue => Effect::Redraw,
         Signal::Resize => Effect::Measure,

@@ -13,9 +13,19 @@ fn keys_and_signals_end_it_and_the_terminal_is_given_back() {
         terminal.press(key);
         assert_eq!(terminal.end(), code, "{key:?}");
     }
-    for (signal, code) in
-        [(Signal::SIGTERM, 143), (Signal::SIGINT, 130), (Signal::SIGHUP, 129), (Signal::SIGQUIT, 131)]
-    {
+    let known =
+        [(Signal::SIGTERM, 143), (Signal::SIGINT, 130), (Signal::SIGHUP, 129), (Signal::SIGQUIT, 131)];
+    let others = [
+        Signal::SIGUSR1,
+        Signal::SIGUSR2,
+        Signal::SIGALRM,
+        Signal::SIGVTALRM,
+        Signal::SIGPROF,
+        Signal::SIGXCPU,
+        Signal::SIGIO,
+    ];
+    let others = others.map(|signal| (signal, 128 + signal as u32));
+    for (signal, code) in known.into_iter().chain(others) {
         let terminal = folder.terminal();
         terminal.wait_for_color("red");
         terminal.signal(signal);

@@ -185,3 +185,42 @@ fn a_file_that_breaks_does_not_stop_the_render_of_the_last_good_scene() {
     terminal.wait_for("done");
     assert_eq!(written, folder.once(&[]));
 }
+
+/// The folder of the scene is removed and made again, as by a checkout: seen from inside it and from outside.
+#[test]
+fn a_folder_that_goes_and_comes_back_is_found_again() {
+    for (line, picture) in [
+        ("cd work && exec \"$0\" scene.toml", "work/scene.png"),
+        ("exec \"$0\" work/scene.toml", "scene.png"),
+    ] {
+        let folder = Folder::new();
+        let make = |color: &str| {
+            fs::create_dir(folder.path("work")).expect("a folder");
+            folder.write("work/scene.toml", &SCENE.replace(RED, color));
+        };
+        make(RED);
+        let terminal = folder.terminal_with(&["/bin/sh", "-c", line, folder.program()], &[]);
+        terminal.wait_for_render(1);
+        fs::remove_dir_all(folder.path("work")).expect("removed");
+        terminal.wait_for("broken");
+        terminal.wait("which folder", |screen| {
+            let text: String = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
+            text.contains("work is not")
+        });
+        make(BLUE);
+        terminal.wait_for_color("blue");
+        terminal.wait_for_render(2);
+        assert!(folder.path(picture).is_file(), "{picture}");
+        // From now on as before.
+        folder.write("work/scene.toml", &SCENE.replace(RED, GREEN));
+        terminal.wait_for_color("green");
+        terminal.wait_for_render(3);
+        // Gone and back before anybody looks.
+        fs::remove_dir_all(folder.path("work")).expect("removed");
+        make(GREEN);
+        folder.write("work/scene.toml", SCENE);
+        terminal.wait_for_color("red");
+        folder.write("work/scene.toml", &SCENE.replace(RED, BLUE));
+        terminal.wait_for_color("blue");
+    }
+}

@@ -17,34 +17,61 @@ pub(super) struct Survey<'a> {
 impl<'a> Survey<'a> {
     /// Comments behind numbers, colours of vertices and lines that `tobj` mistakes for faces (`l`, `p`) are blanked,
     /// lines that go on behind a backslash joined, keywords before names brought to the start of their line, bytes
-    /// beyond UTF-8 replaced.
+    /// beyond UTF-8 replaced, a second texture coordinate of 0 put where there is one alone.
     pub(super) fn of(bytes: &'a [u8]) -> Self {
         let mut survey = Self { text: Cow::Borrowed(bytes), used_materials: BTreeSet::new() };
         let mut unfinished = None;
+        let mut lone = Vec::new();
         let mut start = 0;
         for end in memchr::memchr_iter(b'\n', bytes).chain([bytes.len()]) {
             let line = &bytes[start..end];
-            let statement = unfinished.take().unwrap_or_else(|| Statement::of(line.trim_ascii_start()));
-            if survey.line(start, line, statement) {
-                unfinished = Some(statement);
+            let (statement, words) =
+                unfinished.take().unwrap_or_else(|| (Statement::of(line.trim_ascii_start()), 0));
+            let Line { goes_on, content } = survey.line(start, line, statement);
+            if statement.is_texture() {
+                let words = words + words_of(content).take(LONE_TEXTURE_WORDS + 1).count();
+                if !goes_on && words == LONE_TEXTURE_WORDS {
+                    lone.push(start + content.len());
+                }
+                unfinished = goes_on.then_some((statement, words));
+            } else {
+                unfinished = goes_on.then_some((statement, 0));
             }
             start = (end + 1).min(bytes.len());
         }
+        survey.complete(&lone);
         if !survey.text.is_ascii() && std::str::from_utf8(&survey.text).is_err() {
             survey.text = Cow::Owned(String::from_utf8_lossy(&survey.text).into_owned().into_bytes());
         }
         survey
     }
 
-    /// A line at this byte, of this statement; whether the statement goes on in the next one.
-    fn line(&mut self, start: usize, line: &[u8], statement: Statement) -> bool {
+    /// Puts a second coordinate at these places.
+    fn complete(&mut self, places: &[usize]) {
+        if places.is_empty() {
+            return;
+        }
+        const SECOND: &[u8] = b" 0";
+        let mut text = Vec::with_capacity(self.text.len() + SECOND.len() * places.len());
+        let mut start = 0;
+        for &place in places {
+            text.extend_from_slice(&self.text[start..place]);
+            text.extend_from_slice(SECOND);
+            start = place;
+        }
+        text.extend_from_slice(&self.text[start..]);
+        self.text = Cow::Owned(text);
+    }
+
+    /// A line at this byte, of this statement.
+    fn line<'l>(&mut self, start: usize, line: &'l [u8], statement: Statement) -> Line<'l> {
         let content = match statement {
-            Statement::Comment => return false,
+            Statement::Comment => return Line { goes_on: false, content: line },
             Statement::Named => {
                 self.named(start, line);
                 line
             }
-            Statement::Vertex | Statement::Numbers | Statement::Skipped => {
+            Statement::Vertex | Statement::Texture | Statement::Numbers | Statement::Skipped => {
                 let content = &line[..memchr::memchr(b'#', line).unwrap_or(line.len())];
                 self.blank(start + content.len()..start + line.len());
                 content
@@ -57,15 +84,17 @@ impl<'a> Survey<'a> {
                 let colours = colours(content).unwrap_or(content.len());
                 self.blank(start + colours..start + content.len());
             }
-            Statement::Comment | Statement::Named | Statement::Numbers | Statement::Other => {}
+            Statement::Comment
+            | Statement::Named
+            | Statement::Texture
+            | Statement::Numbers
+            | Statement::Other => {}
         }
         let content = content.trim_ascii_end();
-        let goes_on = content.ends_with(b"\\");
-        if goes_on {
-            self.blank(start + content.len() - 1..start + content.len());
-            self.blank(start + line.len()..(start + line.len() + 1).min(self.text.len()));
-        }
-        goes_on
+        let Some(unfinished) = content.strip_suffix(b"\\") else { return Line { goes_on: false, content } };
+        self.blank(start + unfinished.len()..start + content.len());
+        self.blank(start + line.len()..(start + line.len() + 1).min(self.text.len()));
+        Line { goes_on: true, content: unfinished }
     }
 
     /// `tobj` takes what stands behind the first space of the line for the name.
@@ -90,11 +119,28 @@ impl<'a> Survey<'a> {
     }
 }
 
+/// What there is of a statement in a line.
+struct Line<'l> {
+    /// Whether the next line belongs to it.
+    goes_on: bool,
+    /// Without comments and what leads to the next line.
+    content: &'l [u8],
+}
+
+/// Words of a `vt` with one coordinate: v is 0 then (Wavefront, Object Files, 1995), which `tobj` does not know.
+const LONE_TEXTURE_WORDS: usize = 2;
+
+fn words_of(content: &[u8]) -> impl Iterator<Item = &[u8]> {
+    content.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
 /// What a line is, as far as it is read differently.
 #[derive(Clone, Copy)]
 enum Statement {
     Comment,
     Vertex,
+    /// Texture coordinates.
+    Texture,
     /// Other numbers, up to a comment.
     Numbers,
     /// Points and lines.
@@ -105,11 +151,19 @@ enum Statement {
 }
 
 impl Statement {
+    fn is_texture(self) -> bool {
+        match self {
+            Self::Texture => true,
+            Self::Comment | Self::Vertex | Self::Numbers | Self::Skipped | Self::Named | Self::Other => false,
+        }
+    }
+
     fn of(line: &[u8]) -> Self {
         let keyword = line.iter().position(u8::is_ascii_whitespace).map_or(line, |end| &line[..end]);
         match keyword {
             b"v" => Self::Vertex,
-            b"vt" | b"vn" | b"f" => Self::Numbers,
+            b"vt" => Self::Texture,
+            b"vn" | b"f" => Self::Numbers,
             b"l" | b"p" => Self::Skipped,
             b"usemtl" | b"mtllib" => Self::Named,
             [b'#', ..] => Self::Comment,
@@ -125,8 +179,7 @@ fn colours(line: &[u8]) -> Option<usize> {
     });
     // Behind the keyword and three coordinates.
     let colours = ends.nth(3)?;
-    (line[colours..].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count() == 3)
-        .then_some(colours)
+    (words_of(&line[colours..]).count() == 3).then_some(colours)
 }
 
 /// Bytes that `tobj` gets at a time, between two polls of the token.

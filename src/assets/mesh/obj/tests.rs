@@ -160,3 +160,50 @@ fn colours_and_weights_behind_coordinates() {
     assert_eq!(says("v 0 0 0\nv 1 0 0 0\nv 0 1 0\nf 1 2 3\n"), ":2: the weight of a vertex is 0");
     assert_eq!(says("v 0 0 0 1 0\n"), ":1: coordinates are followed by one weight or three colours");
 }
+
+#[test]
+fn a_texture_coordinate_alone_has_another_one_of_zero() {
+    let faces = "f 1/1 2/2 3/3\n";
+    for coordinates in
+        ["vt 0\nvt 0.5 0\nvt 1\n", "vt 0 # 1\nvt \\\n .5\nvt 1 \\\n", "vt\t0\r\nvt 0.5 0 0\nvt 1 "]
+    {
+        let text = format!("{SQUARE}{coordinates}\n{faces}");
+        let mesh = read(&text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh;
+        assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::new(0.5, 0.0), Vec2::X], "{text}");
+    }
+    assert_eq!(says("vt 0\nvt\nv 0 0 0\n"), ":2: expected 2 texture coordinates, found 0");
+    assert_eq!(says("vt 0\nv 0 0\n"), ":2: expected 3 coordinates, found 2");
+}
+
+#[test]
+fn lines_may_end_in_carriage_returns_alone() {
+    let plain = read(&format!("# a\n{SQUARE}f 1 2 3 4\n")).expect("whole").mesh;
+    let old = format!("# a\n{SQUARE}f 1 2 3 4\n").replace('\n', "\r");
+    assert_eq!(read(&old).expect("whole").mesh, plain);
+    assert_eq!(says("v 0 0 0\rv 1 0\r"), ":2: expected 3 coordinates, found 2");
+    let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n").replace('\n', "\r");
+    let loaded =
+        read_with(&[("a.obj", text.as_bytes()), ("a.mtl", b"newmtl red\rKd 1 0 0\r")]).expect("whole");
+    assert_eq!((loaded.warnings, loaded.materials[0].diffuse), (Vec::new(), Vec3::X));
+}
+
+#[test]
+fn a_corner_that_ends_with_a_slash_lacks_a_number() {
+    let head = format!("{SQUARE}vt 0 0\nvn 0 0 1\n");
+    for (faces, found) in [
+        ("f 1// 2/ 3/", "1//"),
+        ("f 1 2 3/", "3/"),
+        ("f 1 \\\n 2 \\\r\n 3/\t4", "3/"),
+        ("f 1 2/1/ 3\r", "2/1/"),
+    ] {
+        let line = 7 + faces.matches('\\').count();
+        let said = format!(":{line}: expected a corner like 1/2/3, found {found:?}");
+        assert_eq!(says(&format!("{head}{faces}\n")), said, "{faces}");
+        assert_eq!(says(&format!("{head}{faces}")), said, "{faces}");
+    }
+    for whole in
+        ["f 1/1/1 2/1/1 3/1/1 # 4/ 5/", "g here/\nf 1 2 3", "# f 1/\nf 1 2 3", "mtllib f/ 1/\nf 1 2 3"]
+    {
+        assert!(read(&format!("{head}{whole}\n")).is_ok(), "{whole}");
+    }
+}

@@ -172,7 +172,7 @@ fn span_area(u: DVec3, v: DVec3) -> bool {
 }
 
 /// Whether a file is a mesh by its name, of any version of glimt.
-pub(in super::super) fn is_mesh(path: &Path) -> bool {
+pub(in crate::scene) fn is_mesh(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     mesh::MESHES.iter().chain(&mesh::UNAVAILABLE).any(|known| *known == ending)
 }
