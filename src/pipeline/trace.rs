@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Pixels, TileSamples};
+use crate::film::{Pixels, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_by};
 use crate::system::processor::seconds_of_thread;
 use crate::world::World;
@@ -24,6 +24,9 @@ pub(super) type Kernel = fn(
 
 /// The longest time without a tick.
 pub(super) const TICK: Duration = Duration::from_millis(20);
+
+/// Jobs that end within so long are told at once: to wake the thread that asked takes longer than the smallest of them.
+const AT_ONCE: Duration = Duration::from_micros(300);
 
 /// Everything that is the same for all tiles.
 #[derive(Clone, Copy)]
@@ -94,20 +97,35 @@ impl Tracer<'_> {
                 let sender = sender.clone();
                 scope.spawn(move |_| {
                     let _guard = StopOnPanic(stopped);
+                    let (mut done, mut since) = (Vec::new(), Instant::now());
                     while !stopped.load(Ordering::Relaxed)
                         && let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed))
                         && let Ok((samples, cost)) = self.trace(job)
-                        && sender.send((job, keep(job, samples), cost)).is_ok()
-                    {}
+                    {
+                        done.push((job, keep(job, samples), cost));
+                        if since.elapsed() >= AT_ONCE {
+                            if sender.send(std::mem::take(&mut done)).is_err() {
+                                return;
+                            }
+                            since = Instant::now();
+                        }
+                    }
+                    // Nobody listens any more where this fails.
+                    let _ = sender.send(done);
                 });
             }
             drop(sender);
             loop {
-                let go_on = match results.recv_timeout(TICK) {
-                    Ok(result) => each(Some(result)),
-                    Err(RecvTimeoutError::Timeout) => each(None),
+                let mut go_on = true;
+                match results.recv_timeout(TICK) {
+                    Ok(done) => {
+                        for one in done {
+                            go_on &= each(Some(one));
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => go_on = each(None),
                     Err(RecvTimeoutError::Disconnected) => break,
-                };
+                }
                 stopped.fetch_or(!go_on, Ordering::Relaxed);
             }
         });
@@ -128,11 +146,13 @@ impl Drop for StopOnPanic<'_> {
 }
 
 /// Samples that every pixel has after the next pass: 1, 2, 4, … so that pictures come early, then in steps that
-/// keep a tile short. Every power of two is the end of a pass, as noise is judged there.
-pub(super) fn next_pass(done: u32, total: u32) -> u32 {
-    const LONGEST: u32 = 32;
+/// keep a tile short, in a picture of so many pixels. Every power of two is the end of a pass, as noise is judged there.
+pub(super) fn next_pass(done: u32, total: u32, pixels: usize) -> u32 {
+    const LONGEST: usize = 32;
+    const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;
+    let longest = (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32;
     let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
-    done.saturating_add(done.clamp(1, LONGEST)).min(power).min(total)
+    done.saturating_add(done.clamp(1, longest)).min(power).min(total)
 }
 
 #[cfg(test)]
@@ -141,18 +161,20 @@ mod tests {
 
     #[test]
     fn passes_double_and_then_stay_short() {
-        let passes = |total| {
+        let passes = |total, pixels| {
             let mut ends = vec![0];
             while let Some(&last) = ends.last()
                 && last < total
             {
-                ends.push(next_pass(last, total));
+                ends.push(next_pass(last, total, pixels));
             }
             ends
         };
-        assert_eq!(passes(1), [0, 1]);
-        assert_eq!(passes(100), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
-        assert_eq!(next_pass(100, 1000), 128);
-        assert_eq!(next_pass(u32::MAX - 1, u32::MAX), u32::MAX);
+        assert_eq!(passes(1, 5000), [0, 1]);
+        assert_eq!(passes(100, 5000), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
+        // A picture of half a tile takes twice as many at a time.
+        assert_eq!(passes(200, 512), [0, 1, 2, 4, 8, 16, 32, 64, 128, 192, 200]);
+        assert_eq!(next_pass(100, 1000, 5000), 128);
+        assert_eq!(next_pass(u32::MAX - 1, u32::MAX, 0), u32::MAX);
     }
 }

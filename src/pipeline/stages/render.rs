@@ -204,7 +204,8 @@ impl<'a> Painter<'a> {
                 self.look();
                 continue;
             }
-            let target = next_pass(self.canvas.samples_in(part, samples), samples);
+            let pixels = self.canvas.film.crop().area();
+            let target = next_pass(self.canvas.samples_in(part, samples), samples, pixels);
             self.pass(part, target)?;
             if target.is_power_of_two() {
                 self.look();
