@@ -73,6 +73,9 @@ impl UnitLine {
             low.value = 0.0;
         }
         let is_inside = low.value < 0.0 || low.value == 0.0 && low.slope < 0.0;
+        if !is_inside && self.goes_away(from) {
+            return None;
+        }
         for (end, is_convex) in [(inflections[0], true), (inflections[1], false), (to, true)] {
             if end > low.s {
                 let high = self.at(end);
@@ -84,6 +87,13 @@ impl UnitLine {
             }
         }
         None
+    }
+
+    /// Whether from here on it goes away from the circle, on whose outer side it is: both parts of the distance grow.
+    fn goes_away(&self, from: f64) -> bool {
+        let p = self.foot + self.direction * from;
+        let (across, d) = (p.truncate(), self.direction.truncate());
+        across.length_squared() >= 1.0 && across.dot(d) >= 0.0 && p.z * self.direction.z >= 0.0
     }
 
     /// The places from `from`, which is outside, to `to` at which the line goes in: two at most, since it leaves as often.
