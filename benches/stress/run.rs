@@ -107,17 +107,29 @@ pub(crate) fn render(picture: &Picture) -> Result<Rendered, String> {
     render_in(folder.path(), picture)
 }
 
+/// The program, or another one that runs it, called to render a picture in a folder, on one thread.
+///
+/// # Errors
+/// Files cannot be written.
+pub(crate) fn call(
+    folder: &Path,
+    picture: &Picture,
+    mut program: Command,
+) -> Result<Command, std::io::Error> {
+    fs::write(folder.join("scene.toml"), &picture.scene)?;
+    for (name, content) in &picture.files {
+        fs::write(folder.join(name), content)?;
+    }
+    program.current_dir(folder).args("scene.toml --once -o a.exr --report a.json --threads 1".split(' '));
+    program.args(picture.options.split_whitespace()).stdin(Stdio::null());
+    Ok(program)
+}
+
 fn render_in(folder: &Path, picture: &Picture) -> Result<Rendered, String> {
     let said = |error: std::io::Error| error.to_string();
-    fs::write(folder.join("scene.toml"), &picture.scene).map_err(said)?;
-    for (name, content) in &picture.files {
-        fs::write(folder.join(name), content).map_err(said)?;
-    }
-    let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
-    command.current_dir(folder).args("scene.toml --once -o a.exr --report a.json --threads 1".split(' '));
+    let mut command = call(folder, picture, Command::new(env!("CARGO_BIN_EXE_glimt"))).map_err(said)?;
     let errors = fs::File::create(folder.join("said")).map_err(said)?;
-    command.args(picture.options.split_whitespace()).stdin(Stdio::null()).stderr(errors);
-    let (mut child, begin) = (command.spawn().map_err(said)?, Instant::now());
+    let (mut child, begin) = (command.stderr(errors).spawn().map_err(said)?, Instant::now());
     let status = loop {
         if let Some(status) = child.try_wait().map_err(said)? {
             break status;

@@ -34,7 +34,8 @@ pub fn lights(
     sky: Option<Arc<SkyMap>>,
     token: &CancelToken,
 ) -> Result<Arc<Lights>, Cancelled> {
-    let points = scene.lights.iter().map(|light| described(light, geometry.origin()));
+    let points = scene.lights.iter().filter(|light| sends(light));
+    let points = points.map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissions: Vec<Emission> =
         scene.materials.iter().map(|material| lit(emission(scene, images, &material.emission))).collect();
@@ -72,6 +73,16 @@ fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> O
         Some(_) => Some(Environment::map(sky?, *color, *rotate)),
         None => Some(Environment::Constant(*color)),
     }
+}
+
+/// Whether it is not black.
+fn sends(light: &description::Light) -> bool {
+    let color = match light {
+        description::Light::Point(light) => light.intensity,
+        description::Light::Spot(light) => light.point.intensity,
+        description::Light::Directional(light) => light.irradiance,
+    };
+    color != Vec3::ZERO
 }
 
 /// A light that is no shape, in coordinates that start at `origin`.

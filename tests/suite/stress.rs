@@ -1,5 +1,5 @@
 //! The cases of `cargo bench --bench stress`, the short ones, and the pairs of `cargo bench --bench skips`: pictures within their
-//! bounds of their twins, every sample finite, the same bits. Times are for the benchmarks.
+//! bounds of their twins, every sample finite, the same bits and the same rays. Times are for the benchmarks.
 
 #[path = "../../benches/stress/cases/mod.rs"]
 mod cases;
@@ -44,6 +44,10 @@ fn what_a_scene_does_not_use_changes_no_bit() {
         assert!(off.pixels.iter().any(|&x| x > 0.0), "{}: all is black", pair.name);
         if !off.pixels.iter().map(|x| x.to_bits()).eq(on.pixels.iter().map(|x| x.to_bits())) {
             wrong.push(format!("{}: other bits", pair.name));
+        }
+        let done = |report: &serde_json::Value| [report["counters"].clone(), report["lights"].clone()];
+        if done(&off.report) != done(&on.report) {
+            wrong.push(format!("{}: {:?} {:?}", pair.name, done(&off.report), done(&on.report)));
         }
         if let Some((name, part)) = pair.skipped {
             let stages = on.report["stages"].as_array().expect("stages");
