@@ -1,7 +1,7 @@
 //! How near what a terminal shows comes to the picture.
 //!
 //! Cells become pixels, and these are compared with the picture in Oklab: as they are, and blurred as an eye blurs
-//! them that does not look at single cells. Beside it chafa, with the same characters and its best dithering.
+//! them that does not look at single cells; characters as their mean. Beside it chafa, with the same characters and its best dithering.
 
 use std::error::Error;
 use std::path::Path;
@@ -23,6 +23,9 @@ const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 30 };
 /// A terminal's own colours, and how much of a cell the ink of its brightest character covers.
 const INK: [u8; 3] = [229; 3];
 const GROUND: [u8; 3] = [0; 3];
+/// How much of its cell the ink of each character from the space to ~ covers, of 255: the means of DejaVu Sans Mono's bitmaps.
+#[rustfmt::skip]
+const INK_OF_ASCII: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
 
 /// A way to show a picture, by glimt and by chafa.
 struct Mode {
@@ -33,33 +36,30 @@ struct Mode {
     colors: &'static str,
 }
 
-const MODES: [Mode; 8] = [
-    mode(
-        "half blocks, 24 bits",
-        PreviewChoice::HalfBlock,
-        ColorDepth::TrueColor,
-        "vhalf+solid+space",
-        "full",
-    ),
-    mode(
-        "quadrants, 24 bits",
-        PreviewChoice::Quadrant,
-        ColorDepth::TrueColor,
-        "quad+half+solid+space",
-        "full",
-    ),
-    mode(
-        "sextants, 24 bits",
-        PreviewChoice::Sextant,
-        ColorDepth::TrueColor,
-        "sextant+quad+half+solid+space",
-        "full",
-    ),
+const HALVES: &str = "vhalf+solid+space";
+const QUADRANTS: &str = "quad+half+solid+space";
+const SEXTANTS: &str = "sextant+quad+half+solid+space";
+const STIPPLED_HALVES: &str = "vhalf+stipple+solid+space";
+const STIPPLED_QUADRANTS: &str = "quad+half+stipple+solid+space";
+const STIPPLED_SEXTANTS: &str = "sextant+quad+half+stipple+solid+space";
+
+const MODES: [Mode; 16] = [
+    mode("half blocks, 24 bits", PreviewChoice::HalfBlock, ColorDepth::TrueColor, HALVES, "full"),
+    mode("quadrants, 24 bits", PreviewChoice::Quadrant, ColorDepth::TrueColor, QUADRANTS, "full"),
+    mode("sextants, 24 bits", PreviewChoice::Sextant, ColorDepth::TrueColor, SEXTANTS, "full"),
     mode("octants, 24 bits", PreviewChoice::Octant, ColorDepth::TrueColor, "", "full"),
-    mode("half blocks, 256", PreviewChoice::HalfBlock, ColorDepth::Indexed256, "vhalf+solid+space", "256"),
+    mode("half blocks, 256", PreviewChoice::HalfBlock, ColorDepth::Indexed256, HALVES, "256"),
+    mode("quadrants, 256", PreviewChoice::Quadrant, ColorDepth::Indexed256, QUADRANTS, "256"),
+    mode("sextants, 256", PreviewChoice::Sextant, ColorDepth::Indexed256, SEXTANTS, "256"),
     mode("octants, 256", PreviewChoice::Octant, ColorDepth::Indexed256, "", "256"),
-    mode("half blocks, 16", PreviewChoice::HalfBlock, ColorDepth::Ansi16, "vhalf+stipple+solid+space", "16"),
-    mode("quadrants, 16", PreviewChoice::Quadrant, ColorDepth::Ansi16, "quad+half+stipple+solid+space", "16"),
+    mode("half blocks, 16", PreviewChoice::HalfBlock, ColorDepth::Ansi16, STIPPLED_HALVES, "16"),
+    mode("quadrants, 16", PreviewChoice::Quadrant, ColorDepth::Ansi16, STIPPLED_QUADRANTS, "16"),
+    mode("sextants, 16", PreviewChoice::Sextant, ColorDepth::Ansi16, STIPPLED_SEXTANTS, "16"),
+    mode("octants, 16", PreviewChoice::Octant, ColorDepth::Ansi16, "", "16"),
+    mode("ASCII, 24 bits", PreviewChoice::Ascii, ColorDepth::TrueColor, "ascii", "full"),
+    mode("ASCII, 256", PreviewChoice::Ascii, ColorDepth::Indexed256, "ascii", "256"),
+    mode("ASCII, 16", PreviewChoice::Ascii, ColorDepth::Ansi16, "ascii", "16"),
+    mode("ASCII, no colours", PreviewChoice::Ascii, ColorDepth::None, "ascii", "none"),
 ];
 
 const fn mode(
@@ -193,12 +193,14 @@ impl Plane {
             let cell = &buffer[(area.x + (x / CELL.0) as u16, area.y + (y / CELL.1) as u16)];
             let place = y % CELL.1 / (CELL.1 / 12) * 2 + x % CELL.0 / (CELL.0 / 2);
             let symbol = cell.symbol().chars().next().unwrap_or(' ');
-            let is_ink = filled(symbol).is_some_and(|filled| filled[place]);
-            srgb8_to_linear(if is_ink {
-                in_xterm(cell.fg).unwrap_or(INK)
-            } else {
-                in_xterm(cell.bg).unwrap_or(GROUND)
-            })
+            let [ink, ground] = [in_xterm(cell.fg).unwrap_or(INK), in_xterm(cell.bg).unwrap_or(GROUND)];
+            let [ink, ground] = [ink, ground].map(srgb8_to_linear);
+            let part = match (filled(symbol), (symbol as usize).checked_sub(0x20)) {
+                (Some(filled), _) => f32::from(u8::from(filled[place])),
+                (None, Some(number)) => INK_OF_ASCII.get(number).map_or(0.0, |ink| f32::from(*ink) / 255.0),
+                (None, None) => 0.0,
+            };
+            ground + (ink - ground) * part
         };
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }

@@ -55,14 +55,14 @@ pub(super) const KEYMAP: &[Binding] = &[
         &[KeyPress::plain('z')],
         "z",
         Action::RectangleFirst,
-        "then a drag: render that first; z z around the crosshair",
+        "then a drag: that comes first; z z the crosshair; z ends it",
         "",
     ),
     binding(
         &[LEFT, KeyPress::plain('h')],
         "arrows hjkl",
         Action::OrbitLeft,
-        "the camera around what it looks at",
+        "the camera around what it looks at; a drag too",
         "",
     ),
     binding(&[DOWN, KeyPress::plain('j')], "", Action::OrbitDown, "", ""),
@@ -72,7 +72,7 @@ pub(super) const KEYMAP: &[Binding] = &[
         &[KeyPress::plain('+'), KeyPress::plain('=')],
         "+ -",
         Action::DollyIn,
-        "the camera nearer, farther",
+        "the camera nearer, farther; the wheel too",
         "",
     ),
     binding(&[KeyPress::plain('-')], "", Action::DollyOut, "", ""),
@@ -144,7 +144,13 @@ pub(super) const OVERLAY: &[Binding<Overlay>] = &[
         "page",
     ),
     binding(&[KeyPress::special(KeyCode::PageUp)], "", Overlay::PageUp, "", ""),
-    binding(&[KeyPress::special(KeyCode::Esc)], "esc", Overlay::Close, "close what is open", "close"),
+    binding(
+        &[KeyPress::special(KeyCode::Esc)],
+        "esc",
+        Overlay::Close,
+        "close what is open; back to the newest picture",
+        "close",
+    ),
 ];
 
 /// What a key means to what lies over the picture, if anything.

@@ -1,12 +1,14 @@
 //! The mouse, what it asks for, what is said of the answers; and the editor's places.
 
+use crossterm::event::KeyCode;
+
 use super::{BLUE, RED};
 use crate::pipeline::protocol::{self, Command, Kept, Picked, Section, Spot, Thing, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
 use crate::tui::color::ColorDepth;
-use crate::tui::event::{Effect, Event, Mouse, MouseKind};
+use crate::tui::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::tui::fixtures::*;
 use crate::tui::state::PreviewKind;
 
@@ -304,4 +306,34 @@ fn before_and_after_a_camera_that_was_kept_differ() {
     desk.finish(BLUE);
     desk.press('b');
     assert!(super::cells_of(&mut desk, RED) > 0, "the camera from before: {}", desk.text());
+}
+
+#[test]
+fn escape_ends_what_waits_what_was_said_and_older_pictures() {
+    let mut desk = desk();
+    let escape = |desk: &mut Desk| desk.event(Event::Key(KeyPress::special(KeyCode::Esc)));
+    for (key, waits) in [('z', "drag a rectangle"), ('f', "click")] {
+        desk.press(key);
+        assert!(desk.text().contains(waits), "{}", desk.text());
+        escape(&mut desk);
+        assert!(!desk.state.is_marking && !desk.state.is_focusing);
+        assert!(!desk.text().contains(waits), "{}", desk.text());
+    }
+    desk.state.inspected = Some(vec!["sphere".to_owned()]);
+    escape(&mut desk);
+    assert_eq!(desk.state.inspected, None);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.finish(BLUE);
+    desk.press('b');
+    assert!(desk.state.history.is_open());
+    escape(&mut desk);
+    assert!(!desk.state.history.is_open() && desk.text().contains("the newest picture"), "{}", desk.text());
+}
+
+#[test]
+fn a_digit_without_the_list_says_where_the_list_is() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.press('3');
+    assert!(desk.text().contains("v lists the views"), "{}", desk.text());
 }

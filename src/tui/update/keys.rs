@@ -1,5 +1,7 @@
 //! What a key does to the state.
 
+use crossterm::event::{KeyCode, KeyModifiers};
+
 use super::{camera, history, overlay, places, pointer, rectangle, render, resized_preview, say};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
@@ -15,7 +17,15 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     if let Some(effects) = overlay::update(state, key) {
         return effects;
     }
-    let Some(action) = keymap::action(key) else { return Vec::new() };
+    let Some(action) = keymap::action(key) else {
+        let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
+            && matches!(key.code, KeyCode::Char('1'..='9'));
+        return if is_digit {
+            told(state, "v lists the views; a digit chooses one of the list")
+        } else {
+            Vec::new()
+        };
+    };
     state.dirty |= state.message.take().is_some() | state.inspected.take().is_some();
     state.is_focusing &= action == Action::Focus;
     state.is_marking &= action == Action::RectangleFirst;

@@ -2,6 +2,7 @@
 
 use crossterm::event::KeyCode;
 
+use super::history;
 use super::keys::choose_view;
 use crate::choice::Choice;
 use crate::pipeline::settings::View;
@@ -37,14 +38,27 @@ fn chosen(state: &State, key: KeyPress) -> Option<View> {
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
-/// What was opened over all else.
+/// What was opened last: over all else, then what waits for a click or a drag, then what was said of a place, then an older picture.
 fn close(state: &mut State) -> bool {
-    let is_open = state.help.open || state.views.is_some() || state.pane.open;
-    if state.help.open {
+    let is_open = if state.help.open {
         state.help.open = false;
-    } else if state.views.take().is_none() {
+        true
+    } else if state.views.take().is_some() {
+        true
+    } else if state.pane.open {
         state.pane.open = false;
-    }
+        true
+    } else if state.is_focusing || state.is_marking {
+        (state.is_focusing, state.is_marking, state.message) = (false, false, None);
+        true
+    } else if state.inspected.take().is_some() {
+        true
+    } else if state.history.is_open() {
+        history::close(state, "the newest picture");
+        true
+    } else {
+        false
+    };
     state.dirty |= is_open;
     is_open
 }

@@ -10,9 +10,9 @@ use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
 use super::{Random, mean_and_error, v};
 
-/// Lights that send nothing, so many that vertices pick from all.
+/// Lights that send next to nothing, so many that vertices pick from all; black ones would be left out.
 fn with_dark_lights(build: Build) -> Build {
-    (0..33).fold(build, |build, i| build.point_light(v(f64::from(i), 3.0, 0.0), 0.0, Falloff::Square))
+    (0..33).fold(build, |build, i| build.point_light(v(f64::from(i), 3.0, 0.0), 1e-20, Falloff::Square))
 }
 
 /// The means of all pixels agree within 5 standard errors over seeds, which are at most this part of them.
