@@ -16,9 +16,7 @@ use crate::pipeline::session::Session;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 
-/// The most samples that a ladder without given steps climbs to.
-const MOST_SAMPLES: u32 = 1 << 16;
-/// From step to step of it.
+/// From step to step of a ladder that is not given.
 const FACTOR: u32 = 4;
 
 /// One step that is to be made.
@@ -36,6 +34,8 @@ pub(super) struct Measure<'a> {
     pub(super) common: &'a Overrides,
     pub(super) method: &'a Method,
     pub(super) two: &'a TwoReferences,
+    /// To which a ladder without given steps climbs.
+    pub(super) most_samples: f64,
 }
 
 impl Measure<'_> {
@@ -68,7 +68,8 @@ impl Measure<'_> {
                 list.get(steps.len()).map(aim)
             }
             Steps::Climb => {
-                let samples = FACTOR.checked_pow(index).filter(|samples| *samples <= MOST_SAMPLES)?;
+                let samples =
+                    FACTOR.checked_pow(index).filter(|samples| f64::from(*samples) <= self.most_samples)?;
                 let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(FACTOR));
                 let has_time = pace.of_method() + expected <= pace.allowance();
                 (index == 0 || has_time).then_some(Aim { index, samples, budget: None })

@@ -40,7 +40,7 @@ pub struct Order {
 /// Where along a method's line the points are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Steps {
-    /// At 1, 4, 16, … samples, as long as there is time.
+    /// At 1, 4, 16, … samples, as long as there is time, and up to a hundredth of the samples of the references.
     #[default]
     Climb,
     /// At so many samples.

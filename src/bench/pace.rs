@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 /// The part of a scene's time that its references may take.
-const OF_REFERENCES: f64 = 0.6;
+const OF_REFERENCES: f64 = 0.75;
 
 /// The time of a whole run.
 pub(super) struct Pace {
@@ -102,8 +102,8 @@ mod tests {
             |value: f64, expected: f64| assert!((value - expected).abs() < 1.0, "{value}, not {expected}");
         let mut pace = Pace::new(1000.0, 2);
         pace.begin_scene(4);
-        near(pace.of_references(), 300.0);
-        near(pace.left(300.0, true), 1000.0);
+        near(pace.of_references(), 375.0);
+        near(pace.left(375.0, true), 1000.0);
         pace.begin_method();
         near(pace.allowance(), 125.0);
         near(pace.left(20.0, false), 1000.0);
@@ -114,6 +114,6 @@ mod tests {
         pace.end_method();
         pace.end_scene();
         pace.begin_scene(1);
-        near(pace.of_references(), 600.0);
+        near(pace.of_references(), 750.0);
     }
 }

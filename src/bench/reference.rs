@@ -21,6 +21,17 @@ const NO_END: u32 = 1 << 24;
 
 /// Times the samples of the most that is measured.
 const MORE: u32 = 100;
+/// The samples that are measured however few the references have.
+const LEAST_MEASURED: f64 = 16.0;
+
+/// The most samples that a ladder climbs to.
+const MOST_MEASURED: f64 = 65_536.0;
+
+/// The most samples for which references of so many of them can stand; of files nobody knows how many they have.
+pub(super) fn most_measured(of_references: Option<f64>) -> f64 {
+    let most = of_references.map_or(MOST_MEASURED, |samples| samples / f64::from(MORE));
+    most.clamp(LEAST_MEASURED, MOST_MEASURED)
+}
 
 /// How good the references are to be.
 #[derive(Clone, Copy, Debug)]
@@ -149,4 +160,17 @@ fn reference(
         files: Vec::new(),
     };
     Reference { two, result, warnings, unkept }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_stand_for_a_hundredth_of_their_samples() {
+        assert_eq!(most_measured(Some(25_600.0)), 256.0);
+        assert_eq!(most_measured(Some(400.0)), 16.0, "less would show no slope");
+        assert_eq!(most_measured(Some(1e9)), 65_536.0);
+        assert_eq!(most_measured(None), 65_536.0, "files do not tell theirs");
+    }
 }

@@ -6,7 +6,7 @@ use super::measure::Measure;
 use super::methods::methods;
 use super::order::{News, Order, ReferenceOrder, Steps, Trouble};
 use super::pace::Pace;
-use super::reference::{Amount, Maker, Reference, SEEDS, given};
+use super::reference::{Amount, Maker, Reference, SEEDS, given, most_measured};
 use super::results::{Results, SceneResult, Step};
 use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
@@ -17,7 +17,7 @@ use crate::scene;
 use crate::scene::description::Scene;
 
 /// Pixels on the longer side where nothing else is said.
-const LONG_SIDE: u32 = 128;
+const LONG_SIDE: u32 = 96;
 
 /// Measure what the order asks for.
 ///
@@ -87,10 +87,11 @@ impl Run<'_> {
         let (reference, common) = self.reference(&loaded.scene, pace)?;
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
         self.say_reference(&reference, (width, height));
+        let most_samples = most_measured(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
             pace.begin_method();
-            let method = Measure { run: self, common: &common, method, two: &reference.two };
+            let method = Measure { run: self, common: &common, method, two: &reference.two, most_samples };
             measured.push(method.measure(pace, threads)?);
             pace.end_method();
         }
@@ -203,10 +204,10 @@ mod tests {
             (scene.render.width, scene.render.height) = (width, height);
             size(&scene, asked)
         };
-        assert_eq!(of(640, 480, (None, None)), (128, 96));
-        assert_eq!(of(480, 640, (None, None)), (96, 128));
+        assert_eq!(of(640, 480, (None, None)), (96, 72));
+        assert_eq!(of(480, 640, (None, None)), (72, 96));
         assert_eq!(of(64, 32, (None, None)), (64, 32), "none is larger than its scene");
-        assert_eq!(of(65536, 1, (None, None)), (128, 1));
+        assert_eq!(of(65536, 1, (None, None)), (96, 1));
         assert_eq!(of(640, 480, (Some(40), None)), (40, 30));
         assert_eq!(of(640, 480, (None, Some(30))), (40, 30));
         assert_eq!(of(640, 480, (Some(7), Some(9))), (7, 9));

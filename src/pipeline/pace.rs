@@ -68,8 +68,8 @@ impl Pace {
         if span >= SHORTEST_SECONDS && done > before {
             let rate = (done - before) / span;
             let weight = 1.0 - (-span / MEMORY_SECONDS).exp();
-            // Early on every measurement counts alike: the mean of what there is.
-            let weight = weight.max(span / seconds);
+            // Early on what is late counts more: the first passes are slower.
+            let weight = weight.max(2.0 * span / seconds).min(1.0);
             self.rate = Some(self.rate.map_or(rate, |old| old + weight * (rate - old)));
             self.measured = (seconds, done);
         }

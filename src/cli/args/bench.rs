@@ -50,7 +50,7 @@ pub struct BenchArgs {
     /// The first of the seeds
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, default_value = "1", help_heading = "Measurement")]
     pub seed: u32,
-    /// Pixels across [default: with the scene's aspect, 128 on the longer side]
+    /// Pixels across [default: with the scene's aspect, 96 on the longer side]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Measurement")]
     pub width: Option<u32>,
     /// Pixels down

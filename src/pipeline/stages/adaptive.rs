@@ -13,6 +13,12 @@ pub(super) const LEAST: u32 = 16;
 /// The part of the noise asked for that is aimed at, as noise is known by some samples only.
 const AIM: f64 = 0.82;
 
+/// How many times smaller the variance gets from two to four samples and from four to eight, where nothing tells it: of half of the tiles
+/// of the bundled scenes more, of the others less.
+const EARLY_FALL: f64 = 4.0;
+/// Between which it is believed.
+const FALLS: [f64; 2] = [2.0, 8.0];
+
 /// The least brightness that noise is held against, as a part of the picture's.
 const LEAST_BRIGHTNESS: f64 = 0.01;
 
@@ -49,8 +55,8 @@ impl Goals {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
-    /// Expect what the samples so far tell, which are a power of two: by the noise of both halves of a tile, and by how it fell in the
-    /// tiles that are not decided. What is decided is decided otherwise.
+    /// Expect what the samples so far tell, which are a power of two: by the noise of both halves of a tile, and by how it fell.
+    /// What is decided is decided otherwise.
     fn foresee(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
         let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
         let is_open = |tile: &usize| {
@@ -61,7 +67,7 @@ impl Goals {
         };
         let tiles: Vec<usize> = (0..film.tile_count()).filter(is_open).collect();
         let falls = tiles.iter().filter_map(|tile| film.tile_fall(*tile)).collect();
-        let power = power_of(film.convergence(), falls);
+        let way = Way::of(film.convergence(), falls, samples);
         for tile in tiles {
             let noise: Vec<HalfNoise> =
                 [0, 1].into_iter().filter_map(|half| film.tile_noise(tile, half)).collect();
@@ -73,10 +79,7 @@ impl Goals {
             if !mean.is_finite() {
                 continue;
             }
-            let wanted = match mean.sqrt() {
-                noise if noise > 0.0 => samples_by(power, AIM * error / noise, samples),
-                _ => samples,
-            };
+            let wanted = way.samples_to(AIM * error, mean.sqrt(), film.tile_fall(tile));
             let cells = self.expected.iter_mut().zip(&self.decided).zip(done).skip(CELLS * tile).take(CELLS);
             for ((expected, decided), done) in cells {
                 for half in (0..2).filter(|half| decided[*half] == u32::MAX) {
@@ -139,11 +142,53 @@ fn relative(noise: &HalfNoise, brightness: f64) -> f64 {
     noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * brightness)
 }
 
-/// The power of the samples with which variance falls: by the median of how it fell, between those of both kinds of samples.
-fn power_of(convergence: Convergence, mut falls: Vec<f64>) -> f64 {
-    falls.sort_by(f64::total_cmp);
-    let power = |fall: &f64| libm::log2(*fall).clamp(1.0, Convergence::Stratified.power());
-    falls.get(falls.len() / 2).map_or(convergence.power(), power)
+/// How noise is expected to fall from some samples on. What is smooth falls fast, and is below any bound soon: what is left of it then
+/// is noise that falls as that of edges and penumbras, or slower.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Way {
+    samples: u32,
+    /// How often these are doubled as tiles have it of late: up to those that all get, and once at least.
+    doublings: u32,
+    /// How many times smaller the variance of the tiles got of late; as each has it, where it has few samples.
+    fall: Option<f64>,
+    /// The power of the samples with which variance falls later.
+    power: f64,
+}
+
+impl Way {
+    /// By how many times smaller the variances of tiles got by their last doubling.
+    fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
+        let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
+        if convergence == Convergence::Independent {
+            return Self {
+                samples,
+                doublings,
+                fall: Some(libm::exp2(convergence.power())),
+                power: convergence.power(),
+            };
+        }
+        if samples < LEAST {
+            return Self { samples, doublings, fall: None, power: convergence.power() };
+        }
+        falls.sort_by(f64::total_cmp);
+        let usual = libm::exp2(convergence.power());
+        let fall = falls.get(falls.len() / 2).map_or(usual, |fall| fall.clamp(FALLS[0], FALLS[1]));
+        Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.power()) }
+    }
+
+    /// Samples that bring the noise of a tile to a bound, where its variance fell so by its last doubling.
+    fn samples_to(&self, bound: f64, noise: f64, fall: Option<f64>) -> u32 {
+        let of_tile = || {
+            // Of the falls from two samples on, one more is known by each doubling.
+            let known = fall.map_or(0.0, |_| 1.0 - 1.0 / f64::from(self.samples.ilog2()));
+            let fall = fall.map_or(EARLY_FALL, |fall| fall.clamp(FALLS[0], FALLS[1]));
+            libm::pow(fall, known) * libm::pow(EARLY_FALL, 1.0 - known)
+        };
+        let fall = self.fall.unwrap_or_else(of_tile);
+        let noise = noise * libm::pow(fall, -0.5 * f64::from(self.doublings));
+        let samples = self.samples.saturating_mul(1 << self.doublings);
+        if noise > 0.0 { samples_by(self.power, bound / noise, samples) } else { self.samples }
+    }
 }
 
 #[cfg(test)]
@@ -200,26 +245,45 @@ mod tests {
 
     #[test]
     fn a_few_samples_tell_how_many_there_will_be() {
-        for samples in [2, 4, 8] {
+        // Independent samples of a standard deviation of √(1/12) take 833. Two of them do not tell that their noise falls slowly, each
+        // doubling tells more of it: 54, 128 and 177 by steps of the size to be expected, which 64 pixels tell to about a fifth.
+        for (samples, expected) in [(2, 54.0), (4, 128.0), (8, 177.0)] {
             let goals = judged([(1.0, 1.0); 2], samples, 0.01);
             assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
-            // Independent samples of a standard deviation of √(1/12) take 833; if noise falls as in a film, by two of them 112.
-            assert!((60..2000).contains(&goals.expected(0, 0)), "{samples}: {}", goals.expected(0, 0));
+            let ratio = f64::from(goals.expected(0, 0)) / expected;
+            assert!((0.6..1.6).contains(&ratio), "{samples}: {}", goals.expected(0, 0));
         }
     }
 
     #[test]
-    fn how_noise_fell_so_far_tells_how_it_will_fall() {
-        let stratified = Convergence::Stratified.power();
-        for (falls, power) in [
-            (vec![], stratified),
-            (vec![2.0, 1.0, 2.0], 1.0),
-            (vec![9.0, 4.0, 3.0], stratified),
-            (vec![100.0, 2.2, 2.3, 2.1, 1e-3], libm::log2(2.2)),
+    fn how_noise_fell_of_late_tells_how_it_will_fall() {
+        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.power());
+        let of = |falls: &[f64]| Way::of(stratified, falls.to_vec(), 64);
+        for (falls, fall, power) in [
+            (vec![], libm::exp2(usual), usual),
+            (vec![2.0, 1.0, 2.0], 2.0, 1.0),
+            (vec![9.0, 4.0, 3.0], 4.0, usual),
+            (vec![100.0, 2.2, 2.3, 2.1, 1e-3], 2.2, libm::log2(2.2)),
         ] {
-            assert_eq!(power_of(Convergence::Stratified, falls.clone()), power, "{falls:?}");
+            assert_eq!(of(&falls), Way { samples: 64, doublings: 1, fall: Some(fall), power }, "{falls:?}");
         }
-        assert_eq!(power_of(Convergence::Independent, vec![]), 1.0);
+        // Half of the noise of 64 samples, which falls by 4 and then by 2.7 at each doubling; which is nothing but that of chance.
+        let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
+        assert!(near(of(&[4.0]).samples_to(0.5, 1.0, None), 128.0));
+        assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
+        assert!(near(of(&[1.0]).samples_to(0.25, 1.0, None), 16.0 * 64.0));
+        assert!(near(Way::of(Convergence::Independent, vec![9.0], 4).samples_to(0.25, 1.0, Some(9.0)), 64.0));
+    }
+
+    #[test]
+    fn a_few_samples_of_what_is_smooth_tell_that_the_least_will_do() {
+        let way = Way::of(Convergence::Stratified, vec![], 4);
+        assert_eq!((way.doublings, way.fall), (2, None));
+        let [smooth, unknown, rough] =
+            [Some(8.0), None, Some(1.0)].map(|fall| way.samples_to(0.2, 1.0, fall));
+        assert!(smooth < unknown && unknown < rough, "{smooth} {unknown} {rough}");
+        // Falls of √(8 · 4) and √(2 · 4).
+        assert!((12..17).contains(&smooth) && (30..55).contains(&rough), "{smooth} {rough}");
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub(in crate::pipeline) struct Canvas {
     pub(super) rays: Vec<u64>,
     /// Seconds of a processor that each took.
     seconds: Vec<f64>,
+    /// What its samples take of late.
+    recent: Vec<Recent>,
     /// Samples that they are to have at most.
     pub(super) goals: Goals,
     /// A first picture at the size of the preview, shown where there are no samples yet.
@@ -56,6 +58,7 @@ impl Canvas {
             film: Arc::new(film),
             rays: vec![0; film_cells],
             seconds: vec![0.0; film_cells],
+            recent: vec![Recent::default(); film_cells],
             done,
             goals,
             base: None,
@@ -164,7 +167,10 @@ impl Canvas {
             let rect = self.film.cell_rect(cell);
             if let Some(rect) = rect.filter(|rect| rect.intersection(&job.pixels.rect) == Some(*rect)) {
                 self.rays[cell] += rays * rect.area() as u64 / job.pixels.rect.area() as u64;
-                self.seconds[cell] += seconds * rect.area() as f64;
+                let seconds = seconds * rect.area() as f64;
+                self.seconds[cell] += seconds;
+                let pixels = job.pixels.part.count(rect.area());
+                self.recent[cell].note(seconds, pixels as f64 * job.samples.len() as f64);
                 match job.pixels.part {
                     Part::All => self.done[cell] = [job.samples.end; 2],
                     Part::Half(half) => self.done[cell][half] = job.samples.end,
@@ -190,7 +196,7 @@ impl Canvas {
     }
 
     /// Seconds of a processor that it took, and those of the whole render as far as that is known, of some samples at most. What a
-    /// sample takes in a cell is told by those that it has; where it has none, by the others.
+    /// sample takes in a cell is told by its last ones; where it has none, by the others.
     pub(super) fn work(&self, most: u32) -> [f64; 2] {
         let units = |cell: usize, samples: [u32; 2]| -> f64 {
             let unit = |half| self.film.half_pixel_count(cell, half) as f64 * f64::from(samples[half]);
@@ -202,7 +208,8 @@ impl Canvas {
             let to_have = units(cell, [0, 1].map(|half| self.to_come(cell, half, most)));
             if had > 0.0 {
                 let seconds = self.seconds[cell];
-                (done, of, total) = (done + seconds, of + had, total + seconds * to_have / had);
+                let to_come = (to_have - had).max(0.0) * self.recent[cell].seconds_of_unit();
+                (done, of, total) = (done + seconds, of + had, total + seconds + to_come);
             } else {
                 others += to_have;
             }
@@ -237,6 +244,28 @@ impl Canvas {
     }
 }
 
+/// What the samples of a cell take: the first ones, one at a time, take more than those of later passes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Recent {
+    seconds: f64,
+    /// Pixels times samples.
+    units: f64,
+}
+
+impl Recent {
+    /// What is left of what came before, when more comes.
+    const KEPT: f64 = 0.25;
+
+    fn note(&mut self, seconds: f64, units: f64) {
+        self.seconds = Self::KEPT * self.seconds + seconds;
+        self.units = Self::KEPT * self.units + units;
+    }
+
+    fn seconds_of_unit(self) -> f64 {
+        if self.units > 0.0 { self.seconds / self.units } else { 0.0 }
+    }
+}
+
 /// What all halves of all cells lack, if it is the same.
 fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
@@ -259,6 +288,7 @@ mod tests {
             done: vec![[0; 2]; cells],
             rays: vec![0; cells],
             seconds: vec![0.0; cells],
+            recent: vec![Recent::default(); cells],
             goals: Goals::none(cells),
             base: None,
             previewer: None,
