@@ -3,6 +3,7 @@
 pub(super) mod accel;
 mod adaptive;
 pub(super) mod canvas;
+mod coarse;
 pub(super) mod films;
 pub(super) mod keys;
 pub(super) mod lights;

@@ -16,14 +16,15 @@ use super::super::sink::Sink;
 use super::super::trace::{Job, Tracer, next_pass};
 use super::adaptive::LEAST;
 use super::canvas::Canvas;
+use super::coarse;
 use super::films::Films;
 use super::outlook::Outlook;
 use super::photons::{PhotonStore, Sending};
 use super::preview::Screen;
 use super::spread::next_round;
 use super::{Staged, Stop};
-use crate::film::{Convergence, RadianceImage, Rect, TILE_SIZE, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
+use crate::film::{Convergence, Rect, TILE_SIZE, TileSamples};
+use crate::integrators::{PhotonMaps, RayCounters};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 
@@ -33,9 +34,6 @@ const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
 const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
 /// A preview may take this part of the time at most.
 const PREVIEW_SHARE: u32 = 10;
-
-/// What the first picture of a moved camera may take.
-const HASTE: Duration = Duration::from_millis(6);
 
 /// What the stage is given.
 pub(in crate::pipeline) struct Rendering<'a> {
@@ -386,146 +384,18 @@ impl<'a> Painter<'a> {
         self.next_preview = Instant::now() + PREVIEW_INTERVAL;
     }
 
-    /// Columns and rows of the first picture. Where rays are slow, since no cache holds the trees, it has half as many
-    /// pixels as the preview.
-    fn coarse_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
-        /// Triangles whose trees take some tens of megabytes.
-        const LARGE: u64 = 250_000;
-        let side =
-            |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
-        if self.rendering.tracer.world.triangle_count() < LARGE {
-            (width, height)
-        } else {
-            (side(width), side(height))
-        }
-    }
-
-    /// First pictures with one sample at about the preview's own resolution, where that is much less work than one pass: of a
-    /// moved camera a hasty one before.
+    /// First pictures with one sample, where they are much less work than one pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let Some(shown) = self.screen.size() else { return Ok(()) };
-        let usual = self.coarse_size(shown);
-        let rate = self.rendering.coarse_rate.get().filter(|_| self.rendering.is_moved);
-        let hasty = rate.and_then(|rate| hasty_size(usual, rate));
-        for size in hasty.into_iter().chain([usual]) {
-            if self.is_less_work(size) {
-                self.coarse_of(size, shown)?;
-            }
+        for size in coarse::sizes(self.rendering, shown) {
+            let maps = match self.rendering.photons {
+                Some(photons) => Some(self.maps(photons, 0..1)?),
+                None => None,
+            };
+            let picture = coarse::picture(self.rendering, maps.as_ref(), size)?;
+            self.canvas.base = Some(picture.resized(shown.0, shown.1));
+            self.show();
         }
         Ok(())
-    }
-
-    fn is_less_work(&self, (width, height): (u32, u32)) -> bool {
-        let Render { width: full_width, height: full_height, .. } = self.rendering.plan.settings.render;
-        let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
-        pixels(width, height) * 2 <= pixels(full_width, full_height)
-    }
-
-    /// A first picture of this size, shown at another one.
-    fn coarse_of(&mut self, (width, height): (u32, u32), shown: (u32, u32)) -> Result<(), Stop> {
-        let plan = self.rendering.plan;
-        let full = (plan.settings.render.width, plan.settings.render.height);
-        let render = Render { width, height, ..plan.settings.render };
-        let settings = RenderSettings { render, ..plan.settings };
-        let whole = Rect { x: 0, y: 0, width, height };
-        let rect = plan.crop.map_or(whole, |rect| scale(rect, full, (width, height)));
-        let tracer = Tracer { settings: &settings, ..self.rendering.tracer };
-        let maps = match self.rendering.photons {
-            Some(photons) => Some(self.maps(photons, 0..1)?),
-            None => None,
-        };
-        let tracer = Tracer { photons: maps.as_ref(), ..tracer };
-        let mut base = RadianceImage::black(width, height);
-        let begin = Instant::now();
-        tracer.run(
-            &coarse_jobs(rect),
-            |_, piece| piece,
-            |result| {
-                if let Some((_, piece, _)) = result {
-                    base.put(piece.pixels.rect, &piece.radiance);
-                }
-                true
-            },
-        )?;
-        let rate = rect.area() as f64 / begin.elapsed().as_secs_f64().max(1e-6);
-        self.rendering.coarse_rate.set(Some(rate));
-        self.canvas.base = Some(base.resized(shown.0, shown.1));
-        self.show();
-        Ok(())
-    }
-}
-
-/// The size of a first picture that takes [`HASTE`] where so many pixels are traced in a second; none: the usual one takes
-/// hardly longer.
-fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
-    /// Pixels across of the smallest.
-    const LEAST: f64 = 16.0;
-    let share = (rate * HASTE.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
-    let side =
-        |length: u32| ((f64::from(length) * share.max(LEAST / f64::from(width))).round() as u32).max(1);
-    (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
-}
-
-/// Small pieces, so that all threads end at about the same time.
-fn coarse_jobs(rect: Rect) -> Vec<Job> {
-    const FEW: usize = 5000;
-    let side = if rect.area() < FEW { 8 } else { 16 };
-    let starts = |start: u32, length: u32| (start..start + length).step_by(side as usize);
-    let piece = |(x, y)| Rect { x, y, width: side, height: side }.intersection(&rect);
-    let places = starts(rect.y, rect.height).flat_map(|y| starts(rect.x, rect.width).map(move |x| (x, y)));
-    let job = |(tile, rect): (usize, Rect)| Job { tile, pixels: rect.into(), samples: 0..1 };
-    places.filter_map(piece).enumerate().map(job).collect()
-}
-
-/// The pixels of a smaller picture that lie under a rectangle of a larger one.
-fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
-    let along = |start: u32, len: u32, from: u32, to: u32| {
-        let at = |pixel: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
-        let begin = (at(start) as u32).min(to - 1);
-        let end = ((u64::from(start) + u64::from(len)) * u64::from(to)).div_ceil(u64::from(from)) as u32;
-        (begin, end.clamp(begin + 1, to) - begin)
-    };
-    let (x, width) = along(rect.x, rect.width, from.0, to.0);
-    let (y, height) = along(rect.y, rect.height, from.1, to.1);
-    Rect { x, y, width, height }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_pieces_of_a_coarse_picture_cover_it_once() {
-        let rect = Rect { x: 3, y: 5, width: 40, height: 17 };
-        let mut seen = vec![0; 64 * 64];
-        for job in coarse_jobs(rect) {
-            for y in job.pixels.rect.y..job.pixels.rect.y + job.pixels.rect.height {
-                for x in job.pixels.rect.x..job.pixels.rect.x + job.pixels.rect.width {
-                    seen[(y * 64 + x) as usize] += 1;
-                }
-            }
-        }
-        let one = Rect { width: 1, height: 1, ..rect };
-        for (i, times) in (0..64 * 64).zip(seen) {
-            let is_inside = Rect { x: i % 64, y: i / 64, ..one }.intersection(&rect).is_some();
-            assert_eq!(times, i32::from(is_inside), "pixel {i}");
-        }
-    }
-
-    #[test]
-    fn a_hasty_picture_is_as_large_as_its_time_allows() {
-        let pixels_of = |rate: f64| hasty_size((120, 80), rate / HASTE.as_secs_f64());
-        assert_eq!(pixels_of(9600.0), None, "there is time for the usual one");
-        assert_eq!(pixels_of(2400.0), Some((60, 40)));
-        assert_eq!(pixels_of(1.0), Some((16, 11)), "one that still shows something");
-        assert_eq!(hasty_size((10, 5), 0.0), Some((10, 5)));
-    }
-
-    #[test]
-    fn a_crop_covers_its_part_of_a_smaller_picture() {
-        let rect = Rect { x: 10, y: 30, width: 5, height: 10 };
-        assert_eq!(scale(rect, (100, 100), (10, 10)), Rect { x: 1, y: 3, width: 1, height: 1 });
-        let last = Rect { x: 99, y: 99, width: 1, height: 1 };
-        assert_eq!(scale(last, (100, 100), (3, 3)), Rect { x: 2, y: 2, width: 1, height: 1 });
     }
 }
