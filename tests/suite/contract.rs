@@ -427,6 +427,8 @@ fn the_starter_and_the_readme_have_every_key() {
             assert!(starter().lines().any(has), "starter: {header} {key}");
         }
     }
+    // Any shape may have one.
+    assert!(reference.contains("`name`") && starter().contains("# name = "), "name");
 }
 
 #[test]
