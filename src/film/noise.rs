@@ -195,13 +195,15 @@ impl Film {
         Some(HalfNoise { variance, mean: sum / pixels, samples })
     }
 
-    /// How many times smaller the last squared step of the pixels of a tile is than the one before, over all cells; none where there are
-    /// not two steps that tell.
+    /// How many times smaller the last squared step of the pixels of a tile is than the one before, over the halves of its cells that
+    /// have both; none where there are not two steps that tell.
     pub fn tile_fall(&self, tile: usize) -> Option<f64> {
         let squares = &self.tile(tile).steps.squares;
-        let sum = |level: usize| squares[level].iter().flatten().sum::<f64>();
-        let last = squares.len().checked_sub(2)? + 1;
-        Some(sum(last - 1) / sum(last)).filter(|fall| fall.is_finite() && *fall > 0.0)
+        let [.., before, last] = squares.as_slice() else { return None };
+        // A half that has stopped has no last step.
+        let pairs = before.as_flattened().iter().zip(last.as_flattened()).filter(|(_, last)| **last > 0.0);
+        let (before, last) = pairs.fold((0.0, 0.0), |sums, pair| (sums.0 + pair.0, sums.1 + pair.1));
+        Some(before / last).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
     /// The noise in one half of all cells of a tile; none as in [`Film::half_noise`].
@@ -300,6 +302,14 @@ mod tests {
         let error = film(&[&[1.0, 2.0, 3.0, 6.0]]).relative_error().expect("an estimate");
         let expected = ((0.5 * 0.5 / RATE + 1.5 * 1.5) / 2.0 / (RATE - 1.0)).sqrt() / 3.0;
         assert!((error - expected).abs() < 1e-12, "{error}");
+    }
+
+    #[test]
+    fn a_half_that_has_stopped_does_not_tell_how_noise_fell() {
+        // Of two pixels, which are a half each, the first has steps of 1 and 0.5, the other one of 3 alone.
+        let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
+        assert_eq!(film.tile_fall(0), Some(4.0));
+        assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_fall(0), None, "one step");
     }
 
     #[test]

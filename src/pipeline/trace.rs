@@ -25,7 +25,8 @@ pub(super) type Kernel = fn(
 /// The longest time without a tick.
 pub(super) const TICK: Duration = Duration::from_millis(20);
 
-/// Jobs that end within so long are told at once: to wake the thread that asked takes longer than the smallest of them.
+/// Results wait until so much time has passed since the last ones were sent, or the job after them is done: to wake the thread that
+/// asked takes longer than the smallest jobs.
 const AT_ONCE: Duration = Duration::from_micros(300);
 
 /// Everything that is the same for all tiles.

@@ -19,6 +19,9 @@ const EARLY_FALL: f64 = 4.0;
 /// Between which it is believed.
 const FALLS: [f64; 2] = [2.0, 8.0];
 
+/// As many samples as are ever expected; above it stands what nobody knows.
+const MOST: u32 = u32::MAX - 1;
+
 /// The least brightness that noise is held against, as a part of the picture's.
 const LEAST_BRIGHTNESS: f64 = 0.01;
 
@@ -48,6 +51,11 @@ impl Goals {
     /// Samples that it is expected to get; [`u32::MAX`] where nothing is known.
     pub(super) fn expected(&self, cell: usize, half: usize) -> u32 {
         self.expected[cell][half]
+    }
+
+    /// Bytes that they take.
+    pub(super) fn memory_bytes(&self) -> usize {
+        size_of_val(self.decided.as_slice()) + size_of_val(self.expected.as_slice())
     }
 
     /// Whether any half gets fewer samples than these.
@@ -134,7 +142,7 @@ fn wanted(noise: &HalfNoise, convergence: Convergence, brightness: f64, error: f
     if !(relative > 0.0) {
         return noise.samples;
     }
-    convergence.samples_to(AIM * error / relative, noise.samples)
+    convergence.samples_to(AIM * error / relative, noise.samples).min(MOST)
 }
 
 /// Noise over the brightness that it is held against.
@@ -147,9 +155,10 @@ fn relative(noise: &HalfNoise, brightness: f64) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Way {
     samples: u32,
-    /// How often these are doubled as tiles have it of late: up to those that all get, and once at least.
+    /// Doublings of these by each of which the variance falls by `fall`; after them it falls with `power`.
     doublings: u32,
-    /// How many times smaller the variance of the tiles got of late; as each has it, where it has few samples.
+    /// How many times smaller the variance of the tiles got by the last doubling; none below [`LEAST`] samples, where the own fall of
+    /// each tile is taken.
     fall: Option<f64>,
     /// The power of the samples with which variance falls later.
     power: f64,
@@ -187,7 +196,7 @@ impl Way {
         let fall = self.fall.unwrap_or_else(of_tile);
         let noise = noise * libm::pow(fall, -0.5 * f64::from(self.doublings));
         let samples = self.samples.saturating_mul(1 << self.doublings);
-        if noise > 0.0 { samples_by(self.power, bound / noise, samples) } else { self.samples }
+        if noise > 0.0 { samples_by(self.power, bound / noise, samples).min(MOST) } else { self.samples }
     }
 }
 
@@ -273,6 +282,14 @@ mod tests {
         assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
         assert!(near(of(&[1.0]).samples_to(0.25, 1.0, None), 16.0 * 64.0));
         assert!(near(Way::of(Convergence::Independent, vec![9.0], 4).samples_to(0.25, 1.0, Some(9.0)), 64.0));
+    }
+
+    #[test]
+    fn what_takes_more_samples_than_can_be_counted_is_not_taken_for_unknown() {
+        for samples in [2, 16, 64] {
+            let goals = judged([(1.0, 1.0); 2], samples, 1e-12);
+            assert_eq!((goals.of(0, 0), goals.expected(0, 0)), (u32::MAX, MOST), "{samples}");
+        }
     }
 
     #[test]

@@ -19,9 +19,9 @@ pub(in crate::pipeline) struct Canvas {
     pub(super) done: Vec<[u32; 2]>,
     /// Rays of each cell.
     pub(super) rays: Vec<u64>,
-    /// Seconds of a processor that each took.
-    seconds: Vec<f64>,
-    /// What its samples take of late.
+    /// Seconds of a processor that all of them took.
+    seconds: f64,
+    /// What the samples of each take of late.
     recent: Vec<Recent>,
     /// Samples that they are to have at most.
     pub(super) goals: Goals,
@@ -57,7 +57,7 @@ impl Canvas {
             key,
             film: Arc::new(film),
             rays: vec![0; film_cells],
-            seconds: vec![0.0; film_cells],
+            seconds: 0.0,
             recent: vec![Recent::default(); film_cells],
             done,
             goals,
@@ -124,8 +124,14 @@ impl Canvas {
     /// Bytes that it takes.
     pub(super) fn memory_bytes(&self) -> u64 {
         let base = self.base.as_ref().map_or(0, |base| size_of_val(base.pixels.as_slice()) as u64);
-        let done = 4 * size_of_val(self.done.as_slice()) as u64;
-        self.film.memory_bytes() + done + base + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
+        let cells = size_of_val(self.done.as_slice())
+            + size_of_val(self.rays.as_slice())
+            + size_of_val(self.recent.as_slice())
+            + self.goals.memory_bytes();
+        self.film.memory_bytes()
+            + cells as u64
+            + base
+            + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
     /// What brings the halves of every cell of the tiles of a part (none: of all) to as many samples, or to those that they are to
@@ -168,7 +174,7 @@ impl Canvas {
             if let Some(rect) = rect.filter(|rect| rect.intersection(&job.pixels.rect) == Some(*rect)) {
                 self.rays[cell] += rays * rect.area() as u64 / job.pixels.rect.area() as u64;
                 let seconds = seconds * rect.area() as f64;
-                self.seconds[cell] += seconds;
+                self.seconds += seconds;
                 let pixels = job.pixels.part.count(rect.area());
                 self.recent[cell].note(seconds, pixels as f64 * job.samples.len() as f64);
                 match job.pixels.part {
@@ -195,28 +201,33 @@ impl Canvas {
         self.units_of(|cell, half| self.to_come(cell, half, most))
     }
 
-    /// Seconds of a processor that it took, and those of the whole render as far as that is known, of some samples at most. What a
-    /// sample takes in a cell is told by its last ones; where it has none, by the others.
-    pub(super) fn work(&self, most: u32) -> [f64; 2] {
-        let units = |cell: usize, samples: [u32; 2]| -> f64 {
-            let unit = |half| self.film.half_pixel_count(cell, half) as f64 * f64::from(samples[half]);
-            unit(0) + unit(1)
-        };
-        let (mut done, mut of, mut total, mut others) = (0.0, 0.0, 0.0, 0.0);
+    /// Seconds of a processor that it took.
+    pub(super) fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// Those that it will take from here on, as far as that is known, to some samples at most. What a sample takes in a cell is told by
+    /// its last ones; where it has none, by the others.
+    pub(super) fn seconds_to_come(&self, most: u32) -> f64 {
+        let (mut seconds, mut units, mut others) = (0.0, 0.0, 0.0);
         for cell in (0..self.done.len()).filter(|cell| self.film.cell_rect(*cell).is_some()) {
-            let had = units(cell, self.done[cell]);
-            let to_have = units(cell, [0, 1].map(|half| self.to_come(cell, half, most)));
-            if had > 0.0 {
-                let seconds = self.seconds[cell];
-                let to_come = (to_have - had).max(0.0) * self.recent[cell].seconds_of_unit();
-                (done, of, total) = (done + seconds, of + had, total + seconds + to_come);
-            } else {
-                others += to_have;
+            let lacks = |half: usize| {
+                let samples = self.to_come(cell, half, most).saturating_sub(self.done[cell][half]);
+                self.film.half_pixel_count(cell, half) as f64 * f64::from(samples)
+            };
+            let lacking = lacks(0) + lacks(1);
+            match self.recent[cell] {
+                Recent { units: 0.0, .. } => others += lacking,
+                recent => {
+                    seconds += lacking * recent.seconds / recent.units;
+                    units += recent.units;
+                }
             }
         }
         // Before anything is known all samples are alike.
-        let others = if of > 0.0 { others * done / of } else { others };
-        [done, (total + others).max(done)]
+        let of_unit =
+            if units > 0.0 { self.recent.iter().map(|one| one.seconds).sum::<f64>() / units } else { 1.0 };
+        seconds + others * of_unit
     }
 
     /// Samples of the pixels that have most, now and in the end as far as that is known: as many passes of photons are sent.
@@ -260,10 +271,6 @@ impl Recent {
         self.seconds = Self::KEPT * self.seconds + seconds;
         self.units = Self::KEPT * self.units + units;
     }
-
-    fn seconds_of_unit(self) -> f64 {
-        if self.units > 0.0 { self.seconds / self.units } else { 0.0 }
-    }
 }
 
 /// What all halves of all cells lack, if it is the same.
@@ -275,37 +282,81 @@ fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::TileSamples;
     use crate::integrators::RayCounters;
+    use crate::math::Vec3;
     use crate::scene::fingerprint::Fingerprint;
 
-    #[test]
-    fn work_to_come_costs_in_each_tile_what_it_cost_so_far() {
+    /// Of two tiles.
+    fn canvas() -> Canvas {
         let film = Film::new(64, 32, None).expect("a film");
         let cells = film.cell_count();
-        let mut canvas = Canvas {
+        Canvas {
             key: Fingerprint::new("test").finish(),
             film: Arc::new(film),
             done: vec![[0; 2]; cells],
             rays: vec![0; cells],
-            seconds: vec![0.0; cells],
+            seconds: 0.0,
             recent: vec![Recent::default(); cells],
             goals: Goals::none(cells),
             base: None,
             previewer: None,
             is_passing: false,
             ended_by: None,
-        };
-        let mut note = |tile: usize, samples: Range<u32>, seconds: f64| {
-            let pixels = Pixels::from(canvas.film.tile_rect(tile).expect("a tile"));
-            let job = Job { tile, pixels, samples };
-            canvas.note(&job, &Cost { rays: RayCounters::default(), seconds });
-            canvas.work(8).map(|seconds| (seconds * 1e6).round() * 1e-6)
+        }
+    }
+
+    /// A tile has more samples, which took so long.
+    fn note(canvas: &mut Canvas, tile: usize, samples: Range<u32>, seconds: f64) {
+        let pixels = Pixels::from(canvas.film.tile_rect(tile).expect("a tile"));
+        let count = samples.end - samples.start;
+        let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
+        canvas.film.add(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
+        let job = Job { tile, pixels, samples };
+        canvas.note(&job, &Cost { rays: RayCounters::default(), seconds });
+    }
+
+    #[test]
+    fn work_to_come_costs_in_each_tile_what_it_cost_so_far() {
+        let mut canvas = canvas();
+        let mut noted = |tile: usize, samples: Range<u32>, seconds: f64| {
+            note(&mut canvas, tile, samples, seconds);
+            [canvas.seconds(), canvas.seconds_to_come(8)].map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
         // Of the other one nothing is known: it is like the first.
-        assert_eq!(note(0, 0..4, 1.0), [1.0, 4.0]);
-        assert_eq!(note(1, 0..2, 10.0), [11.0, 42.0]);
-        assert_eq!(note(1, 2..8, 30.0), [41.0, 42.0]);
+        assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
+        assert_eq!(noted(1, 0..2, 10.0), [11.0, 31.0]);
+        assert_eq!(noted(1, 2..8, 30.0), [41.0, 1.0]);
         assert_eq!(canvas.passes(8), [8, 8]);
         assert_eq!(canvas.passes(16), [8, 16]);
+    }
+
+    #[test]
+    fn what_samples_take_is_told_by_the_last_ones() {
+        let mut canvas = canvas();
+        for tile in 0..2 {
+            note(&mut canvas, tile, 0..1, 4.0);
+            note(&mut canvas, tile, 1..2, 1.0);
+        }
+        assert_eq!(canvas.seconds(), 10.0);
+        // A quarter of the first and all of the second: 2 seconds for 1.25 samples.
+        assert!(
+            (canvas.seconds_to_come(12) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
+            "{}",
+            canvas.seconds_to_come(12)
+        );
+    }
+
+    #[test]
+    fn no_end_is_foreseen_before_the_noise_tells_it() {
+        let mut canvas = canvas();
+        note(&mut canvas, 0, 0..1, 1.0);
+        note(&mut canvas, 1, 0..1, 1.0);
+        canvas.judge(1, 0.1);
+        assert!(!canvas.is_foreseen(), "one sample has no noise");
+        note(&mut canvas, 0, 1..2, 1.0);
+        note(&mut canvas, 1, 1..2, 1.0);
+        canvas.judge(2, 0.1);
+        assert!(canvas.is_foreseen());
     }
 }

@@ -17,7 +17,8 @@ use super::super::sink::Sink;
 use super::super::trace::TICK;
 use super::Staged;
 use crate::control::{CancelToken, Cancelled, Progress};
-use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons};
+use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons, RenderSettings};
+use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 use crate::world::World;
 
@@ -205,9 +206,10 @@ pub(in crate::pipeline) fn photons(
         };
     };
     if !settings.gathers() {
-        return skipped(match settings.render.max_depth {
-            0 | 1 => "max_depth ends light before it",
-            _ => "this view shows nothing of them",
+        let deeper = Render { max_depth: u32::MAX, ..settings.render };
+        return skipped(match (RenderSettings { render: deeper, ..settings }).gathers() {
+            true => "max_depth 1 leaves no light to them",
+            false => "this view shows nothing of them",
         });
     }
     let key = key(of_photons);

@@ -34,6 +34,8 @@ const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
 const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
 /// A preview may take this part of the time at most.
 const PREVIEW_SHARE: u32 = 10;
+/// To see what is to come may take this part of it: it is a sum over all cells.
+const FORESIGHT_SHARE: u32 = 100;
 
 /// What the stage is given.
 pub(in crate::pipeline) struct Rendering<'a> {
@@ -106,6 +108,16 @@ pub(in crate::pipeline) fn render(
     })
 }
 
+/// What is known of the end.
+struct Foresight {
+    /// When it is to be seen again.
+    due: Instant,
+    /// Seconds of a processor in all.
+    total: Option<f64>,
+    /// Of photons, now and in the end.
+    passes: [u32; 2],
+}
+
 /// One run of the stage.
 struct Painter<'a> {
     canvas: &'a mut Canvas,
@@ -119,6 +131,7 @@ struct Painter<'a> {
     /// Of an earlier render.
     units_before: u64,
     total_units: u64,
+    foresight: Foresight,
     /// Seconds in which photons were sent.
     sending_seconds: f64,
     /// When the last of them began to be sent, while they are.
@@ -136,7 +149,7 @@ impl<'a> Painter<'a> {
         let units = canvas.units();
         let total_units = canvas.units_to_come(rendering.plan.settings.render.samples);
         let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
-        let [done, _] = canvas.work(0);
+        let done = canvas.seconds();
         Self {
             is_first: !canvas.is_covered(),
             canvas,
@@ -151,6 +164,7 @@ impl<'a> Painter<'a> {
             units,
             units_before: units,
             total_units,
+            foresight: Foresight { due: Instant::now(), total: None, passes: [0; 2] },
             rays: RayCounters::default(),
             is_over_time: false,
             next_progress: Instant::now(),
@@ -211,6 +225,7 @@ impl<'a> Painter<'a> {
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
                 self.canvas.judge(target, error.into());
                 self.total_units = self.canvas.units_to_come(most);
+                self.foresight.due = Instant::now();
             }
         }
         Ok(())
@@ -219,8 +234,7 @@ impl<'a> Painter<'a> {
     /// At the noise, where it is time.
     fn look(&mut self) {
         let least = self.canvas.samples(u32::MAX);
-        let [done, _] = self.canvas.work(0);
-        self.outlook.look(&self.canvas.film, least, done);
+        self.outlook.look(&self.canvas.film, least, self.canvas.seconds());
     }
 
     /// All tiles of a part that have fewer samples than `target`.
@@ -354,19 +368,30 @@ impl<'a> Painter<'a> {
     }
 
     /// How far all is after some seconds; nobody knows to where before noise was judged, where it decides that.
-    fn work(&self, elapsed_seconds: f64) -> Work {
-        let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
-        let is_known = !(error > 0.0) || self.canvas.is_foreseen();
-        let [done, total] = self.canvas.work(most);
-        let [passes, all_passes] = self.canvas.passes(most);
+    fn work(&mut self, elapsed_seconds: f64) -> Work {
+        if Instant::now() >= self.foresight.due {
+            self.foresee();
+        }
+        let Foresight { total, passes: [passes, all_passes], .. } = self.foresight;
+        let done = self.canvas.seconds();
         let of_pass = self.rendering.photons.map_or(0.0, PhotonStore::seconds_of_pass);
         let of_this = self.sending_since.map_or(0.0, |since| elapsed_seconds - since);
         let to_come = f64::from(all_passes.saturating_sub(passes)) * of_pass - of_this;
         Work {
             done,
-            total: is_known.then_some(total),
+            total: total.map(|total| total.max(done)),
             aside: [self.sending_seconds + of_this, to_come.max(0.0)],
         }
+    }
+
+    fn foresee(&mut self) {
+        let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
+        let begin = Instant::now();
+        let is_known = !(error > 0.0) || self.canvas.is_foreseen();
+        let total = is_known.then(|| self.canvas.seconds() + self.canvas.seconds_to_come(most));
+        let passes = self.rendering.photons.map_or([0; 2], |_| self.canvas.passes(most));
+        let due = Instant::now() + FORESIGHT_SHARE * begin.elapsed();
+        self.foresight = Foresight { due, total, passes };
     }
 
     /// Of the work that is left, the part that the first pass is.

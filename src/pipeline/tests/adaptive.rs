@@ -1,7 +1,7 @@
 //! Tiles that stop by their noise.
 
 use super::Bench;
-use crate::pipeline::protocol::{Event, Section, Stage};
+use crate::pipeline::protocol::{Section, Stage};
 
 /// A lamp over a floor with a ball: penumbras in some tiles, next to nothing in others.
 const LIT: &str = r#"
@@ -45,23 +45,6 @@ fn smooth_tiles_stop_and_noisy_ones_go_on() {
     bench.overrides.error = Some(0.0);
     let report = bench.done().0;
     assert_eq!((report.image.samples.min, report.image.samples.max), (256, 256));
-}
-
-#[test]
-fn no_end_is_told_before_the_noise_tells_it() {
-    let mut bench = Bench::new(&LIT.replace("samples = 256", "samples = 65536"));
-    let id = bench.send();
-    let events = bench.until_end(id);
-    let progress = events.iter().filter_map(|event| match event {
-        Event::Progress { progress, .. } => Some(progress),
-        _ => None,
-    });
-    let mut told = 0;
-    for progress in progress.filter(|progress| progress.eta_seconds.is_some()) {
-        assert!(progress.total_samples < 4096, "{progress:?}");
-        told += 1;
-    }
-    assert!(told > 0);
 }
 
 #[test]
