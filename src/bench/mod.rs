@@ -21,7 +21,7 @@ pub mod table;
 
 pub use bias::{Bias, LEAST_SEEDS};
 pub use methods::{Method, Toggles, methods};
-pub use order::{News, Order, ReferenceOrder, Steps, Trouble};
+pub use order::{News, Order, ReferenceOrder, Steps, Trouble, Unfinished};
 pub use results::{MethodResult, Picture, ReferenceResult, Results, SceneResult, Step, Verdict};
 pub use run::{run, size};
 pub use slope::{Slope, TimeTo};

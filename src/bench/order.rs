@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::methods::Toggles;
+use super::results::Results;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::session::Unrendered;
 use crate::pipeline::settings::Overrides;
@@ -86,6 +87,15 @@ pub enum News {
     },
     /// Warnings about a scene.
     Warnings(Vec<Diagnostic>),
+}
+
+/// Why it ended before its end, and what was done by then.
+#[derive(Clone, Debug)]
+pub struct Unfinished {
+    /// Why.
+    pub trouble: Trouble,
+    /// The scenes that were measured whole.
+    pub done: Results,
 }
 
 /// Why there are no results.

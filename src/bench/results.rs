@@ -10,7 +10,7 @@ use super::statistics::mean;
 pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 /// Everything that was measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Version.
     pub glimt: String,

@@ -1,10 +1,11 @@
 //! Scene after scene, method after method, step after step, seed after seed.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::measure::Measure;
 use super::methods::methods;
-use super::order::{News, Order, ReferenceOrder, Steps, Trouble};
+use super::order::{News, Order, ReferenceOrder, Steps, Trouble, Unfinished};
 use super::pace::Pace;
 use super::reference::{Amount, Maker, Reference, SEEDS, given, most_measured};
 use super::results::{Results, SceneResult, Step};
@@ -15,26 +16,49 @@ use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 use crate::scene;
 use crate::scene::description::Scene;
+use crate::scene::fingerprint::Key;
 
 /// Pixels on the longer side where nothing else is said.
 const LONG_SIDE: u32 = 96;
 
-/// Measure what the order asks for.
+/// Measure what the order asks for. All scenes are looked at before the first of them is measured.
 ///
 /// # Errors
-/// A scene or the call is wrong, the work failed, or it was told to stop.
-pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Results, Trouble> {
-    check_seeds(order)?;
+/// A scene or the call is wrong, the work failed, or it was told to stop; with the scenes that were done by then.
+pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Results, Box<Unfinished>> {
     let mut pace = Pace::new(order.within, order.scenes.len());
     let mut results =
         Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
-    for path in &order.scenes {
-        let scene = Run { order, path, token, tell }.scene(&mut pace, &mut results.threads)?;
-        results.scenes.push(scene);
-        pace.end_scene();
-    }
+    let runs: Vec<Run<'_>> = order.scenes.iter().map(|path| Run { order, path, token, tell }).collect();
+    let mut measure = || {
+        check_seeds(order)?;
+        for (run, looked) in runs.iter().zip(all_looked(&runs)?) {
+            results.scenes.push(run.scene(looked, &mut pace, &mut results.threads)?);
+            pace.end_scene();
+        }
+        Ok(())
+    };
+    let measured = measure();
     results.seconds = pace.seconds();
-    Ok(results)
+    match measured {
+        Ok(()) => Ok(results),
+        Err(trouble) => Err(Box::new(Unfinished { trouble, done: results })),
+    }
+}
+
+/// What every scene says of itself; or all that is wrong with any of them.
+fn all_looked(runs: &[Run<'_>]) -> Result<Vec<Looked>, Trouble> {
+    let (mut all, mut wrong) = (Vec::new(), Vec::new());
+    for run in runs {
+        match run.look() {
+            Ok(looked) => all.push(looked),
+            Err(Trouble::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
+            Err(trouble @ (Trouble::Failed(Failure::Work(_)) | Trouble::Call(_) | Trouble::Cancelled)) => {
+                return Err(trouble);
+            }
+        }
+    }
+    if wrong.is_empty() { Ok(all) } else { Err(Trouble::Failed(Failure::Scene(wrong))) }
 }
 
 /// The size at which a scene is measured.
@@ -77,14 +101,56 @@ pub(super) struct Run<'a> {
     tell: &'a dyn Fn(News),
 }
 
+/// A scene that can be measured.
+struct Looked {
+    scene: Arc<Scene>,
+    /// References that were given.
+    given: Option<Reference>,
+    /// The settings that all pictures share with the references.
+    common: Overrides,
+    /// What the references depend on.
+    key: Key,
+}
+
 impl Run<'_> {
-    fn scene(&self, pace: &mut Pace, threads: &mut usize) -> Result<SceneResult, Trouble> {
+    /// Reads it and everything that it names.
+    fn look(&self) -> Result<Looked, Trouble> {
         let order = self.order;
+        self.begins("reading", None);
         let loaded = scene::load(self.path, &order.common.sets)
             .map_err(|diagnostics| Trouble::Failed(Failure::Scene(diagnostics)))?;
-        let methods = methods(&loaded.scene, &order.toggles);
+        let given = match &order.reference {
+            ReferenceOrder::Files(files) => Some(given(files)?),
+            ReferenceOrder::InTime | ReferenceOrder::Samples(_) => None,
+        };
+        let (width, height) = match &given {
+            Some(reference) => (reference.two.pair().a().width, reference.two.pair().a().height),
+            None => size(&loaded.scene, (order.width, order.height)),
+        };
+        let common =
+            Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
+        let asked = match &order.reference {
+            ReferenceOrder::Samples(samples) => Some(*samples),
+            ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
+        };
+        let mut session = Session::default();
+        let key = self.maker(&common).key(&mut session, asked)?;
+        self.check_targets(&session)?;
+        Ok(Looked { scene: Arc::clone(&loaded.scene), given, common, key })
+    }
+
+    fn maker<'a>(&'a self, common: &'a Overrides) -> Maker<'a> {
+        Maker { scene: self.path, common, token: self.token, cache: self.order.cache.as_deref() }
+    }
+
+    fn scene(&self, looked: Looked, pace: &mut Pace, threads: &mut usize) -> Result<SceneResult, Trouble> {
+        let Looked { scene, given, common, key } = looked;
+        let methods = methods(&scene, &self.order.toggles);
         pace.begin_scene(methods.len());
-        let (reference, common) = self.reference(&loaded.scene, pace)?;
+        let reference = match given {
+            Some(reference) => reference,
+            None => self.reference(&common, &key, pace)?,
+        };
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
         self.say_reference(&reference, (width, height));
         let most_samples = most_measured(reference.result.samples);
@@ -99,44 +165,23 @@ impl Run<'_> {
         Ok(SceneResult { scene, width, height, reference: reference.result, methods: measured })
     }
 
-    /// The references, and the settings that all pictures share with them.
-    fn reference(&self, scene: &Scene, pace: &Pace) -> Result<(Reference, Overrides), Trouble> {
-        let order = self.order;
-        let of_files = match &order.reference {
-            ReferenceOrder::Files(files) => Some(given(files)?),
-            ReferenceOrder::InTime | ReferenceOrder::Samples(_) => None,
-        };
-        let (width, height) = match &of_files {
-            Some(reference) => (reference.two.pair().a().width, reference.two.pair().a().height),
-            None => size(scene, (order.width, order.height)),
-        };
-        let common =
-            Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
-        self.begins("reading", None);
-        let maker =
-            Maker { scene: self.path, common: &common, token: self.token, cache: order.cache.as_deref() };
-        let mut session = Session::default();
-        let asked = match &order.reference {
-            ReferenceOrder::Samples(samples) => Some(*samples),
-            ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
-        };
-        let key = maker.key(&mut session, asked)?;
-        self.check_targets(&session)?;
-        let amount = match (&order.reference, of_files) {
-            (_, Some(reference)) => return Ok((reference, common)),
-            (ReferenceOrder::Samples(samples), None) => Amount { samples: *samples, seconds: None },
-            (ReferenceOrder::InTime | ReferenceOrder::Files(_), None) => {
-                Amount::in_time(pace.of_references(), order.steps.most_samples())
+    /// The references that are kept, if they are good enough, or new ones.
+    fn reference(&self, common: &Overrides, key: &Key, pace: &Pace) -> Result<Reference, Trouble> {
+        let amount = match &self.order.reference {
+            ReferenceOrder::Samples(samples) => Amount { samples: *samples, seconds: None },
+            ReferenceOrder::InTime | ReferenceOrder::Files(_) => {
+                Amount::in_time(pace.of_references(), self.order.steps.most_samples())
             }
         };
-        if let Some(kept) = maker.kept(&key, amount) {
-            return Ok((kept, common));
+        let maker = self.maker(common);
+        if let Some(kept) = maker.kept(key, amount) {
+            return Ok(kept);
         }
         let begin = |left: usize| {
             let seconds = amount.seconds.map(|seconds| pace.left(seconds * left as f64 / 2.0, true));
             self.begins(&format!("reference {} of 2", 3 - left), seconds);
         };
-        Ok((maker.make(&mut session, &key, amount, begin)?, common))
+        maker.make(&mut Session::default(), key, amount, begin)
     }
 
     /// No output may be a file that the scene is made of.
@@ -211,6 +256,36 @@ mod tests {
         assert_eq!(of(640, 480, (Some(40), None)), (40, 30));
         assert_eq!(of(640, 480, (None, Some(30))), (40, 30));
         assert_eq!(of(640, 480, (Some(7), Some(9))), (7, 9));
+    }
+
+    #[test]
+    fn scenes_that_were_done_are_given_back_though_a_later_one_fails() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scenes: Vec<_> = ["a.toml", "b.toml"].map(|name| folder.path().join(name)).into();
+        for scene in &scenes {
+            let text = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n[environment]\ncolor = 1\n";
+            std::fs::write(scene, text).expect("written");
+        }
+        let order = Order {
+            scenes: scenes.clone(),
+            width: Some(4),
+            height: Some(4),
+            steps: Steps::Samples(vec![1]),
+            seeds: 2,
+            seed: 1,
+            reference: ReferenceOrder::Samples(2),
+            within: 10.0,
+            ..Order::default()
+        };
+        // Somebody moves the second one away while the first is measured.
+        let tell = |news| match news {
+            News::Point { .. } => std::fs::remove_file(&scenes[1]).unwrap_or_default(),
+            News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+        };
+        let Err(unfinished) = run(&order, &CancelToken::new(), &tell) else { panic!("it is gone") };
+        assert!(matches!(unfinished.trouble, Trouble::Failed(_)), "{:?}", unfinished.trouble);
+        let done: Vec<_> = unfinished.done.scenes.iter().map(|scene| scene.methods.len()).collect();
+        assert_eq!(done, [3]);
     }
 
     #[test]

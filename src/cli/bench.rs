@@ -17,7 +17,7 @@ use super::exit::Exit;
 use super::signals::{self, Ended};
 use crate::bench::baseline::{changes, lines};
 use crate::bench::table::table;
-use crate::bench::{self, News, Order, ReferenceOrder, Results, Steps, Toggles, Trouble, cache};
+use crate::bench::{self, News, Order, ReferenceOrder, Results, Steps, Toggles, Trouble, Unfinished, cache};
 use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
@@ -43,21 +43,40 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let (news, work) = begin(order, token)
         .map_err(|error| console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")))?;
     follow(&news, &mut said);
-    let results = work.join().unwrap_or_else(|_| Err(broken()));
+    let results = work.join().unwrap_or_else(|_| Err(Box::new(broken())));
     said.end();
-    let results = results.map_err(|trouble| troubled(&trouble, &ended, &said, console))?;
-    table(&results).iter().for_each(|line| console.answer(line));
-    chart::show(&results, console);
-    if let Some((name, then)) = &baseline {
-        lines(&changes(then, &results), name).iter().for_each(|line| console.answer(line));
+    match results {
+        Ok(results) => {
+            say(&results, baseline.as_ref(), console);
+            outputs.write(&results, &said, console)?;
+            said.done(&results);
+            Ok(ended.by().map_or(Exit::DONE, Exit::signal))
+        }
+        Err(unfinished) => {
+            let Unfinished { trouble, done } = *unfinished;
+            // Nothing is measured where the call is wrong.
+            let is_some = !done.scenes.is_empty();
+            if is_some {
+                say(&done, baseline.as_ref(), console);
+                // What could not be written is said; the exit code tells of the first trouble.
+                let _ = outputs.write(&done, &said, console);
+            }
+            Err(troubled(&trouble, &ended, is_some, &said, console))
+        }
     }
-    outputs.write(&results, &said, console)?;
-    said.done(&results);
-    Ok(ended.by().map_or(Exit::DONE, Exit::signal))
+}
+
+/// The tables, the plots, and what changed since an older run.
+fn say(results: &Results, baseline: Option<&(String, Results)>, console: &Console) {
+    table(results).iter().for_each(|line| console.answer(line));
+    chart::show(results, console);
+    if let Some((name, then)) = baseline {
+        lines(&changes(then, results), name).iter().for_each(|line| console.answer(line));
+    }
 }
 
 /// The thread that measures.
-type Work = JoinHandle<Result<Results, Trouble>>;
+type Work = JoinHandle<Result<Results, Box<Unfinished>>>;
 
 /// The work on a thread of its own, and what it says.
 fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, Work)> {
@@ -83,14 +102,16 @@ fn follow(news: &Receiver<News>, said: &mut Said) {
 }
 
 /// A panic has said what it was.
-fn broken() -> Trouble {
-    Trouble::Failed(Failure::Work("internal error: a part of the renderer gave up".to_owned()))
+fn broken() -> Unfinished {
+    let what = "internal error: a part of the renderer gave up".to_owned();
+    Unfinished { trouble: Trouble::Failed(Failure::Work(what)), done: Results::default() }
 }
 
-fn troubled(trouble: &Trouble, ended: &Ended, said: &Said, console: &Console) -> Exit {
+fn troubled(trouble: &Trouble, ended: &Ended, is_some: bool, said: &Said, console: &Console) -> Exit {
     if let Some(number) = ended.by() {
         if let Some(signal) = signals::name(number) {
-            said.cancelled(&format!("ended by {signal}: nothing was written; finished references are kept"));
+            let what = if is_some { "the scene under way is not in it" } else { "nothing was written" };
+            said.cancelled(&format!("ended by {signal}: {what}; finished references are kept"));
         }
         return Exit::signal(number);
     }

@@ -164,6 +164,48 @@ fn a_run_is_compared_with_an_older_one() {
 }
 
 #[test]
+fn a_baseline_that_is_no_file_is_not_read() {
+    let desk = desk();
+    let pipe = desk.path("pipe.json");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+    for name in ["pipe.json", "/dev/zero"] {
+        let (_, stderr) = bench(&desk, &format!("box.toml {SMALL} --baseline {name}"), 2);
+        assert_eq!(
+            stderr,
+            format!("error: cannot read {name}: it is a pipe, a socket or a device, not a regular file\n")
+        );
+    }
+}
+
+#[test]
+fn all_scenes_are_looked_at_before_the_first_is_measured() {
+    let desk = desk();
+    desk.write("broken.toml", SCENE.replace("radius = 0.5", "radius = -1"));
+    let line = format!("box.toml none.toml broken.toml {SMALL} --csv a.csv");
+    let (stdout, stderr) = bench(&desk, &line, 2);
+    assert_eq!(stdout, "");
+    assert!(stderr.contains("none.toml") && stderr.contains("broken.toml:13"), "all that is wrong: {stderr}");
+    assert!(!desk.path("a.csv").exists());
+    assert!(!desk.path("cache/glimt/references").exists(), "nothing was measured");
+    // An output that the second scene reads.
+    desk.write("skin.ppm", "P6\n1 1\n255\nabc");
+    let skin = "diffuse = { texture = \"skin\" }\n[textures.skin]\nfile = \"skin.ppm\"\n[materials.other]\ndiffuse = 0";
+    desk.write(
+        "skin.toml",
+        SCENE
+            .replace("wall = { diffuse = [0.6, 0.6, 0.5] }", &format!("[materials.wall]\n{skin}"))
+            .replace("lamp = { emission = [8, 8, 8] }", "[materials.lamp]\nemission = 8"),
+    );
+    std::os::unix::fs::symlink("skin.ppm", desk.path("a.svg")).expect("a link");
+    let (stdout, stderr) = bench(&desk, &format!("box.toml skin.toml {SMALL} --plot a.svg"), 2);
+    assert_eq!(stdout, "");
+    assert!(
+        stderr.starts_with("error: cannot write a.svg: it is a file that skin.toml is made of"),
+        "{stderr}"
+    );
+}
+
+#[test]
 fn given_references_decide_the_size_and_one_of_them_is_warned_of() {
     let desk = desk();
     for seed in [8, 9] {

@@ -1,5 +1,6 @@
 //! The files of `glimt bench`, held against those that it reads and against each other.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::progress::Said;
@@ -11,6 +12,7 @@ use crate::cli::lower::STANDARD;
 use crate::control::CancelToken;
 use crate::output::write::{self, Guard};
 use crate::output::{self, FileIdentity, OutputError, holds_foreign_report, holds_foreign_table};
+use crate::system::{file, in_words};
 
 /// What is written, and what must not be.
 pub(super) struct Outputs {
@@ -102,9 +104,8 @@ impl Outputs {
     pub(super) fn baseline(&self, console: &Console) -> Result<Option<(String, Results)>, Exit> {
         let Some(path) = &self.baseline else { return Ok(None) };
         let name = path.display().to_string();
-        let read = std::fs::read(path).map_err(|error| {
-            console.fail(Exit::WRONG, &format!("cannot read {name}: {}", crate::system::in_words(&error)))
-        })?;
+        let read =
+            bytes_of(path).map_err(|why| console.fail(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
         let results = serde_json::from_slice(&read).map_err(|error| {
             let way_out = "name a file that `glimt bench --json FILE` wrote";
             console.fail(Exit::WRONG, &format!("{name} is no baseline: {error}; {way_out}"))
@@ -135,6 +136,26 @@ impl Outputs {
         let written = write::atomic_until(path, &bytes, &guard, &CancelToken::new());
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
+}
+
+/// All of a file of results; nothing that is no file or that large is one.
+fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
+    /// Of results of a million pictures.
+    const MOST: u64 = 256 << 20;
+    let words = |error: std::io::Error| in_words(&error);
+    let (file, metadata) = file::open(path)
+        .map_err(words)?
+        .map_err(|kind| format!("it is {}, not a regular file", kind.words()))?;
+    if metadata.len() > MOST {
+        return Err(format!(
+            "it has {} bytes, more than the {} MiB that are read",
+            metadata.len(),
+            MOST >> 20
+        ));
+    }
+    let mut bytes = Vec::new();
+    file.take(MOST).read_to_end(&mut bytes).map_err(words)?;
+    Ok(bytes)
 }
 
 fn content(kind: Kind, results: &Results) -> Result<Vec<u8>, String> {
