@@ -195,15 +195,34 @@ fn a_corner_that_ends_with_a_slash_lacks_a_number() {
         ("f 1 2 3/", "3/"),
         ("f 1 \\\n 2 \\\r\n 3/\t4", "3/"),
         ("f 1 2/1/ 3\r", "2/1/"),
+        ("f 1 2 3/ # x", "3/"),
+        ("f 1 2 3/# x", "3/"),
     ] {
         let line = 7 + faces.matches('\\').count();
         let said = format!(":{line}: expected a corner like 1/2/3, found {found:?}");
         assert_eq!(says(&format!("{head}{faces}\n")), said, "{faces}");
         assert_eq!(says(&format!("{head}{faces}")), said, "{faces}");
     }
-    for whole in
-        ["f 1/1/1 2/1/1 3/1/1 # 4/ 5/", "g here/\nf 1 2 3", "# f 1/\nf 1 2 3", "mtllib f/ 1/\nf 1 2 3"]
-    {
+    assert!(
+        says(&format!("{head}# note \\\nf 1 2 3/\n")).contains("found \"3/\""),
+        "a comment ends with its line"
+    );
+    for whole in [
+        "f 1/1/1 2/1/1 3/1/1 # 4/ 5/",
+        "g here/\nf 1 2 3",
+        "# f 1/\nf 1 2 3",
+        "mtllib f/ 1/\nf 1 2 3",
+        // The empty line belongs to the face, what follows it does not.
+        "f 1 2 3 \\\n\ng here/ there",
+    ] {
         assert!(read(&format!("{head}{whole}\n")).is_ok(), "{whole}");
     }
+}
+
+#[test]
+fn a_survey_heeds_the_token() {
+    let token = CancelToken::new();
+    assert!(Survey::of(b"f 1 2 3\n", &token).is_ok());
+    token.cancel();
+    assert!(Survey::of(b"f 1 2 3\n", &token).is_err());
 }
