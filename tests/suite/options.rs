@@ -234,6 +234,7 @@ fn wrong_values_are_answered_with_what_is_expected() {
         assert!(stderr.contains(words), "{option}: {stderr}");
     }
     for (call, words) in [
+        ("--samples 4 ball.toml b.toml", "\"b.toml\" is one scene too many"),
         ("chekc ball.toml", "there is no command \"chekc\", nor a scene of that name: did you mean `check`?"),
         (
             "render ball.toml",
