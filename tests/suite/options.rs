@@ -2,6 +2,8 @@
 
 use std::fs;
 use std::io::Read;
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
 use std::process::Stdio;
 
 use super::desk::{Desk, SCENE};
@@ -347,6 +349,12 @@ fn a_dash_is_standard_output_where_that_is_free() {
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), b"".as_slice()));
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(report["image"]["path"], "ball.png");
+    let (mut ours, theirs) = UnixStream::pair().expect("a socket");
+    let mut child = desk.glimt("ball.toml --once --report - --progress none");
+    let mut child = child.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
+    let mut report = String::new();
+    ours.read_to_string(&mut report).expect("a report");
+    assert!(child.wait().expect("it ends").success() && report.starts_with('{'), "{report}");
     for (call, words) in [
         (
             "ball.toml --report -",
