@@ -82,12 +82,12 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     };
     let specular = || scene.objects.iter().filter_map(|object| object.material).any(is_specular);
     let mut warnings = Vec::new();
-    if is_path && !scene.lights.is_empty() && specular() {
+    if is_path && scene.lights.iter().any(Light::sends) && specular() {
         let message = "path finds no light of a [[light]] without size that passes mirror or glass before it meets a \
                        surface: what they would throw on it stays dark";
         warnings.push((Cause::Integrator, message.to_owned()));
     }
-    if photons.is_some() && specular() && scene.lights.iter().any(is_steady) {
+    if photons.is_some() && specular() && scene.lights.iter().any(|light| light.sends() && is_steady(light)) {
         let message =
             "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces";
         warnings.push((Cause::Photons, message.to_owned()));
