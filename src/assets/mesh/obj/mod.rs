@@ -46,16 +46,17 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         };
         return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
     };
-    let Found { materials: known, resolved, mut warnings, missing, files, pictures } =
+    let Found { materials: known, resolved, warnings: mut material_warnings, missing, files, pictures } =
         libraries.found.into_inner();
     let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
         found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
     });
     if !missing {
         let unknown = used.difference(&resolved);
-        warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
+        material_warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
     }
-    let mut parsed = Parsed { materials, warnings, companions: files, pictures, ..Parsed::default() };
+    let mut parsed =
+        Parsed { materials, material_warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
     assemble(source, parsed)
 }
