@@ -58,6 +58,8 @@ pub struct LoadedMesh {
     pub dropped: Dropped,
     /// Anything else worth saying, a line each.
     pub warnings: Vec<String>,
+    /// What its own materials lack, a line each: of no account where the scene gives it another one.
+    pub material_warnings: Vec<String>,
     /// Files that were read besides the mesh file, or should have been: material libraries. When one of them
     /// changes, so does this value.
     pub companions: Vec<PathBuf>,

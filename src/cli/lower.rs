@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::args::{Progress, RenderArgs};
 use crate::output::Format;
+use crate::output::write::STDOUT;
 use crate::pipeline::settings::Overrides;
 use crate::tui::{ColorChoice, PreviewChoice};
 
@@ -34,7 +35,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
             let why = "which has the picture: name a file, or use --once";
             return Err(format!("--report {STANDARD} is standard output, {why}"));
         }
-        overrides.report = Some("/dev/stdout".into());
+        overrides.report = Some(STDOUT.into());
     }
     let scene = args.scene.ok_or("no scene is given; see glimt --help")?;
     Ok(Order {

@@ -80,7 +80,8 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
 
 /// What is said of a first word that is neither a file nor looks like one: a command was meant.
 fn unknown_command(arguments: &[OsString]) -> Option<String> {
-    no_command(Path::new(arguments.iter().skip(1).find(|word| !word.to_string_lossy().starts_with('-'))?))
+    // A later word may be the value of an option.
+    no_command(Path::new(arguments.get(1)?))
 }
 
 /// The same of a word where a scene stands.

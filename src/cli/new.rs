@@ -42,10 +42,12 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
 
 /// What is said of a name that a picture or a mesh has: nobody would find the scene in it, and a render writes pictures.
 fn misnamed(file: &Path) -> Option<String> {
-    let what = match () {
-        () if is_mesh(file) => "a mesh",
-        () if is_picture(file) => "a picture",
-        () => return None,
+    let what = if is_mesh(file) {
+        "a mesh"
+    } else if is_picture(file) {
+        "a picture"
+    } else {
+        return None;
     };
     let scene = file.with_extension("toml");
     Some(format!(

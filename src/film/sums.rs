@@ -26,7 +26,8 @@ pub enum FilmError {
     /// Its memory cannot be had.
     #[error(
         "a picture of {width}×{height} pixels needs {:.1} GB of memory, which this machine does not give; \
-         make it smaller, or render a part of it by a crop", *.bytes as f64 / 1e9
+         make it smaller{}", *.bytes as f64 / 1e9,
+        way_out(*.crop_helps)
     )]
     Memory {
         /// Columns.
@@ -35,6 +36,8 @@ pub enum FilmError {
         height: u32,
         /// For the sums and the finished picture.
         bytes: u64,
+        /// Whether there is room for the finished picture, which a crop does not make smaller, and no crop as yet.
+        crop_helps: bool,
     },
     /// It would have no pixels.
     #[error("there are no pixels to render: the picture is {width}×{height} and the crop lies outside of it")]
@@ -44,6 +47,14 @@ pub enum FilmError {
         /// Rows.
         height: u32,
     },
+}
+
+fn way_out(crop_helps: bool) -> &'static str {
+    if crop_helps {
+        ", or render a part of it by a crop"
+    } else {
+        "; a crop of it is as large, with black around it"
+    }
 }
 
 /// Samples per pixel.
@@ -208,7 +219,11 @@ impl Film {
         let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
         let bytes = bytes_needed(width, height, crop);
         let tiles = if bytes <= most_bytes { allocate(width, height, crop) } else { None };
-        let tiles = tiles.ok_or(FilmError::Memory { width, height, bytes })?;
+        let tiles = tiles.ok_or_else(|| {
+            let least = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
+            let crop_helps = crop == whole && least <= most_bytes && is_available(least);
+            FilmError::Memory { width, height, bytes, crop_helps }
+        })?;
         static IDS: AtomicU64 = AtomicU64::new(0);
         Ok(Self {
             width,
@@ -427,10 +442,16 @@ fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
     (crop.area() as u64).saturating_mul(SUM_BYTES as u64).saturating_add(whole.saturating_mul(pixel as u64))
 }
 
+/// Whether so much can be had at once.
+fn is_available(bytes: u64) -> bool {
+    usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
+}
+
 /// Asks for all the memory at once first, as a system that promises more than it has refuses only that.
 fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
-    let bytes = usize::try_from(bytes_needed(width, height, crop)).ok()?;
-    Vec::<u8>::new().try_reserve_exact(bytes).ok()?;
+    if !is_available(bytes_needed(width, height, crop)) {
+        return None;
+    }
     let (columns, rows) = tile_grid(crop);
     let mut tiles = Vec::new();
     tiles.try_reserve_exact(columns * rows).ok()?;

@@ -214,6 +214,13 @@ fn a_film_that_does_not_fit_is_an_error_that_says_what_to_do() {
     let error = Film::new(u32::MAX, u32::MAX, None).expect_err("no machine has this");
     assert!(error.to_string().contains("4294967295×4294967295"), "{error}");
     assert!(error.to_string().contains("smaller"), "{error}");
+    assert!(error.to_string().ends_with("; a crop of it is as large, with black around it"), "{error}");
+    let cropped = |most_bytes, crop| Film::within(most_bytes, 100, 100, crop).expect_err("too little");
+    let part = Rect { x: 0, y: 0, width: 50, height: 100 };
+    let way_out = ", or render a part of it by a crop";
+    assert!(cropped(200_000, None).to_string().ends_with(way_out));
+    assert!(!cropped(200_000, Some(part)).to_string().ends_with(way_out));
+    assert!(!cropped(100_000, None).to_string().ends_with(way_out));
     assert_eq!(Film::new(0, 5, None).expect_err("no pixels"), FilmError::Empty { width: 0, height: 5 });
     let outside = Rect { x: 10, y: 0, width: 1, height: 1 };
     assert!(Film::new(10, 5, Some(outside)).is_err());

@@ -86,6 +86,24 @@ pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     Ok(format)
 }
 
+/// The same without a try in the directory, for those who look often.
+///
+/// # Errors
+/// As [`check_target`], but for a directory that takes no files although it may be written.
+pub fn look_at_target(path: &Path) -> Result<Format, OutputError> {
+    let format = Format::of(path)?;
+    look_at_place(path)?;
+    Ok(format)
+}
+
+/// [`look_at_target`] of any file.
+///
+/// # Errors
+/// As [`look_at_target`], but for the ending.
+pub fn look_at_place(path: &Path) -> Result<(), OutputError> {
+    place::find(path).map(drop)
+}
+
 /// Whether any file can be written here, as far as can be told before the work.
 ///
 /// # Errors

@@ -16,11 +16,14 @@ use super::temporary::{self, Temporary};
 use super::{OutputError, stoppable};
 use crate::control::CancelToken;
 
+/// Standard output. It is open: opening it by this name would fail where it is a socket.
+pub const STDOUT: &str = "/dev/stdout";
+
 /// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At
 /// any moment, whatever ends the process, the file is the old one or the new one. Its permissions stay; a link
 /// stays and what it points to is replaced. Temporary files of killed writers in the same directory are removed.
 ///
-/// Devices, pipes and open descriptors (`/dev/stdout`) are written in place.
+/// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
 /// # Errors
 /// Names the path, what the system said and the way out; the old file is untouched then, and no temporary file is
@@ -110,6 +113,10 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
 
 /// Appends, so that a descriptor that is a file keeps what it has.
 fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
+    if path == Path::new(STDOUT) {
+        let mut stdout = io::stdout().lock();
+        return stoppable::write_all(&mut stdout, bytes, token).and_then(|()| stdout.flush());
+    }
     let mut options = OpenOptions::new();
     options.append(true);
     // A pipe that nobody reads would hold the process for ever: not waiting makes that an error.

@@ -1,4 +1,4 @@
-//! What a person should know of the settings that hold, each with what asked for it: an option, a key, or the scene.
+//! What a person should know of the settings that hold, each with what asked for it: an option or the scene.
 
 use std::path::PathBuf;
 
@@ -35,8 +35,7 @@ pub(super) fn cautions(
 fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides) -> Diagnostic {
     let severity = Severity::Warning;
     if let Some(option) = cause.option(overrides) {
-        let key = cause.toggle().map_or(String::new(), |key| format!(", or of the key `{key}`"));
-        let help = Some(format!("this comes of `{option}`{key}, not of the scene"));
+        let help = Some(format!("this comes of the setting `{option}`, not of the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
     match cause.key().and_then(|(table, key)| loaded.setting(table, key)) {
@@ -56,16 +55,6 @@ impl Cause {
             Self::PhotonCount => None,
             Self::Clamp => overrides.clamp.map(|clamp| format!("--clamp {clamp}")),
             Self::View => overrides.view.map(|view| format!("--view {}", view.name())),
-        }
-    }
-
-    /// The key of the terminal that changes it.
-    fn toggle(self) -> Option<char> {
-        match self {
-            Self::Integrator => Some('i'),
-            Self::Photons => Some('p'),
-            Self::View => Some('v'),
-            Self::PhotonCount | Self::Clamp => None,
         }
     }
 
@@ -93,12 +82,12 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     };
     let specular = || scene.objects.iter().filter_map(|object| object.material).any(is_specular);
     let mut warnings = Vec::new();
-    if is_path && !scene.lights.is_empty() && specular() {
+    if is_path && scene.lights.iter().any(Light::sends) && specular() {
         let message = "path finds no light of a [[light]] without size that passes mirror or glass before it meets a \
                        surface: what they would throw on it stays dark";
         warnings.push((Cause::Integrator, message.to_owned()));
     }
-    if photons.is_some() && specular() && scene.lights.iter().any(is_steady) {
+    if photons.is_some() && specular() && scene.lights.iter().any(|light| light.sends() && is_steady(light)) {
         let message =
             "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces";
         warnings.push((Cause::Photons, message.to_owned()));

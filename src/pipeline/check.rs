@@ -7,7 +7,7 @@ use std::sync::mpsc;
 use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use crate::scene::description::{Lowered, Object, Shape};
 use crate::scene::diagnostic::Diagnostic;
 use crate::world::file_emits;
@@ -21,7 +21,7 @@ pub struct Checked {
     pub triangles: u64,
     /// Image files read, each reading of its numbers counted.
     pub textures: u64,
-    /// Lights without extent, an environment, and objects that emit.
+    /// Lights without extent, an environment, and objects that emit; those that are black do not count.
     pub lights: u64,
     /// What is probably not meant.
     pub warnings: Vec<Diagnostic>,
@@ -46,12 +46,13 @@ pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
         (None, Some(mesh)) => meshes[mesh.file].mesh.materials.iter().any(file_emits),
         (None, None) => false,
     };
-    let environment = scene.environment.iter().filter(|environment| environment.color != Vec3::ZERO).count();
+    let lights = scene.lights.iter().filter(|light| light.sends()).count();
+    let environment = scene.environment.iter().filter(|environment| environment.sends()).count();
     Ok(Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
         textures: textures.images.len() as u64,
-        lights: (scene.lights.len() + environment + scene.objects.iter().filter(emits).count()) as u64,
+        lights: (lights + environment + scene.objects.iter().filter(emits).count()) as u64,
         warnings,
     })
 }

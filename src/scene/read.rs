@@ -128,6 +128,7 @@ pub(super) fn neighbour(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Op
         .take(MOST_FILES)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(|name| is_alike(Path::new(name), path) && may_be_meant(Path::new(name)))
+        .filter(|name| matches!(file::kind(&folder.join(name)), Ok((Kind::Regular, _))))
         .collect();
     let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
     Some(folder.join(near))
@@ -186,6 +187,12 @@ mod tests {
         let dangling = folder.path().join("link.toml");
         std::os::unix::fs::symlink(folder.path().join("gone"), &dangling).expect("a link");
         assert!(message(&dangling).message.contains("symbolic link to a file that does not exist"));
+        // Nor is a folder, a link that leads nowhere or a pipe.
+        std::fs::create_dir(folder.path().join("hall.toml")).expect("made");
+        std::os::unix::fs::symlink(folder.path().join("gone"), folder.path().join("halls.toml"))
+            .expect("a link");
+        let not_regular = message(&folder.path().join("hal.toml"));
+        assert!(not_regular.help.expect("a way out").contains("glimt new"));
         // A picture is no scene.
         std::fs::write(folder.path().join("my_hall.png"), "").expect("written");
         let picture = message(&folder.path().join("my_hall.toml"));

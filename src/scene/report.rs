@@ -100,7 +100,7 @@ fn one(
         let label = visible(&place.label);
         let fits = excerpt.label_column(line) + columns(&label) <= width;
         // The renderer wraps no labels, only notes.
-        note = (!fits).then_some(place.label.as_str());
+        note = (!fits && !label.is_empty()).then_some(place.label.as_str());
         let label = (fits && !label.is_empty()).then(|| label.into_owned());
         let annotation = AnnotationKind::Primary.span(excerpt.span).label(label);
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));

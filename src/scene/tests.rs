@@ -183,6 +183,13 @@ fn warns_only_of_real_darkness_and_real_gain() {
     let sphere = "[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='m'\n";
     let dark = "nothing lights this scene";
     assert_eq!(messages(&format!("[materials.m]\n{sphere}")), [dark]);
+    for black in
+        ["[[light]]\ntype='point'\nposition=[0,5,0]\nintensity=[0,0,0]", "[environment]\ncolor=[0,0,0]"]
+    {
+        assert_eq!(messages(&format!("[materials.m]\n{sphere}{black}\n")), [dark], "{black}");
+    }
+    let one_of_two = "[[light]]\nintensity=[0,0,0]\n[[light]]\n";
+    assert_eq!(messages(&format!("[materials.m]\n{sphere}{one_of_two}")), [""; 0]);
     assert_eq!(messages(&format!("[materials.m]\nemission=[0,0,1]\n{sphere}")), [""; 0]);
     assert_eq!(messages(&format!("[render]\nambient=[0,0,1]\n[materials.m]\n{sphere}")), [""; 0]);
     let gain = "this material reflects more light than falls on it";

@@ -10,11 +10,13 @@ use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Duration;
 
+#[cfg(target_os = "linux")]
+use nix::libc;
 use nix::sys::signal::{Signal as Number, kill};
 use nix::unistd::{Pid, getpid, getppid, getsid};
 use signal_hook::consts::{
-    SIGALRM, SIGCONT, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM,
-    SIGWINCH, SIGXCPU,
+    SIGALRM, SIGCONT, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP, SIGTSTP, SIGUSR1,
+    SIGUSR2, SIGVTALRM, SIGWINCH, SIGXCPU,
 };
 use signal_hook::iterator::Signals;
 use signal_hook::low_level;
@@ -33,7 +35,18 @@ const WATCH: Duration = Duration::from_millis(500);
 /// Those that mean something to the front end.
 const MEANT: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
 /// Those that mean nothing to it and end a program all the same: the terminal is given back before that.
-const OTHERS: [i32; 7] = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO];
+const OTHERS: [i32; 9] = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGSYS, SIGTRAP];
+
+/// The same of Linux alone, real-time signals among them.
+#[cfg(target_os = "linux")]
+fn of_linux() -> impl Iterator<Item = i32> {
+    [libc::SIGPWR, libc::SIGSTKFLT].into_iter().chain(libc::SIGRTMIN()..=libc::SIGRTMAX())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn of_linux() -> impl Iterator<Item = i32> {
+    std::iter::empty()
+}
 
 /// Hears signals until it is dropped; after that they do what they do by default.
 pub(super) struct Listener {
@@ -44,7 +57,7 @@ impl Listener {
     /// Starts to listen; what is heard goes to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
-        let mut signals = Signals::new(MEANT.iter().chain(&OTHERS))?;
+        let mut signals = Signals::new(MEANT.into_iter().chain(OTHERS).chain(of_linux()))?;
         let ear = Ear { over: Arc::clone(&over), events: events.clone() };
         thread::Builder::new().name("signals".to_owned()).spawn(move || {
             for number in signals.forever() {
@@ -89,7 +102,10 @@ struct Ear {
 impl Ear {
     fn hear(&self, number: i32) {
         if self.over.load(Ordering::Acquire) {
-            let _ = low_level::emulate_default_handler(number);
+            // Those of Linux alone are not known to it.
+            if low_level::emulate_default_handler(number).is_err() {
+                low_level::exit(128 + number);
+            }
             return;
         }
         let is_of_keys = matches!(number, SIGINT | SIGQUIT | SIGTSTP | SIGCONT);
@@ -103,8 +119,8 @@ impl Ear {
             SIGHUP => Signal::Hangup,
             SIGTSTP => Signal::Suspend,
             SIGWINCH => Signal::Resize,
-            other if OTHERS.contains(&other) => Signal::Other(other),
-            _ => Signal::Continue,
+            SIGCONT => Signal::Continue,
+            other => Signal::Other(other),
         };
         self.tell(signal);
     }
@@ -177,6 +193,14 @@ pub(super) fn stop() {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn real_time_signals_are_heard() {
+        let heard: Vec<i32> = of_linux().collect();
+        assert!(heard.contains(&libc::SIGRTMIN()) && heard.contains(&libc::SIGRTMAX()));
+        assert_eq!(ends(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
+    }
 
     #[test]
     fn the_signals_that_end_have_their_codes() {

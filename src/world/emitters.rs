@@ -14,7 +14,7 @@ use crate::lights::{
 };
 use crate::materials::Emission;
 use crate::materials::texels::Texels;
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use crate::scene::description::{self, Scene};
 
 /// The map of the environment, by the texels of its file; none where they are black.
@@ -34,7 +34,7 @@ pub fn lights(
     sky: Option<Arc<SkyMap>>,
     token: &CancelToken,
 ) -> Result<Arc<Lights>, Cancelled> {
-    let points = scene.lights.iter().filter(|light| sends(light));
+    let points = scene.lights.iter().filter(|light| light.sends());
     let points = points.map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissions: Vec<Emission> =
@@ -65,24 +65,14 @@ pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<Photon
 
 /// Light from all around; none where it is black.
 fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> Option<Environment> {
-    let description::Environment { color, file, rotate } = environment;
-    if *color == Vec3::ZERO {
+    if !environment.sends() {
         return None;
     }
+    let description::Environment { color, file, rotate } = environment;
     match file {
         Some(_) => Some(Environment::map(sky?, *color, *rotate)),
         None => Some(Environment::Constant(*color)),
     }
-}
-
-/// Whether it is not black.
-fn sends(light: &description::Light) -> bool {
-    let color = match light {
-        description::Light::Point(light) => light.intensity,
-        description::Light::Spot(light) => light.point.intensity,
-        description::Light::Directional(light) => light.irradiance,
-    };
-    color != Vec3::ZERO
 }
 
 /// A light that is no shape, in coordinates that start at `origin`.
@@ -181,8 +171,8 @@ mod tests {
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
     use crate::lights::{Numbers, Start};
-    use crate::math::random;
     use crate::math::transform::Transform;
+    use crate::math::{Vec3, random};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
 

@@ -46,6 +46,7 @@ fn what_a_scene_does_not_use_changes_no_bit() {
             wrong.push(format!("{}: other bits", pair.name));
         }
         let done = |report: &serde_json::Value| [report["counters"].clone(), report["lights"].clone()];
+        assert!(done(&off.report).iter().all(serde_json::Value::is_object), "{:?}", done(&off.report));
         if done(&off.report) != done(&on.report) {
             wrong.push(format!("{}: {:?} {:?}", pair.name, done(&off.report), done(&on.report)));
         }

@@ -4,6 +4,7 @@ mod apart;
 mod convert;
 mod counting;
 mod exr;
+mod hdr;
 mod jpeg;
 mod png;
 
@@ -158,6 +159,7 @@ impl Source {
 
     /// A decoder of an image within the limits, and the bytes that its texels will take.
     fn decoder(self, report: Reporter) -> Result<(Box<dyn ImageDecoder>, u64), String> {
+        let header = self.file.try_clone().map_err(|error| in_words(&error))?;
         let reader = BufReader::new(Counting::new(self.file, self.length, report));
         let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
         if reader.format().is_none() {
@@ -168,6 +170,9 @@ impl Source {
         let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
         if is_jpeg {
             jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?;
+        }
+        if reader.format() == Some(ImageFormat::Hdr) {
+            hdr::check_header(&header, &self.token)?;
         }
         let decoder = choose(reader, self.limits.memory_bytes).map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };

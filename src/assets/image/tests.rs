@@ -254,3 +254,15 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn the_header_of_an_hdr_image_is_bounded() {
+    let refused = "its header does not end within 1 MiB";
+    let lines = |count: usize| ["#?RADIANCE\n", &"x=1\n".repeat(count), "\n-Y 1 +X 1\n"].concat();
+    let pixel = [128, 128, 128, 129];
+    assert!(says("a.hdr", lines(1 << 18).as_bytes()).contains(refused));
+    assert!(says("a.hdr", format!("#?RADIANCE\n\n{}", "x".repeat(1 << 20)).as_bytes()).contains(refused));
+    let long = [lines(1 << 17).as_bytes(), &pixel].concat();
+    assert!(load_bytes("a.hdr", &long, ImageEncoding::Color).is_ok());
+    assert!(!says("a.hdr", b"#?RADIANCE\nx=1\n").contains(refused));
+}

@@ -63,14 +63,25 @@ pub(super) struct Parsed {
     pub(super) face_materials: Vec<u32>,
     pub(super) materials: Vec<FileMaterial>,
     pub(super) warnings: Vec<String>,
+    pub(super) material_warnings: Vec<String>,
     pub(super) companions: Vec<PathBuf>,
     pub(super) pictures: Vec<PathBuf>,
 }
 
 /// Cut, drop, compact, complete.
 pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
-    let Parsed { positions, normals, uvs, faces, face_materials, materials, warnings, companions, pictures } =
-        parsed;
+    let Parsed {
+        positions,
+        normals,
+        uvs,
+        faces,
+        face_materials,
+        materials,
+        warnings,
+        material_warnings,
+        companions,
+        pictures,
+    } = parsed;
     let (origin, positions) = around_origin(positions, &faces);
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
     let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
@@ -86,7 +97,7 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
         *uv = Vec2::ZERO;
     }
     complete_normals(&mut mesh, source.watch.token)?;
-    Ok(LoadedMesh { mesh, materials, dropped, warnings, companions, pictures })
+    Ok(LoadedMesh { mesh, materials, dropped, warnings, material_warnings, companions, pictures })
 }
 
 /// Positions from an origin near those that faces use. What no `f32` can hold becomes infinite.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::text::with_line_feeds;
 use crate::assets::read::{self, Watch};
 use crate::assets::{AssetError, FileMaterial};
 use crate::math::{DVec3, Vec3};
@@ -17,11 +18,8 @@ pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>,
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
     let mut text = String::with_capacity(bytes.len());
-    let whole = String::from_utf8_lossy(&bytes);
-    // Lines of old end in carriage returns alone.
-    let end = if whole.contains('\n') { '\n' } else { '\r' };
-    for (index, line) in whole.split_terminator(end).enumerate() {
-        let line = line.strip_suffix('\r').unwrap_or(line);
+    let bytes = with_line_feeds(&bytes);
+    for (index, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
         let line = without_comment(line);
         check(line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
         text.push_str(line);

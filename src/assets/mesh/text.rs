@@ -1,6 +1,16 @@
 //! Numbers out of bytes: text files of numbers need no UTF-8 and no copies.
 
+use std::borrow::Cow;
+
 use fast_float2::parse_partial;
+
+/// The text, with line feeds where the lines end in carriage returns alone, as on a Macintosh of old.
+pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if memchr::memchr(b'\n', bytes).is_some() || memchr::memchr(b'\r', bytes).is_none() {
+        return Cow::Borrowed(bytes);
+    }
+    Cow::Owned(bytes.iter().map(|byte| if *byte == b'\r' { b'\n' } else { *byte }).collect())
+}
 
 /// A place in a text.
 #[derive(Clone, Copy)]
@@ -111,6 +121,14 @@ mod tests {
         assert!(cursor.skip_blank());
         assert_eq!(cursor.word(), b"f");
         assert!(!cursor.skip_blank());
+    }
+
+    #[test]
+    fn carriage_returns_end_lines_where_nothing_else_does() {
+        assert_eq!(*with_line_feeds(b"a\rb\r"), *b"a\nb\n");
+        for as_it_is in [b"a\r\nb\rc".as_slice(), b"a\nb", b"a", b""] {
+            assert!(matches!(with_line_feeds(as_it_is), Cow::Borrowed(same) if same == as_it_is));
+        }
     }
 
     #[test]

@@ -101,7 +101,11 @@ mod tests {
             ("room.obj", false),
         ] {
             let loaded = mesh::load(&folder().join(name), &unwatched, &CancelToken::new()).expect(name);
-            assert_eq!((loaded.dropped, loaded.warnings), Default::default(), "{name}");
+            assert_eq!(
+                (loaded.dropped, loaded.warnings, loaded.material_warnings),
+                Default::default(),
+                "{name}"
+            );
             let mesh = loaded.mesh;
             together += if name.ends_with("ply") { mesh.triangles.len() } else { 0 };
             // Places, not indices: seams of texture coordinates have two vertices at one place.

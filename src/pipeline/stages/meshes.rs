@@ -13,6 +13,7 @@ use crate::assets::mesh::load;
 use crate::assets::{AssetError, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::Loaded;
+use crate::scene::description::{Located, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// A mesh file with the files that it names.
@@ -62,14 +63,17 @@ pub(in crate::pipeline) fn meshes(
     })?;
     let mut meshes = Vec::new();
     let mut counts = Counts::default();
-    for (file, asset) in files.iter().zip(assets) {
+    let mut warnings = Vec::new();
+    let own_materials = with_own_materials(&loaded.scene);
+    for ((file, asset), uses_own) in files.iter().zip(assets).zip(own_materials) {
         let content = asset.files[0].content;
         asset.files.into_iter().for_each(|file| findings.read(file));
         let mesh = match asset.result {
             Ok((mesh, was_kept)) => {
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
-                warn(loaded, file.span.clone(), &file.value, &mesh.mesh, findings);
+                let said = warnings_of(&mesh.mesh, uses_own);
+                warnings.extend(said.map(|said| (file, format!("{}: {said}", file.value.display()))));
                 let bytes = mesh.mesh.mesh.memory_bytes();
                 cache.insert(canonical(&file.value), file_key(&file.value, content), (mesh.clone(), bytes));
                 mesh
@@ -84,6 +88,7 @@ pub(in crate::pipeline) fn meshes(
         };
         meshes.push(mesh);
     }
+    warn(loaded, warnings, findings);
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
         if let Some(mesh) = object.shape.mesh()
             && meshes[mesh.file].mesh.lacks_materials()
@@ -172,18 +177,32 @@ pub(super) fn canonical(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
-fn warn(
-    loaded: &Loaded,
-    span: std::ops::Range<usize>,
-    path: &Path,
-    mesh: &LoadedMesh,
-    findings: &mut Findings,
-) {
-    if let Some(message) = dropped(&mesh.dropped) {
-        findings.warn(loaded, span.clone(), format!("{}: {message}", path.display()));
+/// Of each mesh file, whether an object shows its own materials.
+fn with_own_materials(scene: &Scene) -> Vec<bool> {
+    let mut shown = vec![false; scene.mesh_files.len()];
+    let plain = scene.objects.iter().filter(|object| object.material.is_none());
+    plain.filter_map(|object| object.shape.mesh()).for_each(|mesh| shown[mesh.file] = true);
+    shown
+}
+
+/// What is said of a file, whose own materials count where they are shown.
+fn warnings_of(mesh: &LoadedMesh, uses_own: bool) -> impl Iterator<Item = String> {
+    let of_materials = mesh.material_warnings.iter().filter(move |_| uses_own);
+    dropped(&mesh.dropped).into_iter().chain(mesh.warnings.iter().chain(of_materials).cloned())
+}
+
+/// Most warnings of all mesh files.
+const MOST_WARNINGS: usize = 100;
+
+fn warn(loaded: &Loaded, warnings: Vec<(&Located<PathBuf>, String)>, findings: &mut Findings) {
+    let unsaid = warnings.len().saturating_sub(MOST_WARNINGS);
+    let last = warnings.last().map(|(file, _)| file.span.clone());
+    for (file, message) in warnings.into_iter().take(MOST_WARNINGS) {
+        findings.warn(loaded, file.span.clone(), message);
     }
-    for warning in &mesh.warnings {
-        findings.warn(loaded, span.clone(), format!("{}: {warning}", path.display()));
+    if let Some(span) = last.filter(|_| unsaid > 0) {
+        let s = if unsaid == 1 { "" } else { "s" };
+        findings.warn(loaded, span, format!("{unsaid} more warning{s} of mesh files"));
     }
 }
 
@@ -244,16 +263,46 @@ mod tests {
 
         /// A request for `a.obj` that sees files as this snapshot does: the mesh and what is said to be in the files.
         fn read(&mut self, contents: &Snapshot) -> (Arc<KeptMesh>, Vec<FileRead>) {
-            let text = "[[mesh]]\nfile = \"a.obj\"\n[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
-            self.write("scene.toml", text);
+            let (meshes, findings) = self.find("[[mesh]]\nfile = \"a.obj\"\n", contents);
+            assert!(findings.errors.is_empty(), "{:?}", findings.errors);
+            (meshes[0].clone(), findings.files)
+        }
+
+        /// The meshes of a scene with these tables.
+        fn find(&mut self, tables: &str, contents: &Snapshot) -> (Meshes, Findings) {
+            let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
+            self.write("scene.toml", &format!("{tables}{camera}"));
             let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");
             let token = CancelToken::new();
             let reading = Reading { sink: &self.sink, token: &token, contents, pool: &self.pool };
             let mut findings = Findings::default();
             let meshes = meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not cancelled");
-            assert!(findings.errors.is_empty(), "{:?}", findings.errors);
-            (meshes.value[0].clone(), findings.files)
+            (meshes.value, findings)
         }
+    }
+
+    #[test]
+    fn what_a_files_own_materials_lack_is_said_where_they_are_shown() {
+        let mut desk = Desk::new();
+        desk.write("a.obj", &OBJ.replace("usemtl m\n", "f 1 3 2\nusemtl none\n"));
+        let mut said = |tables: &str| {
+            let snapshot = desk.snapshot();
+            desk.find(tables, &snapshot).1.warnings.len()
+        };
+        let own = "[[mesh]]\nfile = \"a.obj\"\n";
+        let given = format!("[materials.red]\n{own}material = \"red\"\n");
+        assert_eq!([said(own), said(&given), said(&format!("{given}{own}"))], [1, 0, 1]);
+    }
+
+    #[test]
+    fn warnings_are_a_hundred_at_most() {
+        let mut desk = Desk::new();
+        let names: String = (0..102).map(|name| format!("usemtl x{name}\nf 1 2 3\n")).collect();
+        desk.write("a.obj", &OBJ.replace("usemtl m\n", &names));
+        let snapshot = desk.snapshot();
+        let warnings = desk.find("[[mesh]]\nfile = \"a.obj\"\n", &snapshot).1.warnings;
+        assert_eq!(warnings.len(), MOST_WARNINGS + 1);
+        assert_eq!(warnings[MOST_WARNINGS].message, "2 more warnings of mesh files");
     }
 
     #[test]

@@ -62,9 +62,9 @@ pub(in crate::pipeline) struct Destination<'a> {
 pub(in crate::pipeline) fn check_targets(writing: Writing, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
     match writing {
         Writing::No => Ok(()),
-        Writing::Must => find_targets(plan).map_err(Stop::work),
+        Writing::Must => find_targets(plan, output::check_target, output::check_place).map_err(Stop::work),
         Writing::Try => {
-            if let Err(error) = find_targets(plan) {
+            if let Err(error) = find_targets(plan, output::look_at_target, output::look_at_place) {
                 sink.write_failed(error.to_string());
             }
             Ok(())
@@ -72,9 +72,13 @@ pub(in crate::pipeline) fn check_targets(writing: Writing, plan: &Plan, sink: &S
     }
 }
 
-fn find_targets(plan: &Plan) -> Result<(), OutputError> {
+fn find_targets(
+    plan: &Plan,
+    target: impl Fn(&Path) -> Result<Format, OutputError>,
+    place: impl Fn(&Path) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
     let check = |path: &PathBuf| {
-        let format = output::check_target(path)?;
+        let format = target(path)?;
         format.check_picture(
             plan.settings.render.width,
             plan.settings.render.height,
@@ -82,7 +86,7 @@ fn find_targets(plan: &Plan) -> Result<(), OutputError> {
         )
     };
     plan.outputs.iter().try_for_each(check)?;
-    plan.report.iter().try_for_each(|path| output::check_place(path))
+    plan.report.iter().try_for_each(|path| place(path))
 }
 
 /// The last stage of a request; whether the picture is on disk then.

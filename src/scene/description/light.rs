@@ -64,6 +64,25 @@ pub struct Environment {
     pub rotate: f64,
 }
 
+impl Light {
+    /// Whether it is not black.
+    pub fn sends(&self) -> bool {
+        let color = match self {
+            Self::Point(light) => light.intensity,
+            Self::Spot(light) => light.point.intensity,
+            Self::Directional(light) => light.irradiance,
+        };
+        color != Vec3::ZERO
+    }
+}
+
+impl Environment {
+    /// Whether it is not black, but for its map.
+    pub fn sends(&self) -> bool {
+        self.color != Vec3::ZERO
+    }
+}
+
 impl Fingerprinted for Light {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         match self {

@@ -20,7 +20,7 @@ mod value;
 
 use std::path::{Path, PathBuf};
 
-use super::description::{Camera, Scene};
+use super::description::{Camera, Environment, Light, Scene};
 use super::source::Source;
 use super::{MAX_FILE_BYTES, Outcome, Setting, toml};
 use crate::math::Vec3;
@@ -152,13 +152,8 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
     let own_materials = scene.objects.iter().any(|object| object.material.is_none());
     let emits = |index: usize| scene.materials[index].emits();
     let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
-    let is_sky_dark = scene.environment.as_ref().is_none_or(|sky| sky.color == Vec3::ZERO);
-    if scene.lights.is_empty()
-        && is_sky_dark
-        && !own_materials
-        && !lamps
-        && scene.render.ambient == Vec3::ZERO
-    {
+    let lights = scene.lights.iter().any(Light::sends) || scene.environment.iter().any(Environment::sends);
+    if !lights && !own_materials && !lamps && scene.render.ambient == Vec3::ZERO {
         let help = "add a [[light]] or an [environment], give a material in use `emission`, or set `ambient` in [render]";
         context.report(Issue::warning(0..0, "nothing lights this scene").help(help));
     }

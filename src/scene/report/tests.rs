@@ -48,6 +48,15 @@ fn columns_count_characters_and_survive_tabs_and_escapes() {
 }
 
 #[test]
+fn a_place_without_words_has_no_note() {
+    let source: Arc<str> = format!("{}a", "[".repeat(100)).into();
+    let text = render(&[at(&source, 100..101, "")], 60, Style::Plain);
+    assert!(!text.contains("note"), "{text}");
+    let text = render(&[at(&source, 100..101, "here")], 60, Style::Plain);
+    assert!(text.contains("= note: here"), "{text}");
+}
+
+#[test]
 fn sorts_by_place_and_counts() {
     let source: Arc<str> = "a = 1\nb = 2\n".into();
     let mut warning = at(&source, 0..1, "first");

@@ -23,6 +23,12 @@ fn keys_and_signals_end_it_and_the_terminal_is_given_back() {
         Signal::SIGPROF,
         Signal::SIGXCPU,
         Signal::SIGIO,
+        Signal::SIGSYS,
+        Signal::SIGTRAP,
+        #[cfg(target_os = "linux")]
+        Signal::SIGPWR,
+        #[cfg(target_os = "linux")]
+        Signal::SIGSTKFLT,
     ];
     let others = others.map(|signal| (signal, 128 + signal as u32));
     for (signal, code) in known.into_iter().chain(others) {

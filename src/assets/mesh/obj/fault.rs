@@ -63,33 +63,11 @@ fn skip_in_statement(cursor: &mut Cursor<'_>) -> bool {
     false
 }
 
-/// The first corner of a face that ends with a slash, behind which a number is missing; `tobj` takes it for one without.
-pub(super) fn open_corner(source: &Source<'_>) -> Option<AssetError> {
-    let ends = [b"/ ", b"/\t", b"/\n", b"/\r"].map(|end| memchr::memmem::find_iter(source.bytes, end));
-    let at_end = source.bytes.ends_with(b"/").then(|| source.bytes.len() - 1);
-    let mut slashes: Vec<usize> = ends.into_iter().flatten().chain(at_end).collect();
-    slashes.sort_unstable();
-    slashes.into_iter().find_map(|slash| {
-        let statement = statement_before(&source.bytes[..=slash]);
-        let corner = statement.rsplit(u8::is_ascii_whitespace).next().unwrap_or(statement);
-        let is_face = statement.starts_with(b"f")
-            && statement.get(1).is_some_and(u8::is_ascii_whitespace)
-            && !statement.contains(&b'#');
-        let reason = || format!("expected a corner like 1/2/3, found {}", shown(corner));
-        is_face.then(|| source.wrong_at(slash, reason()))
-    })
-}
-
-/// The statement that these bytes end in, from its keyword on; it may have begun in lines before that end with a backslash.
-fn statement_before(bytes: &[u8]) -> &[u8] {
-    let mut start = bytes.len();
-    loop {
-        start = memchr::memrchr(b'\n', &bytes[..start]).map_or(0, |end| end + 1);
-        if start == 0 || !bytes[..start].trim_ascii_end().ends_with(b"\\") {
-            return bytes[start..].trim_ascii_start();
-        }
-        start -= 1;
-    }
+/// The corner that ends with this slash.
+pub(super) fn open_corner(source: &Source<'_>, slash: usize) -> AssetError {
+    let until = &source.bytes[..=slash];
+    let corner = until.rsplit(u8::is_ascii_whitespace).next().unwrap_or(until);
+    source.wrong_at(slash, format!("expected a corner like 1/2/3, found {}", shown(corner)))
 }
 
 fn face_fault(cursor: &mut Cursor<'_>, counts: [i64; 3]) -> Option<String> {

@@ -7,27 +7,38 @@ use std::io::{self, BufRead, Read};
 use std::ops::Range;
 
 use super::super::Source;
+use crate::control::{CancelToken, Cancelled};
 
 /// The text as `tobj` may read it, and what it does not tell.
 pub(super) struct Survey<'a> {
     pub(super) text: Cow<'a, [u8]>,
     pub(super) used_materials: BTreeSet<String>,
+    /// Where the first corner of a face ends with a slash, behind which a number is missing; `tobj` takes it for one without.
+    pub(super) open_corner: Option<usize>,
 }
 
 impl<'a> Survey<'a> {
     /// Comments behind numbers, colours of vertices and lines that `tobj` mistakes for faces (`l`, `p`) are blanked,
     /// lines that go on behind a backslash joined, keywords before names brought to the start of their line, bytes
     /// beyond UTF-8 replaced, a second texture coordinate of 0 put where there is one alone.
-    pub(super) fn of(bytes: &'a [u8]) -> Self {
-        let mut survey = Self { text: Cow::Borrowed(bytes), used_materials: BTreeSet::new() };
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the token was told so.
+    pub(super) fn of(bytes: &'a [u8], token: &CancelToken) -> Result<Self, Cancelled> {
+        let mut survey =
+            Self { text: Cow::Borrowed(bytes), used_materials: BTreeSet::new(), open_corner: None };
         let mut unfinished = None;
         let mut lone = Vec::new();
         let mut start = 0;
         for end in memchr::memchr_iter(b'\n', bytes).chain([bytes.len()]) {
+            token.check()?;
             let line = &bytes[start..end];
             let (statement, words) =
                 unfinished.take().unwrap_or_else(|| (Statement::of(line.trim_ascii_start()), 0));
             let Line { goes_on, content } = survey.line(start, line, statement);
+            if survey.open_corner.is_none() && statement.is_face() {
+                survey.open_corner = open_corner(content).map(|slash| start + slash);
+            }
             if statement.is_texture() {
                 let words = words + words_of(content).take(LONE_TEXTURE_WORDS + 1).count();
                 if !goes_on && words == LONE_TEXTURE_WORDS {
@@ -43,7 +54,7 @@ impl<'a> Survey<'a> {
         if !survey.text.is_ascii() && std::str::from_utf8(&survey.text).is_err() {
             survey.text = Cow::Owned(String::from_utf8_lossy(&survey.text).into_owned().into_bytes());
         }
-        survey
+        Ok(survey)
     }
 
     /// Puts a second coordinate at these places.
@@ -71,7 +82,11 @@ impl<'a> Survey<'a> {
                 self.named(start, line);
                 line
             }
-            Statement::Vertex | Statement::Texture | Statement::Numbers | Statement::Skipped => {
+            Statement::Vertex
+            | Statement::Texture
+            | Statement::Face
+            | Statement::Numbers
+            | Statement::Skipped => {
                 let content = &line[..memchr::memchr(b'#', line).unwrap_or(line.len())];
                 self.blank(start + content.len()..start + line.len());
                 content
@@ -87,6 +102,7 @@ impl<'a> Survey<'a> {
             Statement::Comment
             | Statement::Named
             | Statement::Texture
+            | Statement::Face
             | Statement::Numbers
             | Statement::Other => {}
         }
@@ -141,6 +157,7 @@ enum Statement {
     Vertex,
     /// Texture coordinates.
     Texture,
+    Face,
     /// Other numbers, up to a comment.
     Numbers,
     /// Points and lines.
@@ -154,7 +171,26 @@ impl Statement {
     fn is_texture(self) -> bool {
         match self {
             Self::Texture => true,
-            Self::Comment | Self::Vertex | Self::Numbers | Self::Skipped | Self::Named | Self::Other => false,
+            Self::Comment
+            | Self::Vertex
+            | Self::Face
+            | Self::Numbers
+            | Self::Skipped
+            | Self::Named
+            | Self::Other => false,
+        }
+    }
+
+    fn is_face(self) -> bool {
+        match self {
+            Self::Face => true,
+            Self::Comment
+            | Self::Vertex
+            | Self::Texture
+            | Self::Numbers
+            | Self::Skipped
+            | Self::Named
+            | Self::Other => false,
         }
     }
 
@@ -163,13 +199,20 @@ impl Statement {
         match keyword {
             b"v" => Self::Vertex,
             b"vt" => Self::Texture,
-            b"vn" | b"f" => Self::Numbers,
+            b"f" => Self::Face,
+            b"vn" => Self::Numbers,
             b"l" | b"p" => Self::Skipped,
             b"usemtl" | b"mtllib" => Self::Named,
             [b'#', ..] => Self::Comment,
             _ => Self::Other,
         }
     }
+}
+
+/// The first slash that ends a word.
+fn open_corner(content: &[u8]) -> Option<usize> {
+    let ends_word = |slash: &usize| content.get(slash + 1).is_none_or(u8::is_ascii_whitespace);
+    memchr::memchr_iter(b'/', content).find(ends_word)
 }
 
 /// Where the three colours of a vertex stand; `tobj` wants all vertices to have them, or none.

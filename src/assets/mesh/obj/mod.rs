@@ -8,6 +8,7 @@ mod libraries;
 use std::cell::RefCell;
 
 use super::assemble::{Parsed, assemble};
+use super::text::with_line_feeds;
 use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;
 use crate::assets::contain::contain;
@@ -21,25 +22,14 @@ const OPTIONS: tobj::LoadOptions =
     tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: false, ignore_lines: false };
 
 pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
-    match with_line_feeds(source.bytes) {
-        Some(bytes) => parse_lines(&Source { bytes: &bytes, ..*source }),
-        None => parse_lines(source),
-    }
-}
-
-/// The text of a file whose lines end in carriage returns alone, as on a Macintosh of old; none of others.
-fn with_line_feeds(bytes: &[u8]) -> Option<Vec<u8>> {
-    if memchr::memchr(b'\n', bytes).is_some() || memchr::memchr(b'\r', bytes).is_none() {
-        return None;
-    }
-    Some(bytes.iter().map(|byte| if *byte == b'\r' { b'\n' } else { *byte }).collect())
+    parse_lines(&Source { bytes: &with_line_feeds(source.bytes), ..*source })
 }
 
 fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
-    if let Some(fault) = open_corner(source) {
-        return Err(fault);
+    let survey = Survey::of(source.bytes, source.watch.token)?;
+    if let Some(slash) = survey.open_corner {
+        return Err(open_corner(source, slash));
     }
-    let survey = Survey::of(source.bytes);
     let used = &survey.used_materials;
     let libraries = Libraries { source, used, found: RefCell::default(), failed: RefCell::default() };
     let mut reader = Chunks::new(source, &survey.text);
@@ -56,16 +46,17 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         };
         return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
     };
-    let Found { materials: known, resolved, mut warnings, missing, files, pictures } =
+    let Found { materials: known, resolved, warnings: mut material_warnings, missing, files, pictures } =
         libraries.found.into_inner();
     let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
         found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
     });
     if !missing {
         let unknown = used.difference(&resolved);
-        warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
+        material_warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
     }
-    let mut parsed = Parsed { materials, warnings, companions: files, pictures, ..Parsed::default() };
+    let mut parsed =
+        Parsed { materials, material_warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
     assemble(source, parsed)
 }

@@ -53,15 +53,18 @@ fn triangles_know_their_materials() {
     let loaded = read_with(&[("a.obj", text.as_bytes()), ("my one.mtl", mtl)]).expect("whole");
     assert_eq!(loaded.mesh.materials, [u32::MAX, 1, u32::MAX]);
     assert_eq!(loaded.materials[1].emission, Vec3::splat(5.0));
-    assert_eq!(loaded.warnings, ["no material is named \"none\""]);
+    assert_eq!(loaded.material_warnings, ["no material is named \"none\""]);
 }
 
 #[test]
 fn a_missing_library_is_a_warning_and_a_wrong_one_an_error() {
     let text = format!("mtllib none.mtl\nusemtl red\n{SQUARE}f 1 2 3\n");
     let loaded = read(&text).expect("a mesh all the same");
-    assert_eq!((loaded.warnings.len(), loaded.materials.len(), loaded.mesh.materials.len()), (1, 0, 0));
-    assert!(loaded.warnings[0].contains("none.mtl"), "{:?}", loaded.warnings);
+    assert_eq!(
+        (loaded.material_warnings.len(), loaded.materials.len(), loaded.mesh.materials.len()),
+        (1, 0, 0)
+    );
+    assert!(loaded.material_warnings[0].contains("none.mtl"), "{:?}", loaded.material_warnings);
     let result = read_with(&[("a.obj", text.as_bytes()), ("none.mtl", b"newmtl red\nKd 1\n")]);
     assert!(result.expect_err("refused").to_string().contains("none.mtl:2: `Kd`"));
 }
@@ -134,7 +137,7 @@ fn names_are_told_from_comments_by_what_there_is() {
         "mtllib a.mtl # ours\n{SQUARE}usemtl Material #25\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl d # e\nf 2 3 4\n"
     );
     let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]).expect("whole");
-    assert_eq!(loaded.warnings, Vec::<String>::new());
+    assert_eq!(loaded.material_warnings, Vec::<String>::new());
     assert_eq!(loaded.mesh.materials, [0, 1, 2]);
     assert_eq!(loaded.materials[0].diffuse, Vec3::X);
 }
@@ -144,7 +147,7 @@ fn keywords_may_be_indented_and_followed_by_tabs() {
     let mtl = b"\tnewmtl\ta b\n\tKd\t1 0 0\n";
     let text = format!("\tmtllib\ta.mtl\n{SQUARE}  usemtl\ta b \nf 1 2 3\n");
     let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]).expect("whole");
-    assert_eq!(loaded.warnings, Vec::<String>::new());
+    assert_eq!(loaded.material_warnings, Vec::<String>::new());
     assert_eq!(loaded.mesh.materials, [0]);
 }
 
@@ -184,7 +187,7 @@ fn lines_may_end_in_carriage_returns_alone() {
     let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n").replace('\n', "\r");
     let loaded =
         read_with(&[("a.obj", text.as_bytes()), ("a.mtl", b"newmtl red\rKd 1 0 0\r")]).expect("whole");
-    assert_eq!((loaded.warnings, loaded.materials[0].diffuse), (Vec::new(), Vec3::X));
+    assert_eq!((loaded.material_warnings, loaded.materials[0].diffuse), (Vec::new(), Vec3::X));
 }
 
 #[test]
@@ -195,15 +198,34 @@ fn a_corner_that_ends_with_a_slash_lacks_a_number() {
         ("f 1 2 3/", "3/"),
         ("f 1 \\\n 2 \\\r\n 3/\t4", "3/"),
         ("f 1 2/1/ 3\r", "2/1/"),
+        ("f 1 2 3/ # x", "3/"),
+        ("f 1 2 3/# x", "3/"),
     ] {
         let line = 7 + faces.matches('\\').count();
         let said = format!(":{line}: expected a corner like 1/2/3, found {found:?}");
         assert_eq!(says(&format!("{head}{faces}\n")), said, "{faces}");
         assert_eq!(says(&format!("{head}{faces}")), said, "{faces}");
     }
-    for whole in
-        ["f 1/1/1 2/1/1 3/1/1 # 4/ 5/", "g here/\nf 1 2 3", "# f 1/\nf 1 2 3", "mtllib f/ 1/\nf 1 2 3"]
-    {
+    assert!(
+        says(&format!("{head}# note \\\nf 1 2 3/\n")).contains("found \"3/\""),
+        "a comment ends with its line"
+    );
+    for whole in [
+        "f 1/1/1 2/1/1 3/1/1 # 4/ 5/",
+        "g here/\nf 1 2 3",
+        "# f 1/\nf 1 2 3",
+        "mtllib f/ 1/\nf 1 2 3",
+        // The empty line belongs to the face, what follows it does not.
+        "f 1 2 3 \\\n\ng here/ there",
+    ] {
         assert!(read(&format!("{head}{whole}\n")).is_ok(), "{whole}");
     }
+}
+
+#[test]
+fn a_survey_heeds_the_token() {
+    let token = CancelToken::new();
+    assert!(Survey::of(b"f 1 2 3\n", &token).is_ok());
+    token.cancel();
+    assert!(Survey::of(b"f 1 2 3\n", &token).is_err());
 }
