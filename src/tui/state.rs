@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::color::{Ansi, ColorDepth, Shades};
 use super::editor::FilePlace;
-use super::event::{Window, Written};
+use super::event::{Unwritten, Window, Written};
 use super::graphics::Protocol;
 use super::history::History;
 use super::known::Ask;
@@ -263,9 +263,10 @@ pub(super) struct State {
     pub edits: u64,
     /// Whether the next picture that is written is one that was asked for.
     pub asked_to_write: bool,
-    /// Why the picture at hand is not on disk although it is to be; and that in full.
+    /// Why the picture at hand is not on disk although it is to be.
     pub unwritten: Option<String>,
-    pub write_failed: Option<String>,
+    /// The last failure to write, until a later picture is on disk.
+    pub write_failed: Option<Unwritten>,
     pub written: Vec<Written>,
     pub picture: Option<Shown>,
 
