@@ -286,8 +286,9 @@ pub(super) struct State {
     /// Whether the picture has the screen for itself.
     pub is_alone: bool,
     pub message: Option<String>,
-    /// When the camera was written into the scene file.
+    /// When the camera was written into the scene file, or was not because of what is there.
     pub kept: Option<Instant>,
+    pub not_kept: Option<Instant>,
 
     pub change: Option<PendingChange>,
     /// From the last save to its first changed cell.
@@ -364,6 +365,7 @@ impl State {
             is_alone: false,
             message: None,
             kept: None,
+            not_kept: None,
             change: None,
             first_change: None,
             frame: None,
