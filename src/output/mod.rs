@@ -23,7 +23,7 @@ pub use error::OutputError;
 pub use exr::mean_luminance_error;
 pub use format::{BitDepth, Format};
 pub use identity::FileIdentity;
-pub use origin::{holds_foreign_picture, holds_foreign_report, holds_foreign_table};
+pub use origin::{Replaced, holds_foreign_report, holds_foreign_table, replaced_picture, replaced_report};
 
 use crate::control::CancelToken;
 use crate::film::RadianceImage;

@@ -1,7 +1,7 @@
 //! Whose file it is that a write would replace.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use super::PROGRAM;
@@ -12,16 +12,46 @@ const HEADER_BYTES: usize = 1 << 20;
 /// Of the start of a report.
 const START_BYTES: u64 = 64;
 
-/// Whether a file is there that would be replaced and is no PNG picture that glimt wrote, as its text chunk says. So is
-/// one that cannot be read.
-pub fn holds_foreign_picture(path: &Path) -> bool {
-    replaced(path).is_some_and(|file| !file.is_some_and(is_own_picture))
+/// What a write would replace.
+#[derive(Debug)]
+pub enum Replaced {
+    /// Nothing, or what may be replaced.
+    Own,
+    /// What somebody else may want to keep.
+    Foreign,
+    /// A file that cannot be read.
+    Unreadable(io::Error),
 }
 
-/// Whether a file is there that would be replaced and is nothing that a report may replace: an earlier report, an empty
-/// file, any file that ends in `.json`.
+impl Replaced {
+    fn of(file: Option<io::Result<File>>, is_own: impl Fn(File) -> bool) -> Self {
+        match file {
+            None => Self::Own,
+            Some(Ok(file)) => {
+                if is_own(file) {
+                    Self::Own
+                } else {
+                    Self::Foreign
+                }
+            }
+            Some(Err(error)) => Self::Unreadable(error),
+        }
+    }
+}
+
+/// A PNG picture is glimt's own where its text chunk says so.
+pub fn replaced_picture(path: &Path) -> Replaced {
+    Replaced::of(replaced(path), is_own_picture)
+}
+
+/// A report may replace an earlier report, an empty file, any file that ends in `.json`.
+pub fn replaced_report(path: &Path) -> Replaced {
+    if has_ending(path, "json") { Replaced::Own } else { Replaced::of(replaced(path), is_own_report) }
+}
+
+/// Whether a file is there that a report must not replace. So is one that cannot be read.
 pub fn holds_foreign_report(path: &Path) -> bool {
-    !has_ending(path, "json") && replaced(path).is_some_and(|file| !file.is_some_and(is_own_report))
+    !matches!(replaced_report(path), Replaced::Own)
 }
 
 /// Whether a file is there that would be replaced and is no table: neither empty, nor with this first line, nor one that
@@ -32,7 +62,7 @@ pub fn holds_foreign_table(path: &Path, first_line: &str) -> bool {
         let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
         is_read && (start.is_empty() || start == first_line.as_bytes())
     };
-    !has_ending(path, "csv") && replaced(path).is_some_and(|file| !file.is_some_and(is_own))
+    !has_ending(path, "csv") && !matches!(Replaced::of(replaced(path), is_own), Replaced::Own)
 }
 
 fn has_ending(path: &Path, wanted: &str) -> bool {
@@ -40,9 +70,9 @@ fn has_ending(path: &Path, wanted: &str) -> bool {
 }
 
 /// The regular file that a write would replace, open if it can be read.
-fn replaced(path: &Path) -> Option<Option<File>> {
+fn replaced(path: &Path) -> Option<io::Result<File>> {
     match place::find(path) {
-        Ok(Place::File(Target { path, existing: Some(_) })) => Some(File::open(path).ok()),
+        Ok(Place::File(Target { path, existing: Some(_) })) => Some(File::open(path)),
         // Nothing is replaced there; what cannot be written is said by whoever writes.
         Ok(Place::File(Target { existing: None, .. }) | Place::InPlace(_)) | Err(_) => None,
     }
@@ -69,4 +99,23 @@ fn is_own_report(file: File) -> bool {
     }
     let key = start.trim_ascii_start().strip_prefix(b"{").map(<[u8]>::trim_ascii_start);
     start.is_empty() || key.is_some_and(|key| key.starts_with(b"\"glimt\""))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_read_is_not_called_somebody_else_s() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        assert!(matches!(replaced_picture(&path), Replaced::Own), "there is none");
+        std::fs::write(&path, "a picture").expect("written");
+        assert!(matches!(replaced_picture(&path), Replaced::Foreign));
+        let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
+        let replaced = Replaced::of(denied(), |_| true);
+        assert!(
+            matches!(replaced, Replaced::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
+        );
+    }
 }

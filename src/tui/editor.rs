@@ -30,32 +30,48 @@ pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {
     set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| DEFAULT.to_owned())
 }
 
-/// Runs the editor at this place until it ends. Where it is stopped, so is this program, until both are continued. Signals
-/// from keys are the editor's.
+/// Runs the editor at this place until it ends. Where it is stopped, so is this program, until both are continued. A
+/// signal that ends this program ends it as well.
 ///
 /// # Errors
 /// It could not be started, or says that it failed.
 pub(super) fn run(editor: &str, place: &FilePlace) -> Result<(), String> {
-    let _foreground = signals::leave_keys_to_child();
     let failed = |error: io::Error| format!("cannot start the editor `{editor}`: {error}");
     let mut shell = Command::new("/bin/sh");
-    shell.arg("-c").arg(format!("{editor} \"$@\"")).arg(editor).args(arguments(editor, place));
+    shell.arg("-c").arg(line(editor)).arg(editor).args(arguments(editor, place));
     let child = shell.spawn().map_err(failed)?;
     let id = i32::try_from(child.id()).map_err(|_| format!("the editor `{editor}` is lost"))?;
+    let id = Pid::from_raw(id);
+    signals::set_child(Some(id));
+    let end = wait(id);
+    signals::set_child(None);
+    match end {
+        Ok(None | Some(0)) => Ok(()),
+        Ok(Some(127)) => Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR")),
+        Ok(Some(code)) => Err(format!("the editor `{editor}` ended with code {code}")),
+        Err(error) => Err(failed(error.into())),
+    }
+}
+
+/// Waits for the end of a child; its exit code, none: a signal ended it.
+fn wait(id: Pid) -> Result<Option<i32>, Errno> {
     loop {
-        match waitpid(Pid::from_raw(id), Some(WaitPidFlag::WUNTRACED)) {
+        match waitpid(id, Some(WaitPidFlag::WUNTRACED)) {
             Ok(WaitStatus::Stopped(..)) => signals::stop(),
-            Ok(WaitStatus::Exited(_, 0) | WaitStatus::Signaled(..)) => return Ok(()),
-            Ok(WaitStatus::Exited(_, 127)) => {
-                return Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR"));
-            }
-            Ok(WaitStatus::Exited(_, code)) => {
-                return Err(format!("the editor `{editor}` ended with code {code}"));
-            }
+            Ok(WaitStatus::Exited(_, code)) => return Ok(Some(code)),
+            Ok(WaitStatus::Signaled(..)) => return Ok(None),
             Ok(_) | Err(Errno::EINTR) => {}
-            Err(error) => return Err(failed(error.into())),
+            Err(error) => return Err(error),
         }
     }
+}
+
+/// What the shell is to run. Plain words take its place: a shell in between would keep signals from the editor.
+fn line(editor: &str) -> String {
+    let is_plain = |character: char| character.is_alphanumeric() || " -_./+,:@%".contains(character);
+    let is_of_shell = ["command", "eval", "exec", "time", "."].contains(&program(editor));
+    let exec = if editor.chars().all(is_plain) && !is_of_shell { "exec " } else { "" };
+    format!("{exec}{editor} \"$@\"")
 }
 
 /// What leads an editor to a place.
@@ -105,6 +121,14 @@ mod tests {
         assert_eq!(of(&[("VISUAL", "hx"), ("EDITOR", "ed")]), "hx");
         assert_eq!(of(&[("VISUAL", " "), ("EDITOR", "ed")]), "ed");
         assert_eq!(of(&[]), "vi");
+    }
+
+    #[test]
+    fn only_plain_words_take_the_place_of_the_shell() {
+        assert_eq!(line("/usr/bin/nvim -u NONE"), "exec /usr/bin/nvim -u NONE \"$@\"");
+        for editor in ["TERM=vt100 vi", "cd /; vi", "'my editor'", "vi #", "$HOME/vi", "command vi"] {
+            assert_eq!(line(editor), format!("{editor} \"$@\""));
+        }
     }
 
     #[test]

@@ -171,6 +171,14 @@ pub(super) enum Effect {
     Measure,
 }
 
+/// Why a picture is not on disk although it is to be.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unwritten {
+    pub why: String,
+    /// Of which request.
+    pub generation: u64,
+}
+
 /// A picture that was written.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Written {

@@ -1,5 +1,6 @@
 //! The line that stays when the screen is given back.
 
+use super::event::Unwritten;
 use super::state::{Activity, State};
 use crate::pipeline::protocol::Report;
 use crate::pipeline::words::seconds;
@@ -14,8 +15,8 @@ pub(super) fn words(state: &State) -> String {
     } else {
         format!("wrote {}", files.join(", "))
     };
-    if let Some(why) = &state.write_failed {
-        return unwritten(state, why);
+    if let Some(failed) = &state.write_failed {
+        return unwritten(state, failed);
     }
     let made = state.rendered.as_ref().map_or(String::new(), |report| format!(": {}", made(report)));
     let next = if state.rendered.is_some() { "the render after it" } else { "the render" };
@@ -34,11 +35,11 @@ pub(super) fn words(state: &State) -> String {
 }
 
 /// That the last picture is not on disk, and why; what is there is of before, but for what was written of it.
-fn unwritten(state: &State, why: &str) -> String {
-    let mut words = format!("the last picture is not written: {}", visible(why));
+fn unwritten(state: &State, failed: &Unwritten) -> String {
+    let mut words = format!("the last picture is not written: {}", visible(&failed.why));
     for written in &state.written {
         let name = visible(&written.path.to_string_lossy()).into_owned();
-        let is_new = written.generation == state.generation;
+        let is_new = written.generation >= failed.generation;
         words += &if is_new { format!("; wrote {name}") } else { format!("; {name} is an earlier one") };
     }
     words
@@ -57,9 +58,53 @@ fn made(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::protocol::Event;
+    use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::diagnostic::Severity;
     use crate::tui::fixtures::{Desk, diagnostic, done, progress};
+
+    #[test]
+    fn what_could_not_be_written_is_told_whatever_is_shown_since() {
+        let mut desk = Desk::new();
+        let fail = |desk: &mut Desk| {
+            let generation = desk.state.generation;
+            desk.worker(Event::Started { generation });
+            desk.worker(Event::WriteFailed {
+                generation,
+                message: "cannot write a.png: no space".to_owned(),
+            });
+            desk.worker(finished(generation, Status::Skipped));
+        };
+        fail(&mut desk);
+        let failed = "the last picture is not written: cannot write a.png: no space";
+        for key in ['l', 'v', '?'] {
+            desk.press(key);
+            let generation = desk.state.generation;
+            desk.worker(Event::Started { generation });
+            assert_eq!(words(&desk.state), failed, "{key}");
+            desk.worker(finished(generation, Status::Skipped));
+            assert_eq!(words(&desk.state), failed, "{key}");
+        }
+        // Back at the scene's own, where the disk has room or the picture of before.
+        desk.press('0');
+        for status in [Status::Done, Status::Reused] {
+            fail(&mut desk);
+            assert_eq!(words(&desk.state), failed);
+            desk.press('r');
+            let generation = desk.state.generation;
+            desk.worker(Event::Started { generation });
+            desk.worker(finished(generation, status));
+            assert!(desk.state.write_failed.is_none(), "{status:?}");
+        }
+    }
+
+    /// A request that ends, with its last stage like this.
+    fn finished(generation: u64, write: Status) -> Event {
+        let mut event = done(generation, Vec::new(), false);
+        if let Event::Done { report, .. } = &mut event {
+            report.stages[Stage::Write as usize].status = write;
+        }
+        event
+    }
 
     #[test]
     fn it_tells_what_was_written_and_what_was_not() {

@@ -390,12 +390,14 @@ impl Ui {
         self.leave();
         input::hold(true);
         self.screen.suspend();
-        let modes = terminal::modes();
+        // Until keys come raw again they send signals.
+        let keys_of_child = signals::leave_keys_to_child();
+        terminal::lend();
         let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
-        // An editor that was killed leaves them as they were in it.
-        terminal::set_modes(modes.as_ref());
+        terminal::take_back();
         input::hold(false);
         let end = self.redraw();
+        drop(keys_of_child);
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
     }
 

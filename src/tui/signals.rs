@@ -4,19 +4,19 @@
 //! nothing, or behind keys that never end. What has to end the program ends it from here when the loop does not.
 
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 #[cfg(target_os = "linux")]
 use nix::libc;
 use nix::sys::signal::{Signal as Number, kill};
-use nix::unistd::{Pid, getpid, getppid, getsid};
+use nix::unistd::{Pid, getpgrp, getpid, getppid, getsid};
 use signal_hook::consts::{
-    SIGALRM, SIGCONT, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP, SIGTSTP, SIGUSR1,
-    SIGUSR2, SIGVTALRM, SIGWINCH, SIGXCPU,
+    SIGALRM, SIGCONT, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP, SIGTSTP, SIGURG,
+    SIGUSR1, SIGUSR2, SIGVTALRM, SIGWINCH, SIGXCPU,
 };
 use signal_hook::iterator::Signals;
 use signal_hook::low_level;
@@ -48,6 +48,9 @@ fn of_linux() -> impl Iterator<Item = i32> {
     std::iter::empty()
 }
 
+/// Only wakes the thread that hears: nobody else sends it, and it means nothing by default.
+const MARK: i32 = SIGURG;
+
 /// Hears signals until it is dropped; after that they do what they do by default.
 pub(super) struct Listener {
     over: Arc<AtomicBool>,
@@ -57,11 +60,13 @@ impl Listener {
     /// Starts to listen; what is heard goes to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
-        let mut signals = Signals::new(MEANT.into_iter().chain(OTHERS).chain(of_linux()))?;
+        let mut signals = Signals::new(MEANT.into_iter().chain(OTHERS).chain(of_linux()).chain([MARK]))?;
         let ear = Ear { over: Arc::clone(&over), events: events.clone() };
         thread::Builder::new().name("signals".to_owned()).spawn(move || {
-            for number in signals.forever() {
-                ear.hear(number);
+            loop {
+                signals.wait().for_each(|number| ear.hear(number));
+                *rounds() += 1;
+                ROUNDS.1.notify_all();
             }
         })?;
         let ear = Ear { over: Arc::clone(&over), events: events.clone() };
@@ -79,6 +84,66 @@ impl Drop for Listener {
 /// Whether signals that keys send are a child's.
 static KEYS_OF_CHILD: AtomicBool = AtomicBool::new(false);
 
+/// How often all that had come was heard.
+static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
+
+fn rounds() -> MutexGuard<'static, u64> {
+    ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// How long a thread that hears is waited for. It takes some microseconds; only one that is gone takes this long.
+const HEARING: Duration = Duration::from_secs(10);
+
+/// Returns when all signals that came before have been heard. The first round may have begun before that; the second one
+/// has not.
+fn hear_what_came() {
+    for _ in 0..2 {
+        let before = rounds();
+        let last = *before;
+        if low_level::raise(MARK).is_ok() {
+            drop(ROUNDS.1.wait_timeout_while(before, HEARING, |now| *now == last));
+        }
+    }
+}
+
+/// The program that has the terminal, and the signal that ends this one meanwhile.
+struct Child {
+    id: Option<Pid>,
+    ending: Option<Number>,
+}
+
+static CHILD: Mutex<Child> = Mutex::new(Child { id: None, ending: None });
+
+fn child() -> MutexGuard<'static, Child> {
+    CHILD.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Signals that end this program end its child as well, until there is none.
+pub(super) fn set_child(id: Option<Pid>) {
+    let mut child = child();
+    child.id = id;
+    if let (Some(id), Some(number)) = (id, child.ending) {
+        pass_on(id, number);
+    }
+}
+
+/// The same for a signal that comes now; once, because it may come back with the others of the job.
+fn end_child(number: Number) {
+    let mut child = child();
+    if child.ending.replace(number).is_none()
+        && let Some(id) = child.id
+    {
+        pass_on(id, number);
+    }
+}
+
+/// To the child and, where the job is this program's own, to all in it: a shell does not pass it on to what it runs.
+fn pass_on(id: Pid, number: Number) {
+    let whole_job = Pid::from_raw(0);
+    // One that is gone needs no end.
+    let _ = kill(if getpgrp() == getpid() { whole_job } else { id }, number);
+}
+
 /// Signals that keys send are a child's until the result is dropped.
 pub(super) fn leave_keys_to_child() -> KeysOfChild {
     KEYS_OF_CHILD.store(true, Ordering::Release);
@@ -90,6 +155,8 @@ pub(super) struct KeysOfChild(());
 
 impl Drop for KeysOfChild {
     fn drop(&mut self) {
+        // A key that ended the child is heard here as well, and perhaps later.
+        hear_what_came();
         KEYS_OF_CHILD.store(false, Ordering::Release);
     }
 }
@@ -101,6 +168,9 @@ struct Ear {
 
 impl Ear {
     fn hear(&self, number: i32) {
+        if number == MARK {
+            return;
+        }
         if self.over.load(Ordering::Acquire) {
             // Those of Linux alone are not known to it.
             if low_level::emulate_default_handler(number).is_err() {
@@ -137,11 +207,27 @@ impl Ear {
 
     fn tell(&self, signal: Signal) {
         if let Some(status) = ends(signal) {
+            if let Ok(number) = Number::try_from(number(signal)) {
+                end_child(number);
+            }
             let over = Arc::clone(&self.over);
             thread::spawn(move || end_later(signal, status, &over));
         }
         // The loop is gone: so is the need to tell it.
         let _ = self.events.send(Event::Signal(signal));
+    }
+}
+
+fn number(signal: Signal) -> i32 {
+    match signal {
+        Signal::Interrupt => SIGINT,
+        Signal::Terminate => SIGTERM,
+        Signal::Quit => SIGQUIT,
+        Signal::Hangup => SIGHUP,
+        Signal::Other(number) => number,
+        Signal::Suspend => SIGTSTP,
+        Signal::Continue => SIGCONT,
+        Signal::Resize => SIGWINCH,
     }
 }
 
@@ -157,7 +243,8 @@ fn ends(signal: Signal) -> Option<ExitStatus> {
     }
 }
 
-/// Ends the process when the loop did not. After a hangup nothing is waited for: there is nobody to see it.
+/// Ends the process when the loop did not. After a hangup nothing is waited for: there is nobody to see it. A child that
+/// goes on may have left the terminal in any mode.
 fn end_later(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     thread::sleep(GRACE);
     if signal != Signal::Hangup {
@@ -167,6 +254,7 @@ fn end_later(signal: Signal, status: ExitStatus, over: &AtomicBool) {
         terminal::rescue();
         thread::sleep(RESCUE);
     }
+    terminal::take_back();
     low_level::exit(i32::from(status.0));
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::color::{Ansi, ColorDepth, Shades};
 use super::editor::FilePlace;
-use super::event::{Window, Written};
+use super::event::{Unwritten, Window, Written};
 use super::graphics::Protocol;
 use super::history::History;
 use super::known::Ask;
@@ -263,9 +263,10 @@ pub(super) struct State {
     pub edits: u64,
     /// Whether the next picture that is written is one that was asked for.
     pub asked_to_write: bool,
-    /// Why the picture at hand is not on disk although it is to be; and that in full.
+    /// Why the picture at hand is not on disk although it is to be.
     pub unwritten: Option<String>,
-    pub write_failed: Option<String>,
+    /// The last failure to write, until a later picture is on disk.
+    pub write_failed: Option<Unwritten>,
     pub written: Vec<Written>,
     pub picture: Option<Shown>,
 
@@ -285,8 +286,9 @@ pub(super) struct State {
     /// Whether the picture has the screen for itself.
     pub is_alone: bool,
     pub message: Option<String>,
-    /// When the camera was written into the scene file.
+    /// When the camera was written into the scene file, or was not because of what is there.
     pub kept: Option<Instant>,
+    pub not_kept: Option<Instant>,
 
     pub change: Option<PendingChange>,
     /// From the last save to its first changed cell.
@@ -363,6 +365,7 @@ impl State {
             is_alone: false,
             message: None,
             kept: None,
+            not_kept: None,
             change: None,
             first_change: None,
             frame: None,

@@ -104,15 +104,19 @@ impl Drop for Screen {
     }
 }
 
-/// The modes of the terminal, as another program is to find them; none: there is no terminal.
-pub(super) fn modes() -> Option<Termios> {
-    tcgetattr(io::stdin()).ok()
+/// The modes of the terminal as another program found them; none: no other has it.
+static LENT: Mutex<Option<Termios>> = Mutex::new(None);
+
+/// Leaves the terminal to another program, until [`take_back`].
+pub(super) fn lend() {
+    *LENT.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
 }
 
-/// Sets the modes of the terminal. Errors are of no use: there is nothing else to be done.
-pub(super) fn set_modes(modes: Option<&Termios>) {
-    if let Some(modes) = modes {
-        let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, modes);
+/// Sets the modes of the terminal as they were when it was lent: a program that was killed leaves its own. Errors are of
+/// no use: there is nothing else to be done.
+pub(super) fn take_back() {
+    if let Some(modes) = LENT.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes);
     }
 }
 

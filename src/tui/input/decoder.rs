@@ -58,8 +58,9 @@ enum Held {
 impl Decoder {
     /// What these bytes say, together with those before.
     pub(super) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<Input> {
-        // An escape character and a doubt are not over: what had to follow them is here, if late.
-        if matches!(self.held, Held::Sequence { .. } | Held::Paste(_)) {
+        // An escape character and a doubt are not over: what had to follow them is here, if late. Nor is a paste: its text
+        // may have waited for a busy reader, which is no silence.
+        if matches!(self.held, Held::Sequence { .. }) {
             self.expire_into_found(now);
         }
         self.last = Some(now);

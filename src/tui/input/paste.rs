@@ -1,14 +1,18 @@
 //! Bracketed paste: text between two marks, which is skipped.
 //!
 //! Where the closing mark never comes (the line broke, a program in between swallowed it), the keyboard must not be
-//! held for ever: the paste is over after a second without text, after ten seconds, or after 1 MiB, whichever comes
-//! first. Control sequences are no text: the terminal's answers come all the time while a picture is drawn. What comes later counts as keys again, a late closing mark as nothing.
+//! held for ever: the paste is over after a second without text, and once it has taken ten seconds or 1 MiB, after a fifth
+//! of a second. It is never over while text comes: the rest of it would be keys. Control sequences are no text: the
+//! terminal's answers come all the time while a picture is drawn. What comes later counts as keys again, a late closing
+//! mark as nothing.
 
 use std::time::{Duration, Instant};
 
 const SILENCE: Duration = Duration::from_secs(1);
-const LONGEST: Duration = Duration::from_secs(10);
-const MOST_BYTES: usize = 1 << 20;
+/// The silence that ends what is longer than a paste is expected to be.
+const SHORT_SILENCE: Duration = Duration::from_millis(200);
+const LONG: Duration = Duration::from_secs(10);
+const MANY_BYTES: usize = 1 << 20;
 const END: &[u8] = b"\x1b[201~";
 
 /// A paste under way.
@@ -53,23 +57,24 @@ impl Paste {
 
     /// When it is over if nothing more comes.
     pub(super) fn deadline(&self) -> Instant {
-        (self.last + SILENCE).min(self.begin + LONGEST)
+        let long_at = if self.bytes >= MANY_BYTES { self.last } else { self.begin + LONG };
+        (self.last + SILENCE).min(long_at.max(self.last + SHORT_SILENCE))
     }
 
-    /// Takes one byte; whether it was the last one.
+    /// Takes one byte; whether it ended the closing mark.
     pub(super) fn takes_last(&mut self, byte: u8, now: Instant) -> bool {
         let sequence = self.sequence.after(byte);
         if sequence.is_none() {
             self.last = now;
         }
         self.sequence = sequence.unwrap_or(Sequence::Outside);
-        self.bytes += 1;
+        self.bytes = self.bytes.saturating_add(1);
         // No suffix of the mark's beginnings is a beginning of the mark but ESC itself.
         self.matched = match byte {
             _ if END[self.matched] == byte => self.matched + 1,
             0x1b => 1,
             _ => 0,
         };
-        self.matched == END.len() || self.bytes >= MOST_BYTES
+        self.matched == END.len()
     }
 }

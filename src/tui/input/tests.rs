@@ -217,7 +217,7 @@ fn a_paste_is_one_event_and_its_text_is_no_keys() {
 }
 
 #[test]
-fn a_paste_without_an_end_is_over_by_silence_time_or_length() {
+fn a_paste_without_an_end_is_over_by_silence() {
     let mut bench = Bench::new();
     bench.read(b"\x1b[200~qqq");
     assert_eq!(bench.wait(999), []);
@@ -234,7 +234,39 @@ fn a_paste_without_an_end_is_over_by_silence_time_or_length() {
     assert_eq!((keys[0], keys[1]), (Input::Paste, plain('q')), "somebody presses a key again and again");
 
     let long = [&b"\x1b[200~"[..], &vec![b'q'; (1 << 20) + 3]].concat();
-    assert_eq!(read(&long), [Input::Paste, plain('q'), plain('q'), plain('q')]);
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(&long), []);
+    assert_eq!(bench.wait(199), []);
+    assert_eq!(bench.wait(1), [Input::Paste], "after so much a short silence is enough");
+    assert_eq!(bench.read(b"q"), [plain('q')]);
+}
+
+#[test]
+fn nothing_of_a_long_paste_is_a_key() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~"), []);
+    for _ in 0..3000 {
+        assert_eq!(bench.read(&[b'q'; 1000]), []);
+        assert_eq!(bench.wait(5), []);
+    }
+    assert_eq!(bench.read(b"q\x1b[201~c"), [Input::Paste, plain('c')], "3 MB, 15 s");
+
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~"), []);
+    for _ in 0..150 {
+        assert_eq!(bench.read(b"q"), []);
+        assert_eq!(bench.wait(100), []);
+    }
+    assert_eq!(bench.read(b"q\x1b[201~c"), [Input::Paste, plain('c')], "over a thin line");
+}
+
+#[test]
+fn text_that_waited_for_the_reader_is_still_of_its_paste() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~q"), []);
+    // Nobody looked in between, so nobody knows that there was silence.
+    bench.now += Duration::from_secs(60);
+    assert_eq!(bench.read(b"q\x1b[201~"), [Input::Paste]);
 }
 
 #[test]

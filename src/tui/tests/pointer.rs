@@ -164,6 +164,11 @@ fn a_camera_in_the_file_is_the_scene_s_own() {
     assert!(desk.worker(protocol::Event::CameraKept { generation: 0, outcome }).is_empty());
     let text = desk.text();
     assert!(text.contains("error: the scene file has changed") && text.contains("camera moved"), "{text}");
+    // The watcher hears of that save a little later.
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    assert!(desk.text().contains("error: the scene file has changed"), "{}", desk.text());
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    assert!(!desk.text().contains("error: the scene file has changed"), "{}", desk.text());
 }
 
 #[test]

@@ -98,7 +98,10 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
 pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
     let Kept { path, is_new, is_own } = match outcome {
         Ok(kept) => kept,
-        Err(why) => return told(state, &format!("error: {}", visible(&why))),
+        Err(why) => {
+            state.not_kept = Some(state.now);
+            return told(state, &format!("error: {}", visible(&why)));
+        }
     };
     let name = visible(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {

@@ -60,13 +60,17 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             show(state, Shown { generation, picture, range, section })
         }
         Event::Changed(Changed { noticed }) => {
-            // It may be glimt's own save: what was said of that stays.
+            // It may be glimt's own save, or the one that kept it from its own: what was said of that stays.
             const OWN: Duration = Duration::from_secs(1);
-            let is_own = state.kept.take().is_some_and(|kept| state.now <= kept + OWN);
+            let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
+            let (is_own, is_known) = (is_of(state.kept), is_of(state.not_kept));
+            (state.kept, state.not_kept) = (None, None);
             state.is_settled = false;
             history::record(state);
-            if !is_own {
+            if !is_own && !is_known {
                 (state.message, state.inspected) = (None, None);
+            }
+            if !is_own {
                 state.history.edited();
             }
             state.edits += 1;

@@ -4,7 +4,7 @@ use super::{camera, history, pointer, resized_preview, say};
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, Stage, StageReport, Status};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
-use crate::tui::event::{Effect, Written};
+use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
@@ -45,7 +45,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 state.unwritten = Some("not written".to_owned());
             }
             say(state, format!("error: {}", visible(&message)));
-            state.write_failed = Some(message);
+            state.write_failed = Some(Unwritten { why: message, generation: state.generation });
         }
         Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::WritePostponed { .. } => {
@@ -93,7 +93,7 @@ fn started(state: &mut State) {
     state.assets.clear();
     state.progress = None;
     state.report = None;
-    (state.unwritten, state.write_failed) = (None, None);
+    state.unwritten = None;
     state.unchanged = false;
 }
 
@@ -132,7 +132,8 @@ fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.asked_to_write = false;
     state.unwritten = Some("not written: e says why".to_owned());
     say(state, "nothing is written (e shows why)");
-    state.write_failed = Some(conflicts.first().map_or(String::new(), |conflict| conflict.message.clone()));
+    let why = conflicts.first().map_or(String::new(), |conflict| conflict.message.clone());
+    state.write_failed = Some(Unwritten { why, generation: state.generation });
     if !conflicts.iter().all(|conflict| state.warnings.contains(conflict)) {
         state.pane = Pane { open: true, scroll: 0 };
     }
@@ -159,6 +160,11 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     // What was found again took its time before.
     if report.stages[Stage::Render as usize].status == Status::Done && state.is_written() {
         state.rendered = Some(report.clone());
+    }
+    // The picture of this request is on disk: none is missing any more.
+    let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
+    if state.is_written() && is_on_disk && state.unwritten.is_none() {
+        state.write_failed = None;
     }
     state.report = Some(report);
     state.unchanged = unchanged;

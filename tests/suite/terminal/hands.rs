@@ -3,6 +3,10 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
+use nix::errno::Errno;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
 use super::pty::{Colors, Folder, GREEN, RED, SCENE, Terminal};
 
 /// What a terminal sends for the left button: down, moved or up, over a cell from 1.
@@ -140,6 +144,83 @@ fn an_editor_that_dies_in_raw_mode_leaves_a_terminal_that_echoes() {
     terminal.wait_for_render(1);
     terminal.press("o");
     terminal.wait_for("ended with");
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
+
+/// The program with a shell script as its editor, which has the terminal.
+fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> Terminal {
+    folder.write("vi", &format!("#!/bin/sh\necho $PPID > parent\necho $$ > id\n{script}\n"));
+    fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
+    let editor = format!("{}{options}", folder.path("vi").to_str().expect("a name"));
+    let mut terminal = folder.terminal_with(command, &[("VISUAL", ""), ("EDITOR", &editor)]);
+    terminal.wait_for_render(1);
+    terminal.press("o");
+    terminal.wait_for("at-work");
+    terminal
+}
+
+/// The process whose number this file has.
+fn process(folder: &Folder, file: &str) -> Pid {
+    let number = String::from_utf8(folder.bytes(file)).expect("a number");
+    Pid::from_raw(number.trim().parse().expect("a number"))
+}
+
+/// The end of glimt is not the end of the terminal, which would set its modes by itself.
+const FROM_SHELL: &str = "modes=$(stty -g); \"$0\" scene.toml; code=$?; test \"$modes\" = \"$(stty -g)\" && echo as before; exit $code";
+
+#[test]
+fn a_signal_ends_the_editor_too_and_the_terminal_is_as_before() {
+    for (signal, code) in [(Signal::SIGTERM, 143), (Signal::SIGHUP, 129), (Signal::SIGUSR1, 138)] {
+        let folder = Folder::new();
+        let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
+        let script = "stty raw -echo\nprintf at-work\nexec sleep 1000";
+        let terminal = in_editor(&folder, &command, script, "");
+        kill(process(&folder, "parent"), signal).expect("sent");
+        let editor = process(&folder, "id");
+        terminal.wait("the editor's end", |_| kill(editor, None) == Err(Errno::ESRCH));
+        assert_eq!(terminal.end_saying("as before"), code, "{signal}");
+    }
+}
+
+#[test]
+fn an_editor_that_hears_no_signal_does_not_keep_the_terminal_raw() {
+    let folder = Folder::new();
+    let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
+    // It ends with the terminal.
+    let script = "trap '' TERM HUP\nstty raw -echo\nprintf at-work\nread -r line";
+    let terminal = in_editor(&folder, &command, script, "");
+    kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
+    assert_eq!(terminal.end_saying("as before"), 143);
+}
+
+#[test]
+fn a_shell_between_does_not_keep_a_signal_from_the_editor() {
+    let folder = Folder::new();
+    let command = [folder.program(), "scene.toml"];
+    let terminal = in_editor(&folder, &command, "printf at-work\nexec sleep 1000", " #");
+    terminal.signal(Signal::SIGTERM);
+    let editor = process(&folder, "id");
+    terminal.wait("the editor's end", |_| kill(editor, None) == Err(Errno::ESRCH));
+    assert_eq!(terminal.end(), 143);
+}
+
+#[test]
+fn ctrl_c_for_the_editor_does_not_end_glimt() {
+    let folder = Folder::new();
+    let command = [folder.program(), "scene.toml"];
+    let mut terminal = in_editor(&folder, &command, "printf at-work\nexec sleep 1000", "");
+    for _ in 0..20 {
+        terminal
+            .wait("the editor", |screen| !screen.alternate_screen() && screen.contents().contains("at-work"));
+        terminal.scribble("\x1b[2J\x1b[H");
+        terminal.press("\x03");
+        terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
+        terminal.press("o");
+    }
+    terminal.wait_for("at-work");
+    terminal.press("\x03");
+    terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
 }

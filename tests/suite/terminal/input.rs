@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::pty::Folder;
+use super::pty::{Folder, SCENE};
 
 /// Does nothing.
 const UNBOUND: &str = "Y";
@@ -35,6 +35,19 @@ fn pasted_text_is_no_keys() {
     terminal.wait_for_render(1);
     terminal.burst(format!("\x1b[200~{}\x1b[201~?", "q?".repeat(30_000)));
     terminal.wait_for("show or hide this help");
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
+
+#[test]
+fn nothing_of_a_long_paste_is_a_key() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    // Each of these keys does something, the last two write the camera into the scene and end the program.
+    terminal.burst(format!("\x1b[200~{}\x1b[201~?", "h?vcq".repeat(300_000)));
+    terminal.wait_for("show or hide this help");
+    assert_eq!(folder.bytes("scene.toml"), SCENE.as_bytes());
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
 }
