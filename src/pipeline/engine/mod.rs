@@ -13,7 +13,6 @@ use std::cell::Cell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -24,6 +23,7 @@ use super::cache::{Memo, Pool};
 use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
+use super::pace::Stopwatch;
 use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
@@ -223,8 +223,8 @@ impl Engine {
         meanwhile: &Meanwhile<'_>,
         findings: &mut Findings,
     ) -> Result<Report, Stop> {
-        let begin = Instant::now();
-        let mut table = StageTable { sink, stages: Vec::new() };
+        let watch = Stopwatch::start(meanwhile.token);
+        let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new() };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
         let ready = self.prepare(request, &mut table, reading, findings)?;
@@ -270,7 +270,7 @@ impl Engine {
             photons: photons_key.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
             is_written,
         };
-        Ok(report(&finished, table.stages, begin.elapsed().as_secs_f64()))
+        Ok(report(&finished, table.stages, watch.seconds()))
     }
 
     /// All stages before photons and light.
