@@ -377,6 +377,8 @@ pub struct ImageReport {
     pub error: Option<f64>,
     /// Whether every pixel got the samples that were asked for.
     pub complete: bool,
+    /// Seconds that it was rendered for: by this request, and by those before that it goes on from.
+    pub render_seconds: f64,
     /// Of a view that is stretched to what is seen: the numbers at both ends. In `depth` the least, which is white, and the greatest
     /// distance; in others 0 and the greatest number, which is white.
     pub range: Option<[f32; 2]>,

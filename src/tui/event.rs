@@ -179,3 +179,5 @@ pub(super) struct Written {
     /// Of which request.
     pub generation: u64,
 }
+    /// What the file holds, in words, as far as it is known.
+    pub made: String,

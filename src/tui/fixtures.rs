@@ -197,6 +197,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         samples: SampleCounts { min: 64, mean: 64.0, max: 64 },
         error: Some(0.0081),
         complete: true,
+        render_seconds: 1.5,
         range: None,
     };
     let report = Report {

@@ -254,8 +254,6 @@ pub(super) struct State {
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
-    /// Of the last request that rendered a picture for its files and finished.
-    pub rendered: Option<Box<Report>>,
     pub unchanged: bool,
     /// Requests that were rendered and finished.
     pub renders: u64,
@@ -343,7 +341,6 @@ impl State {
             assets: Vec::new(),
             progress: None,
             report: None,
-            rendered: None,
             unchanged: false,
             renders: 0,
             edits: 0,

@@ -390,7 +390,13 @@ impl Engine {
             coarse_rate: &self.coarse_rate,
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
-        render(key, &mut self.films, &rendering)
+        let watch = Stopwatch::start(meanwhile.token);
+        let rendered = render(key, &mut self.films, &rendering);
+        let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
+        if let Some(canvas) = self.films.current_mut().filter(|canvas| canvas.key == key && !is_reused) {
+            canvas.render_seconds += watch.seconds();
+        }
+        rendered
     }
 
     /// The pool of this many threads; kept while the number stays.
