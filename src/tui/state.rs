@@ -222,8 +222,10 @@ pub(super) struct State {
     pub resize_due: Option<Instant>,
 
     pub effective: Option<Effective>,
-    /// The camera of the newest request that was understood.
+    /// The scene's own camera, of the newest request that was understood.
     pub camera: Option<Viewpoint>,
+    /// The scene's own exposure, in stops.
+    pub exposure: Option<f32>,
     pub nudge: Nudge,
     /// The first request of a camera that keys have moved.
     pub moved_since: Option<u64>,
@@ -324,6 +326,7 @@ impl State {
             camera: None,
             nudge: Nudge::default(),
             moved_since: None,
+            exposure: None,
             is_mouse_on: true,
             press: None,
             is_focusing: false,

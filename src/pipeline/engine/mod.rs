@@ -50,6 +50,7 @@ use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
+use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
@@ -289,8 +290,13 @@ impl Engine {
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
         let eye = Eye::new(&plan.scene, parsed.orbiter, &request.overrides.camera);
-        let (settings, camera) = (Box::new(plan.effective.clone()), eye.viewpoint());
-        table.sink.send(Event::Settings { generation: request.generation, settings, camera });
+        let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
+        table.sink.send(Event::Settings {
+            generation: request.generation,
+            settings: Box::new(plan.effective.clone()),
+            camera: own.viewpoint(),
+            exposure: parsed.loaded.scene.render.exposure,
+        });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
         // The picture at hand, which may yet be written, is of the scene before.

@@ -24,7 +24,7 @@ fn rendered(desk: &mut Desk, (width, height): (u32, u32)) {
     let generation = desk.state.generation;
     desk.worker(protocol::Event::Started { generation });
     let settings = Box::new(Effective { width, height, ..settings() });
-    desk.worker(protocol::Event::Settings { generation, settings, camera: camera() });
+    desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0 });
     show(desk, (width, height));
 }
 
@@ -103,11 +103,19 @@ fn nothing_jumps_while_a_render_runs_nor_when_it_is_done() {
 fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
     let mut desk = Desk::new();
     let settings = |width| Box::new(Effective { width, height: 480, ..settings() });
-    let same =
-        desk.worker(protocol::Event::Settings { generation: 1, settings: settings(640), camera: camera() });
+    let same = desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings: settings(640),
+        camera: camera(),
+        exposure: 0.0,
+    });
     assert!(same.is_empty(), "{same:?}");
-    let wide =
-        desk.worker(protocol::Event::Settings { generation: 1, settings: settings(1200), camera: camera() });
+    let wide = desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings: settings(1200),
+        camera: camera(),
+        exposure: 0.0,
+    });
     assert!(
         matches!(wide[..], [Effect::Send(Command::Preview(Some(PreviewSize { width: 80, .. })))]),
         "{wide:?}"

@@ -36,8 +36,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Started { .. } => started(state),
         Event::Stage { stage, .. } => record(state, stage),
         Event::Asset { progress, .. } => asset(state, progress),
-        Event::Settings { settings, camera, .. } => {
-            state.camera = Some(camera);
+        Event::Settings { settings, camera, exposure, .. } => {
+            (state.camera, state.exposure) = (Some(camera), Some(exposure));
             let pinhole = state.overrides().dof == Some(true) && !settings.dof;
             state.effective = Some(*settings);
             mended(state);
