@@ -11,7 +11,6 @@ use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::scene::report::summary;
 use crate::scene::sanitize::visible;
-use crate::tui::event::Written;
 use crate::tui::state::{Activity, AssetBar, PreviewKind, State};
 
 /// Columns of a bar.
@@ -96,11 +95,10 @@ fn results(state: &State) -> Vec<Line> {
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
     lines.extend(state.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
-    let is_of_now = |written: &Written| state.is_written() || written.generation == state.generation;
-    if !state.written.iter().any(is_of_now) && !state.is_written() {
+    if under::is_in_no_file(state) {
         lines.push(vec![("unwritten: w writes it".to_owned(), Tone::Faint)]);
     }
-    for written in state.written.iter().filter(|written| is_of_now(written)) {
+    for written in under::files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::Plain)]);
         let size = state.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
