@@ -395,7 +395,7 @@ impl Ui {
         // An editor that was killed leaves them as they were in it.
         terminal::set_modes(modes.as_ref());
         input::hold(false);
-        let end = self.redraw();
+        let end = self.apply(Event::Back).or_else(|| self.redraw());
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
     }
 

@@ -289,7 +289,9 @@ pub(super) struct State {
     pub kept: Option<Instant>,
 
     pub change: Option<PendingChange>,
-    /// From the last save to its first changed cell.
+    /// When the editor last gave the terminal back.
+    pub back: Option<Instant>,
+    /// From the last save to its first changed cell, without the time in the editor.
     pub first_change: Option<Duration>,
 
     pub frame: Option<FrameReport>,
@@ -324,9 +326,9 @@ impl State {
             resize_due: None,
             effective: None,
             camera: None,
+            exposure: None,
             nudge: Nudge::default(),
             moved_since: None,
-            exposure: None,
             is_mouse_on: true,
             press: None,
             is_focusing: false,
@@ -364,6 +366,7 @@ impl State {
             message: None,
             kept: None,
             change: None,
+            back: None,
             first_change: None,
             frame: None,
             now,
