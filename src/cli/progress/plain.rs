@@ -79,7 +79,7 @@ impl Reporter for Plain {
 fn line(progress: &RenderProgress) -> String {
     let eta = progress.eta_seconds.map_or(String::new(), |eta| format!(", {} left", seconds(eta)));
     let (samples, total) = (progress.samples, progress.total_samples);
-    format!("{:<8} {:3.0}% ({samples}/{total} samples{eta})", "render", progress.fraction * 100.0)
+    format!("{:<8} {:3.0}% ({samples} of {total} samples{eta})", "render", progress.fraction * 100.0)
 }
 
 /// `parse    done    0.40 ms`
@@ -97,6 +97,19 @@ pub(super) fn stage_line(stage: &StageReport) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn samples_are_told_in_words() {
+        let progress = RenderProgress {
+            fraction: 0.2,
+            elapsed_seconds: 1.0,
+            eta_seconds: Some(4.0),
+            samples: 9,
+            total_samples: 64,
+            noise: None,
+        };
+        assert_eq!(line(&progress), "render    20% (9 of 64 samples, 4.00 s left)");
+    }
 
     #[test]
     fn no_line_is_said_twice() {
