@@ -207,17 +207,22 @@ fn the_screen_tells_whoever_has_not_saved_yet_to_save() {
 #[test]
 fn the_folded_line_names_no_file_of_another_picture() {
     let mut desk = Desk::new();
-    rendered(&mut desk, (320, 200));
+    let finish = |desk: &mut Desk| {
+        let generation = desk.state.generation;
+        rendered(desk, (320, 200));
+        desk.worker(done(generation, Vec::new(), false));
+        let settings = desk.state.effective.as_mut().expect("settings");
+        (settings.width, settings.height) = (320, 200);
+    };
+    finish(&mut desk);
     desk.worker(protocol::Event::Written { generation: 1, path: "dof.png".into(), bytes: 63_000 });
-    desk.worker(done(1, Vec::new(), false));
     assert!(
         Layout::of(&desk.state).panel.is_empty() && desk.text().contains("→ dof.png 63.0 kB"),
         "{}",
         desk.text()
     );
     desk.press('l');
-    rendered(&mut desk, (320, 200));
-    desk.worker(done(2, Vec::new(), false));
+    finish(&mut desk);
     let text = desk.text();
     assert!(text.contains("unwritten: w writes it") && !text.contains("dof.png 63"), "{text}");
     desk.press('w');

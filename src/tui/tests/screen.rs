@@ -510,7 +510,7 @@ fn warnings_below_errors_are_counted_with_them() {
 
 #[test]
 fn a_change_of_time_that_has_no_room_is_left_out() {
-    let mut desk = Desk::with(state(120, 40));
+    let mut desk = Desk::with(state(100, 24));
     desk.finish(RED);
     desk.state.before[Stage::Render as usize] = Some(4.0);
     desk.press('r');

@@ -17,6 +17,8 @@ const TURN: f64 = 3.0;
 const NEARER: f64 = 0.95;
 /// What a step widens the field of view by.
 const WIDER: f64 = 1.05;
+/// How far from where it began a field of view may be for all that it is back, as each step is rounded; no step is as small.
+const ROUNDING: f64 = 0.015;
 /// Stops of a step of exposure.
 const STOPS: f32 = 0.25;
 /// The most that keys expose, and darken.
@@ -98,7 +100,7 @@ fn forget_own(state: &mut State) {
     let Some(own) = state.camera else { return };
     let camera = &mut state.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
-    camera.fov = camera.fov.filter(|fov| *fov != own.fov);
+    camera.fov = camera.fov.filter(|fov| (fov - own.fov).abs() > ROUNDING);
     let pose = CameraChange { focus: None, ..*camera };
     camera.focus = camera.focus.filter(|focus| *focus != own.changed(&pose).focus);
 }

@@ -17,6 +17,9 @@ const LEAST_WHY: u16 = 12;
 pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<Line> {
     let mut line = figures(state, stage, room);
     let why = why(state, stage);
+    if why.is_empty() {
+        return vec![line];
+    }
     if columns(&why) <= beside(&line, room) {
         line.push((format!("  {why}"), Tone::Faint));
         return vec![line];
