@@ -15,6 +15,7 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::output::write::{self, Guard};
 use crate::output::{self, EncodeOptions, FileIdentity, Format, OutputError};
+use crate::tui::wrapped;
 
 pub(super) fn run(args: &CompareArgs, console: &Console) -> Exit {
     match ThreadPoolBuilder::new().build() {
@@ -199,14 +200,43 @@ fn say_json(summary: &Summary<'_>, console: &Console) {
 }
 
 fn say_table(summary: &Summary<'_>, console: &Console) {
+    table(summary, console.answer_columns()).iter().for_each(|line| console.answer(line));
+}
+
+/// Its lines, broken between words where they are wider than so many columns.
+fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     let Summary { a, b, width, height, .. } = summary;
-    console.answer(&format!("{a} against the reference {b}, {width}×{height} pixels"));
-    console.answer("");
-    for (name, value, unit, note) in rows(summary) {
-        console.answer(format!("{name:<16}{value:>12} {unit:<4}{note}").trim_end());
-    }
-    console.answer("");
-    console.answer("Better is: PSNR higher, SSIM nearer to 1, everything else nearer to 0.");
+    let title = format!("{a} against the reference {b}, {width}×{height} pixels");
+    let rows = rows(summary).into_iter().flat_map(|(name, value, unit, note)| {
+        row(&format!("{name:<16}{value:>12} {unit:<4}"), &note, columns)
+    });
+    let end = "Better is: PSNR higher, SSIM nearer to 1, everything else nearer to 0.";
+    let mut lines = broken(&title, columns);
+    lines.push(String::new());
+    lines.extend(rows);
+    lines.push(String::new());
+    lines.extend(broken(end, columns));
+    lines
+}
+
+/// Figures, and beside them what they are of; below them where there is no room for it.
+fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
+    /// Narrower notes are hard to read.
+    const LEAST: usize = 24;
+    const INDENT: usize = 4;
+    let start = figures.chars().count();
+    let Some(columns) = columns else { return vec![format!("{figures}{note}").trim_end().to_owned()] };
+    let is_beside = columns >= start + LEAST;
+    let indent = if is_beside { start } else { INDENT };
+    let mut note = wrapped(note, columns.saturating_sub(indent).max(1));
+    let first = if is_beside && !note.is_empty() { note.remove(0) } else { String::new() };
+    let first = format!("{figures}{first}").trim_end().to_owned();
+    let rest = note.into_iter().map(|line| format!("{:indent$}{line}", ""));
+    std::iter::once(first).chain(rest).collect()
+}
+
+fn broken(text: &str, columns: Option<usize>) -> Vec<String> {
+    columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
 }
 
 /// Name, value, unit, and what it is of.
@@ -261,6 +291,40 @@ fn decibels(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_is_as_wide_as_the_terminal_and_breaks_between_words() {
+        let summary = Summary {
+            a: "a/long/name/of/a/folder/picture.png".to_owned(),
+            b: "a/long/name/of/a/folder/reference.png".to_owned(),
+            width: 256,
+            height: 256,
+            rmse: 0.012_345,
+            relmse: 0.1,
+            relmse_trimmed: 0.05,
+            dropped_pixels: 64,
+            max: 1.0,
+            max_at: &[3, 4],
+            psnr_db: 31.25,
+            ssim: 0.9,
+            flip: 0.1,
+            bias: Some(0.01),
+            bias_standard_error: Some(0.02),
+            bias_z: Some(0.5),
+            max_relmse: None,
+            is_within: true,
+        };
+        let words =
+            |lines: &[String]| lines.join(" ").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let whole = table(&summary, None);
+        assert!(whole.iter().any(|line| line.contains("0.1 %: 64 of 65536 pixels")), "{whole:?}");
+        for columns in [200, 120, 80, 60, 50, 40] {
+            let lines = table(&summary, Some(columns));
+            let widest = lines.iter().map(|line| line.chars().count()).max();
+            assert!(widest.is_some_and(|widest| widest <= columns), "{columns}: {lines:#?}");
+            assert_eq!(words(&lines), words(&whole), "{columns}");
+        }
+    }
 
     #[test]
     fn figures_have_the_digits_that_count() {

@@ -62,6 +62,13 @@ impl Console {
         self.text(&format!("{}\n", visible(text)));
     }
 
+    /// Columns of stdout, where it is a terminal.
+    pub(super) fn answer_columns(&self) -> Option<usize> {
+        let is_terminal = io::stdout().is_terminal();
+        let size = if is_terminal { crossterm::terminal::size().ok() } else { None };
+        size.map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0)
+    }
+
     /// A text of our own on stdout, as it is.
     pub(super) fn text(&self, text: &str) {
         let mut stdout = std::io::stdout().lock();

@@ -1,7 +1,8 @@
 //! How long work is stopped, paused and watched: a token that is polled and a sink for progress.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// The work was told to stop; nothing that it made may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -23,8 +24,15 @@ pub struct CancelToken(Arc<Shared>);
 struct Shared {
     cancelled: AtomicBool,
     paused: AtomicBool,
-    lock: Mutex<()>,
+    held: Mutex<Held>,
     changed: Condvar,
+}
+
+/// For how long work was held, and since when it is.
+#[derive(Debug, Default)]
+struct Held {
+    before: Duration,
+    since: Option<Instant>,
 }
 
 impl CancelToken {
@@ -41,8 +49,20 @@ impl CancelToken {
 
     /// Hold the work at its next [`CancelToken::check`], or let it go on.
     pub fn set_paused(&self, paused: bool) {
+        let mut held = self.lock();
         self.0.paused.store(paused, Ordering::Release);
-        self.notify();
+        if paused {
+            held.since.get_or_insert_with(Instant::now);
+        } else if let Some(since) = held.since.take() {
+            held.before += since.elapsed();
+        }
+        self.0.changed.notify_all();
+    }
+
+    /// For how long the work was held until now, in all.
+    pub fn held(&self) -> Duration {
+        let held = self.lock();
+        held.before + held.since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
     /// Whether the work is being held.
@@ -67,12 +87,16 @@ impl CancelToken {
     }
 
     fn notify(&self) {
-        let _guard = self.0.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        let _guard = self.lock();
         self.0.changed.notify_all();
     }
 
+    fn lock(&self) -> MutexGuard<'_, Held> {
+        self.0.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn wait_while_paused(&self) {
-        let mut guard = self.0.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut guard = self.lock();
         while self.is_paused() && !self.is_cancelled() {
             guard = self.0.changed.wait(guard).unwrap_or_else(PoisonError::into_inner);
         }
@@ -90,6 +114,23 @@ mod tests {
         assert_eq!(other.check(), Ok(()));
         token.cancel();
         assert_eq!(other.check(), Err(Cancelled));
+    }
+
+    #[test]
+    fn the_time_for_which_work_is_held_is_known_while_it_is_and_after() {
+        const HOLD: Duration = Duration::from_millis(20);
+        let token = CancelToken::new();
+        token.set_paused(false);
+        assert_eq!(token.held(), Duration::ZERO);
+        token.set_paused(true);
+        std::thread::sleep(HOLD);
+        token.set_paused(true);
+        let during = token.held();
+        token.set_paused(false);
+        let after = token.held();
+        std::thread::sleep(HOLD);
+        assert!(HOLD <= during && during <= after);
+        assert_eq!(token.held(), after, "it works again");
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use crate::control::CancelToken;
+
 /// Seconds over which the rate is averaged.
 const MEMORY_SECONDS: f64 = 3.0;
 /// Shortest time between two measurements of the rate.
@@ -27,6 +29,25 @@ impl Clock {
         }
         self.last = now;
         self.active.as_secs_f64()
+    }
+}
+
+/// Seconds since it was started, without those in which work was held.
+#[derive(Debug)]
+pub(super) struct Stopwatch<'a> {
+    begin: Instant,
+    token: &'a CancelToken,
+    held: Duration,
+}
+
+impl<'a> Stopwatch<'a> {
+    pub(super) fn start(token: &'a CancelToken) -> Self {
+        Self { begin: Instant::now(), token, held: token.held() }
+    }
+
+    pub(super) fn seconds(&self) -> f64 {
+        let held = self.token.held().saturating_sub(self.held);
+        self.begin.elapsed().saturating_sub(held).as_secs_f64()
     }
 }
 
@@ -90,6 +111,19 @@ mod tests {
     /// So much of so much work, and nothing aside.
     fn of(done: f64, total: f64) -> Work {
         Work { done, total: Some(total), aside: [0.0; 2] }
+    }
+
+    #[test]
+    fn a_stopwatch_stands_while_work_is_held() {
+        let token = CancelToken::new();
+        let watch = Stopwatch::start(&token);
+        token.set_paused(true);
+        std::thread::sleep(Duration::from_millis(300));
+        let during = watch.seconds();
+        token.set_paused(false);
+        std::thread::sleep(Duration::from_millis(20));
+        let after = watch.seconds();
+        assert!(during < 0.2 && (0.02..0.25).contains(&after), "{during} {after}");
     }
 
     #[test]

@@ -128,8 +128,10 @@ pub enum Event {
         generation: u64,
         /// The settings.
         settings: Box<Effective>,
-        /// The camera.
+        /// The scene's own camera.
         camera: Viewpoint,
+        /// The scene's own exposure, in stops.
+        exposure: f32,
     },
     /// The render went on.
     Progress {
@@ -375,6 +377,8 @@ pub struct ImageReport {
     /// The error to expect, relative to the picture's mean luminance; see
     /// [`Film::relative_error`](crate::film::Film::relative_error). None below two samples a pixel.
     pub error: Option<f64>,
+    /// Seconds that it was rendered for: by this request, and by those before that it goes on from.
+    pub render_seconds: f64,
     /// Whether every pixel got the samples that were asked for.
     pub complete: bool,
     /// Of a view that is stretched to what is seen: the numbers at both ends. In `depth` the least, which is white, and the greatest

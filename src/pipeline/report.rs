@@ -71,6 +71,7 @@ fn image(finished: &Finished<'_>) -> ImageReport {
         height: plan.settings.render.height,
         samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
         error: finished.canvas.film.relative_error(),
+        render_seconds: finished.canvas.render_seconds,
         complete: finished.canvas.is_complete(plan.settings.render.samples),
         range: range(finished),
     }

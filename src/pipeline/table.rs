@@ -1,14 +1,16 @@
 //! The table of stages as it fills: each is timed and said, when it begins and when it ends.
 
-use std::time::Instant;
-
+use super::pace::Stopwatch;
 use super::protocol::{Stage, StageReport, Status};
 use super::sink::Sink;
 use super::stages::{Staged, Stop};
+use crate::control::CancelToken;
 
 /// The stages of one request.
 pub(super) struct StageTable<'a> {
     pub(super) sink: &'a Sink,
+    /// By which work is held: that time does not count.
+    pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
 }
 
@@ -22,8 +24,8 @@ impl StageTable<'_> {
         name: Stage,
         work: impl FnOnce() -> Result<Staged<T>, Stop>,
     ) -> Result<T, Stop> {
-        let begin = Instant::now();
-        let report = |status, why| StageReport { name, status, seconds: begin.elapsed().as_secs_f64(), why };
+        let watch = Stopwatch::start(self.token);
+        let report = |status, why| StageReport { name, status, seconds: watch.seconds(), why };
         self.sink.stage(report(Status::Running, String::new()));
         let staged = work()?;
         let report = report(staged.status, staged.why);

@@ -95,7 +95,7 @@ fn pretend(
         return None;
     }
     say(Event::Stage { generation, stage: stage(Stage::Parse, Status::Done, 0.0003, "") });
-    say(Event::Settings { generation, settings: Box::new(settings()), camera: camera() });
+    say(Event::Settings { generation, settings: Box::new(settings()), camera: camera(), exposure: 0.0 });
     say(Event::Stage { generation, stage: stage(Stage::Textures, Status::Running, 0.0, "") });
     let start = Instant::now();
     for step in 0..=20_u32 {

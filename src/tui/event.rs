@@ -49,6 +49,8 @@ pub(super) enum Event {
     Tick,
     /// Ctrl-z where nothing could continue the program again.
     NoShell,
+    /// The terminal is back from the editor.
+    Back,
     /// The editor could not be used: why.
     NoEditor(String),
     /// A source of events ended.
@@ -186,4 +188,6 @@ pub(super) struct Written {
     pub bytes: u64,
     /// Of which request.
     pub generation: u64,
+    /// What the file holds, in words, as far as it is known.
+    pub made: String,
 }

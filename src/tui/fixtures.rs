@@ -101,6 +101,7 @@ impl Desk {
             generation,
             settings: Box::new(settings()),
             camera: camera(),
+            exposure: 0.0,
         });
         self.event(Event::Picture {
             generation,
@@ -196,6 +197,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         height: 480,
         samples: SampleCounts { min: 64, mean: 64.0, max: 64 },
         error: Some(0.0081),
+        render_seconds: 1.5,
         complete: true,
         range: None,
     };

@@ -87,6 +87,12 @@ impl History {
         self.look_at(next, newest)
     }
 
+    /// Whether so many pictures back, negative: forth, ends the look at older ones.
+    pub(super) fn leads_to_newest(&self, back: isize) -> bool {
+        let place = self.open.as_ref().and_then(|(at, _)| at.checked_add_signed(-back));
+        place.is_some_and(|place| place + 1 >= self.past.len())
+    }
+
     /// The last picture from before the last edit.
     pub(super) fn before_edit(&mut self, newest: Shown) -> Option<Shown> {
         let at = self.past.iter().rposition(|past| past.edits < self.edits)?;

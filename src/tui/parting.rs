@@ -1,25 +1,20 @@
 //! The line that stays when the screen is given back.
 
-use super::event::Unwritten;
+use super::event::{Unwritten, Written};
 use super::state::{Activity, State};
+use crate::choice::Choice;
 use crate::pipeline::protocol::Report;
+use crate::pipeline::settings::View;
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
 /// What was written, its samples and its seconds, and what came after it.
 pub(super) fn words(state: &State) -> String {
-    let files: Vec<_> =
-        state.written.iter().map(|it| visible(&it.path.to_string_lossy()).into_owned()).collect();
-    let files = if files.is_empty() {
-        "nothing is written".to_owned()
-    } else {
-        format!("wrote {}", files.join(", "))
-    };
     if let Some(failed) = &state.write_failed {
         return unwritten(state, failed);
     }
-    let made = state.rendered.as_ref().map_or(String::new(), |report| format!(": {}", made(report)));
-    let next = if state.rendered.is_some() { "the render after it" } else { "the render" };
+    let is_after = state.written.iter().any(|written| written.generation != state.generation);
+    let next = if is_after { "the render after it" } else { "the render" };
     let since = match (state.activity, &state.progress) {
         (Activity::Done, _) => String::new(),
         (Activity::Running { .. } | Activity::Cancelled, Some(progress)) => {
@@ -31,7 +26,22 @@ pub(super) fn words(state: &State) -> String {
             format!("; {} has errors since", visible(&name))
         }
     };
-    files + &made + &since
+    files(&state.written) + &since
+}
+
+/// What was written, and what it is; files that hold the same together.
+fn files(written: &[Written]) -> String {
+    let alike = written.chunk_by(|one, next| one.made == next.made);
+    let said: Vec<String> = alike
+        .map(|files| {
+            let names: Vec<_> =
+                files.iter().map(|it| visible(&it.path.to_string_lossy()).into_owned()).collect();
+            let made = files.first().map_or("", |it| &it.made);
+            let colon = if made.is_empty() { "" } else { ": " };
+            format!("wrote {}{colon}{made}", names.join(", "))
+        })
+        .collect();
+    if said.is_empty() { "nothing is written".to_owned() } else { said.join("; ") }
 }
 
 /// That the last picture is not on disk, and why; what is there is of before, but for what was written of it.
@@ -45,14 +55,23 @@ fn unwritten(state: &State, failed: &Unwritten) -> String {
     words
 }
 
-fn made(report: &Report) -> String {
+/// What a picture is and what it took. One whose samples were there already took its time before.
+pub(super) fn made(report: &Report) -> String {
     let image = &report.image;
+    let time = seconds(report.seconds.max(image.render_seconds));
+    let view = view(report.settings.view);
+    let comma = if view.is_empty() { "" } else { ", " };
     let samples = if image.samples.min == image.samples.max {
         image.samples.max.to_string()
     } else {
         format!("{} to {}", image.samples.min, image.samples.max)
     };
-    format!("{}×{}, {samples} samples, {}", image.width, image.height, seconds(report.seconds))
+    format!("{view}{comma}{}×{}, {samples} samples, {time}", image.width, image.height)
+}
+
+/// What is shown, where it is not the picture itself.
+pub(super) fn view(view: View) -> String {
+    if view == View::Beauty { String::new() } else { format!("view {}", view.name()) }
 }
 
 #[cfg(test)]
@@ -61,6 +80,73 @@ mod tests {
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::diagnostic::Severity;
     use crate::tui::fixtures::{Desk, diagnostic, done, progress};
+
+    /// The report of a request, changed.
+    fn done_as(generation: u64, change: impl FnOnce(&mut Report)) -> Event {
+        let Event::Done { mut report, warnings, unchanged, .. } = done(generation, Vec::new(), false) else {
+            panic!("it is done")
+        };
+        change(&mut report);
+        Event::Done { generation, report, warnings, unchanged }
+    }
+
+    #[test]
+    fn a_picture_that_is_written_while_a_newer_one_is_asked_for_is_named() {
+        let mut desk = Desk::new();
+        desk.finish([200, 30, 30]);
+        desk.press('r');
+        let begun = desk.state.generation;
+        desk.worker(Event::Started { generation: begun });
+        desk.press('l');
+        desk.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1 });
+        assert!(
+            words(&desk.state).starts_with("wrote big.png; the render after it"),
+            "{}",
+            words(&desk.state)
+        );
+        desk.worker(done(begun, Vec::new(), false));
+        desk.finish([30, 30, 200]);
+        assert_eq!(words(&desk.state), "wrote big.png: 640×480, 64 samples, 1.93 s");
+        assert!(desk.text().contains("unwritten: w writes it"), "of the one at hand: {}", desk.text());
+    }
+
+    #[test]
+    fn the_seconds_are_those_of_the_picture_in_the_file() {
+        let mut desk = Desk::new();
+        let write = |desk: &mut Desk, seconds: f64, rendered: f64| {
+            let generation = desk.state.generation;
+            desk.worker(Event::Started { generation });
+            desk.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1 });
+            desk.worker(done_as(generation, |report| {
+                (report.seconds, report.image.render_seconds) = (seconds, rendered);
+            }));
+        };
+        write(&mut desk, 2.02, 2.0);
+        desk.press('r');
+        write(&mut desk, 1.02, 1.0);
+        desk.press('r');
+        write(&mut desk, 0.05, 2.0);
+        assert_eq!(words(&desk.state), "wrote dof.png: 640×480, 64 samples, 2.00 s");
+    }
+
+    #[test]
+    fn a_view_that_was_written_is_said_to_be_one() {
+        let mut desk = Desk::new();
+        desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1 });
+        desk.finish([200, 30, 30]);
+        let own = words(&desk.state);
+        desk.press('v');
+        let generation = desk.state.generation;
+        desk.worker(Event::Started { generation });
+        desk.worker(done_as(generation, |report| {
+            (report.settings.view, report.seconds, report.image.render_seconds) = (View::Normal, 0.5, 0.4);
+            (report.image.path, report.image.paths) = (None, Vec::new());
+        }));
+        assert_eq!(words(&desk.state), own, "that is what is written");
+        desk.press('w');
+        desk.worker(Event::Written { generation, path: "a.png".into(), bytes: 1 });
+        assert_eq!(words(&desk.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
+    }
 
     #[test]
     fn what_could_not_be_written_is_told_whatever_is_shown_since() {

@@ -396,7 +396,7 @@ impl Ui {
         let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
         terminal::take_back();
         input::hold(false);
-        let end = self.redraw();
+        let end = self.apply(Event::Back).or_else(|| self.redraw());
         drop(keys_of_child);
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
     }

@@ -222,8 +222,10 @@ pub(super) struct State {
     pub resize_due: Option<Instant>,
 
     pub effective: Option<Effective>,
-    /// The camera of the newest request that was understood.
+    /// The scene's own camera, of the newest request that was understood.
     pub camera: Option<Viewpoint>,
+    /// The scene's own exposure, in stops.
+    pub exposure: Option<f32>,
     pub nudge: Nudge,
     /// The first request of a camera that keys have moved.
     pub moved_since: Option<u64>,
@@ -254,8 +256,6 @@ pub(super) struct State {
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
-    /// Of the last request that rendered a picture for its files and finished.
-    pub rendered: Option<Box<Report>>,
     pub unchanged: bool,
     /// Requests that were rendered and finished.
     pub renders: u64,
@@ -291,7 +291,9 @@ pub(super) struct State {
     pub not_kept: Option<Instant>,
 
     pub change: Option<PendingChange>,
-    /// From the last save to its first changed cell.
+    /// When the editor last gave the terminal back.
+    pub back: Option<Instant>,
+    /// From the last save to its first changed cell, without the time in the editor.
     pub first_change: Option<Duration>,
 
     pub frame: Option<FrameReport>,
@@ -326,6 +328,7 @@ impl State {
             resize_due: None,
             effective: None,
             camera: None,
+            exposure: None,
             nudge: Nudge::default(),
             moved_since: None,
             is_mouse_on: true,
@@ -345,7 +348,6 @@ impl State {
             assets: Vec::new(),
             progress: None,
             report: None,
-            rendered: None,
             unchanged: false,
             renders: 0,
             edits: 0,
@@ -367,6 +369,7 @@ impl State {
             kept: None,
             not_kept: None,
             change: None,
+            back: None,
             first_change: None,
             frame: None,
             now,

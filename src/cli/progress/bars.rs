@@ -46,7 +46,7 @@ impl Bars {
         });
         let eta = progress.eta_seconds.map_or(String::new(), |eta| format!(", {} left", seconds(eta)));
         bar.set_position((progress.fraction * STEPS as f64) as u64);
-        bar.set_message(format!("{}/{} samples{eta}", progress.samples, progress.total_samples));
+        bar.set_message(format!("{} of {} samples{eta}", progress.samples, progress.total_samples));
     }
 }
 

@@ -79,7 +79,7 @@ impl Reporter for Plain {
 fn line(progress: &RenderProgress) -> String {
     let eta = progress.eta_seconds.map_or(String::new(), |eta| format!(", {} left", seconds(eta)));
     let (samples, total) = (progress.samples, progress.total_samples);
-    format!("{:<8} {:3.0}% ({samples}/{total} samples{eta})", "render", progress.fraction * 100.0)
+    format!("{:<8} {:3.0}% ({samples} of {total} samples{eta})", "render", progress.fraction * 100.0)
 }
 
 /// `parse    done    0.40 ms`
@@ -134,7 +134,7 @@ mod tests {
             total_samples: 64,
             noise: None,
         };
-        assert_eq!(line(&progress), "render    40% (25/64 samples, 1.50 s left)");
+        assert_eq!(line(&progress), "render    40% (25 of 64 samples, 1.50 s left)");
         assert!(!line(&RenderProgress { eta_seconds: None, ..progress }).contains("left"));
     }
 }

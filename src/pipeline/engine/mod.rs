@@ -13,7 +13,6 @@ use std::cell::Cell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -24,6 +23,7 @@ use super::cache::{Memo, Pool};
 use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
+use super::pace::Stopwatch;
 use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
@@ -50,6 +50,7 @@ use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
+use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
@@ -223,8 +224,8 @@ impl Engine {
         meanwhile: &Meanwhile<'_>,
         findings: &mut Findings,
     ) -> Result<Report, Stop> {
-        let begin = Instant::now();
-        let mut table = StageTable { sink, stages: Vec::new() };
+        let watch = Stopwatch::start(meanwhile.token);
+        let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new() };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
         let ready = self.prepare(request, &mut table, reading, findings)?;
@@ -270,7 +271,7 @@ impl Engine {
             photons: photons_key.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
             is_written,
         };
-        Ok(report(&finished, table.stages, begin.elapsed().as_secs_f64()))
+        Ok(report(&finished, table.stages, watch.seconds()))
     }
 
     /// All stages before photons and light.
@@ -289,8 +290,13 @@ impl Engine {
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
         let eye = Eye::new(&plan.scene, parsed.orbiter, &request.overrides.camera);
-        let (settings, camera) = (Box::new(plan.effective.clone()), eye.viewpoint());
-        table.sink.send(Event::Settings { generation: request.generation, settings, camera });
+        let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
+        table.sink.send(Event::Settings {
+            generation: request.generation,
+            settings: Box::new(plan.effective.clone()),
+            camera: own.viewpoint(),
+            exposure: parsed.loaded.scene.render.exposure,
+        });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
         // The picture at hand, which may yet be written, is of the scene before.
@@ -390,7 +396,13 @@ impl Engine {
             coarse_rate: &self.coarse_rate,
         };
         let key = keys::render(ready.world.0, &plan.settings, plan.crop);
-        render(key, &mut self.films, &rendering)
+        let watch = Stopwatch::start(meanwhile.token);
+        let rendered = render(key, &mut self.films, &rendering);
+        let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
+        if let Some(canvas) = self.films.current_mut().filter(|canvas| canvas.key == key && !is_reused) {
+            canvas.render_seconds += watch.seconds();
+        }
+        rendered
     }
 
     /// The pool of this many threads; kept while the number stays.

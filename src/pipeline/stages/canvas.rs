@@ -33,6 +33,8 @@ pub(in crate::pipeline) struct Canvas {
     pub(super) is_passing: bool,
     /// The budget that ended the last render of it.
     pub(super) ended_by: Option<f64>,
+    /// Seconds that it was rendered for, by all requests.
+    pub(in crate::pipeline) render_seconds: f64,
 }
 
 impl Canvas {
@@ -65,6 +67,7 @@ impl Canvas {
             previewer: None,
             is_passing: false,
             ended_by: None,
+            render_seconds: 0.0,
         })
     }
 
@@ -303,6 +306,7 @@ mod tests {
             previewer: None,
             is_passing: false,
             ended_by: None,
+            render_seconds: 0.0,
         }
     }
 

@@ -6,11 +6,11 @@ use std::cell::{Cell, RefCell};
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Instant;
 
 use rayon::ThreadPool;
 
 use super::super::cache::Memo;
+use super::super::pace::Stopwatch;
 use super::super::plan::Plan;
 use super::super::protocol::PhotonsReport;
 use super::super::sink::Sink;
@@ -119,7 +119,7 @@ impl PhotonStore {
             return Ok(Arc::clone(pass));
         }
         let Sending { world, plan, pool, token, .. } = sending;
-        let begin = Instant::now();
+        let watch = Stopwatch::start(token);
         let photons = &self.photons;
         let settings = plan.settings.heeded();
         let pass = ticking(pool, tick, || photons.pass(world, &settings, number, token))?;
@@ -130,7 +130,7 @@ impl PhotonStore {
             emitted: sent.emitted + pass.emitted,
             stored: sent.stored + pass.stored(),
             lookups: sent.lookups + pass.lookups,
-            seconds: sent.seconds + begin.elapsed().as_secs_f64(),
+            seconds: sent.seconds + watch.seconds(),
             ..sent
         });
         let has_room = self.kept_bytes() + pass.memory_bytes() <= MOST_KEPT_BYTES;
@@ -221,12 +221,12 @@ pub(in crate::pipeline) fn photons(
         });
     }
     let Sending { world, pool, token, .. } = sending;
-    let begin = Instant::now();
+    let watch = Stopwatch::start(token);
     let send = |progress: Progress<'_>| {
         ticking(pool, &mut tick, || Photons::new(world, &settings, of_photons, progress, token))
     };
     let (photons, first) = sending.sink.asset("photons", send)?;
-    let seconds = begin.elapsed().as_secs_f64();
+    let seconds = watch.seconds();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);
     let sent = Sent { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);

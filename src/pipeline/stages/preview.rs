@@ -9,7 +9,9 @@ use super::super::protocol::{PreviewSize, Section, Spot};
 use super::super::sink::Sink;
 use super::canvas::Canvas;
 use crate::control::CancelToken;
-use crate::film::{Previewer, Quantity, RadianceImage, Rect, tone::develop};
+use crate::film::stretch::Stretch;
+use crate::film::tone::{ToneMapping, develop};
+use crate::film::{Previewer, Quantity, RadianceImage, Rect};
 
 /// The longest that a film is taken up without a look at the orders.
 const PATIENCE: Duration = Duration::from_millis(4);
@@ -33,7 +35,7 @@ impl Screen<'_> {
     /// The whole film, unless that is cancelled. For when no tile is being rendered, as the pool helps.
     pub(in crate::pipeline) fn show(&self, canvas: &mut Canvas, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
-        if self.say_section(canvas) {
+        if self.say_section(canvas, true) {
             return;
         }
         while !pool.install(|| catch_up(canvas, self.plan.settings.view.quantity(), size)) {
@@ -41,48 +43,61 @@ impl Screen<'_> {
                 return;
             }
         }
-        self.say(canvas);
+        self.say(canvas, true);
     }
 
     /// The same between two tiles, on this thread and for a short time; what is left is for the next call. Whether a
     /// picture came of it.
     pub(super) fn show_some(&self, canvas: &mut Canvas) -> bool {
         let Some(size) = self.size() else { return false };
-        if self.say_section(canvas) {
+        if self.say_section(canvas, false) {
             return true;
         }
         catch_up(canvas, self.plan.settings.view.quantity(), size);
         let is_whole = canvas.previewer.as_ref().is_some_and(Previewer::is_whole);
         if is_whole {
-            self.say(canvas);
+            self.say(canvas, false);
         }
         is_whole
     }
 
-    fn say(&self, canvas: &Canvas) {
+    fn say(&self, canvas: &Canvas, has_time: bool) {
         if let Some(previewer) = &canvas.previewer {
             // The first coarse picture has none of the numbers about samples.
             let base = canvas.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
             let image = previewer.picture(base);
-            self.send(&image, None);
+            self.send(&image, &self.tone(canvas, &image, has_time), None);
         }
     }
 
     /// The picture's own pixels, if they are asked for.
-    fn say_section(&self, canvas: &Canvas) -> bool {
+    fn say_section(&self, canvas: &Canvas, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
         let quantity = self.plan.settings.view.quantity();
         let base = canvas.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
         let section = Section::of(rect, (render.width, render.height));
-        self.send(&canvas.film.section(quantity, rect, base), Some(section));
+        let image = canvas.film.section(quantity, rect, base);
+        self.send(&image, &self.tone(canvas, &image, has_time), Some(section));
         true
     }
 
-    fn send(&self, image: &RadianceImage, section: Option<Section>) {
-        let tone = self.plan.tone.of_picture(image);
+    fn send(&self, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
         let range = tone.stretch.range().map(|range| range.ends());
-        self.sink.preview(develop(image, &tone), range, section);
+        self.sink.preview(develop(image, tone), range, section);
+    }
+
+    /// Numbers are stretched by the range of the picture that is written, as pixels of a preview are means of distances and nothing;
+    /// where that has pixels without samples, or is large and there is no time, by the range of the preview.
+    fn tone(&self, canvas: &Canvas, image: &RadianceImage, has_time: bool) -> ToneMapping {
+        /// Pixels that are looked through in a few milliseconds.
+        const QUICK: usize = 1 << 18;
+        let tone = self.plan.tone;
+        let is_known = canvas.is_covered() && (has_time || canvas.film.crop().area() <= QUICK);
+        if tone.stretch == Stretch::None || !is_known {
+            return tone.of_picture(image);
+        }
+        tone.of_picture(&canvas.film.image(self.plan.settings.view.quantity()))
     }
 
     /// The pixels that are shown one by one.

@@ -14,7 +14,7 @@ fn moved() -> CameraChange {
     CameraChange { pose: Some(pose), fov: Some(35.0), focus: None }
 }
 
-/// The camera that a request says it has.
+/// The camera of a request: the scene's own, as the request says it, with what the front end changes.
 fn camera(bench: &mut Bench) -> Viewpoint {
     let of = bench.send();
     let events = bench.until_end(of);
@@ -22,7 +22,8 @@ fn camera(bench: &mut Bench) -> Viewpoint {
         Event::Settings { camera, .. } => Some(*camera),
         _ => None,
     };
-    events.iter().find_map(camera).expect("a camera")
+    let own = events.iter().find_map(camera).expect("a camera");
+    own.changed(&bench.overrides.camera)
 }
 
 #[test]

@@ -476,3 +476,75 @@ fn warnings_are_said_before_anything_is_rendered() {
     };
     assert_eq!((early, early.len()), (warnings, 1));
 }
+
+#[test]
+fn distances_are_stretched_in_the_preview_as_in_the_picture() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.view = Some(View::Depth);
+    for (width, around) in [(7, None), (40, None), (6, Some(Spot { x: 0.5, y: 0.5 }))] {
+        bench.preview = Some(PreviewSize { width, height: 30, around });
+        let (report, _) = bench.done();
+        let shown = bench.worker.previews.lock().expect("whole").take().expect("a picture");
+        assert!(report.image.range.is_some());
+        assert_eq!(shown.range, report.image.range, "{width}");
+    }
+}
+
+/// As the real one, a little later.
+fn leisurely(
+    world: &World,
+    settings: &RenderSettings,
+    pixels: Pixels,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    token.check()?;
+    std::thread::sleep(Duration::from_millis(5));
+    crate::integrators::render_tile(world, settings, pixels, samples, token)
+}
+
+#[test]
+fn the_time_for_which_a_render_is_held_does_not_count() {
+    const HOLD: f64 = 0.6;
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 32"), leisurely);
+    let begin = Instant::now();
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Pause(true));
+    std::thread::sleep(Duration::from_secs_f64(HOLD));
+    bench.worker.send(Command::Pause(false));
+    let Some(Event::Done { report, .. }) = bench.until_end(of).pop() else { panic!("it is done") };
+    let most = begin.elapsed().as_secs_f64() - HOLD;
+    let render = report.stages[Stage::Render as usize].seconds;
+    assert!(render > 0.005 && render <= most && report.seconds <= most, "{render} {} {most}", report.seconds);
+    assert!(report.image.render_seconds <= most);
+}
+
+#[test]
+fn a_picture_that_is_found_again_tells_what_it_took() {
+    let mut bench = Bench::with(SCENE, leisurely);
+    let (first, _) = bench.done();
+    bench.overrides.shadows = Some(crate::scene::description::Shadows::Off);
+    bench.done();
+    bench.overrides.shadows = None;
+    let (again, _) = bench.done();
+    assert_eq!(again.stages[Stage::Render as usize].status, Status::Reused);
+    assert_eq!(again.image.render_seconds, first.image.render_seconds);
+    assert!(first.image.render_seconds > 0.005);
+}
+
+#[test]
+fn a_request_tells_what_the_scene_itself_says() {
+    let mut bench = Bench::new(&SCENE.replace("exposure = 0.0", "exposure = 0.5"));
+    bench.overrides.exposure = Some(2.0);
+    bench.overrides.camera.fov = Some(10.0);
+    let of = bench.send();
+    let events = bench.until_end(of);
+    let said = |event: &Event| match event {
+        Event::Settings { settings, camera, exposure, .. } => {
+            Some((settings.exposure, *exposure, camera.fov))
+        }
+        _ => None,
+    };
+    assert_eq!(events.iter().find_map(said), Some((2.0, 0.5, 40.0)));
+}

@@ -2,10 +2,12 @@
 
 use super::{BLUE, RED};
 use crate::pipeline::protocol::{self, Writing};
+use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
-use crate::tui::Changed;
 use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
+use crate::tui::state::PreviewKind;
+use crate::tui::{Changed, ColorDepth};
 use crossterm::event::KeyCode;
 
 fn show(desk: &mut Desk) -> Vec<crate::tui::event::Effect> {
@@ -103,7 +105,7 @@ fn before_a_scene_is_read_there_is_no_camera_to_move() {
 fn exposure_starts_from_the_scene_s_own() {
     let mut desk = Desk::new();
     desk.finish(RED);
-    desk.state.effective.as_mut().expect("settings").exposure = 1.0;
+    desk.state.exposure = Some(1.0);
     desk.press(']');
     show(&mut desk);
     let effects = desk.press(']');
@@ -136,4 +138,36 @@ fn keys_that_are_held_come_to_an_end_and_say_so() {
         let view = desk.state.viewpoint().expect("a camera");
         assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
     }
+}
+
+#[test]
+fn what_is_back_where_the_scene_has_it_is_no_change() {
+    for keys in ["[]", "][", "<>", "><", "+-", "-+", "lh", "]]]]["] {
+        let mut desk = Desk::new();
+        desk.finish(RED);
+        let mut last = None;
+        for key in keys.chars() {
+            let effects = desk.press(key);
+            last = request(&effects).cloned();
+            show(&mut desk);
+        }
+        let last = last.expect("a request");
+        let is_back = keys != "]]]][";
+        assert_eq!(last.overrides == Overrides::default(), is_back, "{keys}: {:?}", last.overrides);
+        assert_eq!(last.write, Writing::Try, "{keys}");
+        let line = desk.text().lines().last().map(str::to_owned).unwrap_or_default();
+        assert_eq!(!line.contains("0 "), is_back, "{keys}: {line}");
+        assert!(!desk.text().contains("camera moved"), "{keys}: {}", desk.text());
+    }
+}
+
+#[test]
+fn the_call_s_own_exposure_is_no_change_either() {
+    let base = Overrides { exposure: Some(1.0), ..Overrides::default() };
+    let mut desk = Desk::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
+    desk.finish(RED);
+    desk.press('[');
+    show(&mut desk);
+    desk.press(']');
+    assert_eq!((desk.state.toggles.exposure, desk.state.overrides().exposure), (None, Some(1.0)));
 }

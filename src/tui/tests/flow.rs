@@ -292,3 +292,22 @@ fn a_failure_of_the_work_does_not_wait_for_the_file() {
     desk.worker(protocol::Event::Failed { generation: desk.state.generation, failure });
     assert!(desk.text().contains("no memory"), "{}", desk.text());
 }
+
+#[test]
+fn time_in_the_editor_is_not_from_the_save_to_the_screen() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let noticed = desk.now;
+    desk.now += Duration::from_secs(9);
+    desk.event(Event::Back);
+    desk.now += Duration::from_millis(2);
+    desk.event(Event::Changed(Changed { noticed }));
+    desk.now += Duration::from_millis(20);
+    desk.event(Event::Shown { generation: 2 });
+    assert_eq!(desk.state.first_change, Some(Duration::from_millis(22)));
+    let noticed = desk.now;
+    desk.event(Event::Changed(Changed { noticed }));
+    desk.now += Duration::from_millis(30);
+    desk.event(Event::Shown { generation: 3 });
+    assert_eq!(desk.state.first_change, Some(Duration::from_millis(30)));
+}

@@ -302,16 +302,31 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
 fn depth_of_field_of_a_pinhole_is_explained() {
     let mut desk = Desk::new();
     let pinhole = || Box::new(Effective { dof: false, ..settings() });
-    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole(), camera: camera() });
+    desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings: pinhole(),
+        camera: camera(),
+        exposure: 0.0,
+    });
     assert!(desk.press('d').is_empty());
     assert!(desk.text().contains("no `aperture`"));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
     let mut desk = Desk::with(state);
-    desk.worker(protocol::Event::Settings { generation: 1, settings: pinhole(), camera: camera() });
+    desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings: pinhole(),
+        camera: camera(),
+        exposure: 0.0,
+    });
     assert_eq!(request(&desk.press('d')).expect("a request").overrides.dof, Some(true));
-    desk.worker(protocol::Event::Settings { generation: 2, settings: pinhole(), camera: camera() });
+    desk.worker(protocol::Event::Settings {
+        generation: 2,
+        settings: pinhole(),
+        camera: camera(),
+        exposure: 0.0,
+    });
     assert!(desk.text().contains("no `aperture`"));
 }
 

@@ -24,7 +24,7 @@ fn rendered(desk: &mut Desk, (width, height): (u32, u32)) {
     let generation = desk.state.generation;
     desk.worker(protocol::Event::Started { generation });
     let settings = Box::new(Effective { width, height, ..settings() });
-    desk.worker(protocol::Event::Settings { generation, settings, camera: camera() });
+    desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0 });
     show(desk, (width, height));
 }
 
@@ -103,11 +103,19 @@ fn nothing_jumps_while_a_render_runs_nor_when_it_is_done() {
 fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
     let mut desk = Desk::new();
     let settings = |width| Box::new(Effective { width, height: 480, ..settings() });
-    let same =
-        desk.worker(protocol::Event::Settings { generation: 1, settings: settings(640), camera: camera() });
+    let same = desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings: settings(640),
+        camera: camera(),
+        exposure: 0.0,
+    });
     assert!(same.is_empty(), "{same:?}");
-    let wide =
-        desk.worker(protocol::Event::Settings { generation: 1, settings: settings(1200), camera: camera() });
+    let wide = desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings: settings(1200),
+        camera: camera(),
+        exposure: 0.0,
+    });
     assert!(
         matches!(wide[..], [Effect::Send(Command::Preview(Some(PreviewSize { width: 80, .. })))]),
         "{wide:?}"
@@ -194,4 +202,32 @@ fn the_screen_tells_whoever_has_not_saved_yet_to_save() {
             assert!(!desk.text().contains("save cornell.toml"), "{}", desk.text());
         }
     }
+}
+
+#[test]
+fn the_folded_line_names_no_file_of_another_picture() {
+    let mut desk = Desk::new();
+    let finish = |desk: &mut Desk| {
+        let generation = desk.state.generation;
+        rendered(desk, (320, 200));
+        desk.worker(done(generation, Vec::new(), false));
+        let settings = desk.state.effective.as_mut().expect("settings");
+        (settings.width, settings.height) = (320, 200);
+    };
+    finish(&mut desk);
+    desk.worker(protocol::Event::Written { generation: 1, path: "dof.png".into(), bytes: 63_000 });
+    assert!(
+        Layout::of(&desk.state).panel.is_empty() && desk.text().contains("→ dof.png 63.0 kB"),
+        "{}",
+        desk.text()
+    );
+    desk.press('l');
+    finish(&mut desk);
+    let text = desk.text();
+    assert!(text.contains("unwritten: w writes it") && !text.contains("dof.png 63"), "{text}");
+    desk.press('w');
+    desk.worker(protocol::Event::Written { generation: 2, path: "dof.png".into(), bytes: 64_000 });
+    desk.press('y');
+    let text = desk.text();
+    assert!(text.contains("→ dof.png 64.0 kB") && !text.contains("unwritten"), "{text}");
 }

@@ -204,7 +204,7 @@ fn errors_lie_beside_the_picture_where_there_is_room() {
         let mut desk = Desk::with(state(columns, rows));
         desk.finish(RED);
         let settings = Box::new(Effective { width, height: 480, ..settings() });
-        desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera() });
+        desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
         let before = cells_of(&mut desk, RED);
         desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
         assert!(desk.text().contains("error: unknown key `heigth`"), "{}", desk.text());

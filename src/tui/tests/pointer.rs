@@ -208,6 +208,11 @@ fn older_pictures_wait_for_no_newer_one_and_a_render_ends_them() {
     });
     assert!(super::cells_of(&mut desk, RED) > 0, "the older one stays");
     desk.press('N');
+    assert!(
+        !desk.state.history.is_open() && desk.text().contains("this is the newest picture"),
+        "{}",
+        desk.text()
+    );
     assert!(super::cells_of(&mut desk, BLUE) + super::cells_of(&mut desk, [10, 200, 10]) > 0);
     desk.press('n');
     desk.press('s');

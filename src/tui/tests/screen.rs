@@ -175,9 +175,18 @@ fn words_beside_a_stage_are_not_cut_in_the_middle() {
     assert!(desk.text().contains("skipped  no need"), "{}", desk.text());
     desk.event(Event::Resize(window(80, 24)));
     desk.worker(protocol::Event::Stage { generation: 1, stage: stage("the scene names none") });
-    assert!(!desk.text().contains("the sc"), "{}", desk.text());
-    desk.event(Event::Resize(window(94, 24)));
-    assert!(desk.text().contains("the scene names…"), "{}", desk.text());
+    assert!(desk.text().contains("  the scene names none"), "{}", desk.text());
+    desk.worker(protocol::Event::Stage { generation: 1, stage: stage("there is none in this scene") });
+    let text = desk.text();
+    assert!(text.contains("  there is none in this") && text.contains("  scene"), "{text}");
+    // Below the picture there is one row for each.
+    desk.event(Event::Resize(window(80, 37)));
+    assert!(
+        !desk.text().contains("there is none in this scene") && desk.text().contains("skipped"),
+        "{}",
+        desk.text()
+    );
+    desk.worker(protocol::Event::Stage { generation: 1, stage: stage("the scene names none") });
     desk.event(Event::Resize(window(200, 60)));
     assert!(desk.text().contains("the scene names none"), "{}", desk.text());
 }
@@ -489,4 +498,25 @@ fn the_folder_stands_before_the_name() {
     assert!(desk.text().contains("scenes/cornell.toml  640×480"), "{}", desk.text());
     desk.event(Event::Resize(window(40, 12)));
     assert!(!desk.text().contains("scenes"), "{}", desk.text());
+}
+
+#[test]
+fn warnings_below_errors_are_counted_with_them() {
+    let mut desk = Desk::new();
+    desk.fail(vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")]);
+    desk.event(Event::Settled);
+    assert!(desk.text().contains("─ 1 error, 1 warning ─"), "{}", desk.text());
+}
+
+#[test]
+fn a_change_of_time_that_has_no_room_is_left_out() {
+    let mut desk = Desk::with(state(100, 24));
+    desk.finish(RED);
+    desk.state.before[Stage::Render as usize] = Some(4.0);
+    desk.press('r');
+    desk.state.stages[Stage::Render as usize] = Some(stage(Stage::Render, Status::Done, 0.35, ""));
+    assert!(desk.text().contains("render    350 ms −3.65 s"), "{}", desk.text());
+    desk.event(Event::Resize(window(80, 24)));
+    let text = desk.text();
+    assert!(text.contains("350 ms") && !text.contains('−'), "{text}");
 }

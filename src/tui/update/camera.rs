@@ -17,6 +17,8 @@ const TURN: f64 = 3.0;
 const NEARER: f64 = 0.95;
 /// What a step widens the field of view by.
 const WIDER: f64 = 1.05;
+/// How far from where it began a field of view may be for all that it is back, as each step is rounded; no step is as small.
+const ROUNDING: f64 = 0.015;
 /// Stops of a step of exposure.
 const STOPS: f32 = 0.25;
 /// The most that keys expose, and darken.
@@ -56,13 +58,14 @@ pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
 
 /// So many steps brighter.
 pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
-    let Some(effective) = &state.effective else { return unknown(state) };
-    let before = state.toggles.exposure.unwrap_or(effective.exposure);
+    let Some(scene) = state.exposure else { return unknown(state) };
+    let own = state.base.exposure.unwrap_or(scene);
+    let before = state.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
     if stops == before {
         return told(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
     }
-    state.toggles.exposure = Some(stops);
+    state.toggles.exposure = (stops != own).then_some(stops);
     let effects = step(state);
     say(state, format!("exposure {stops:+}"));
     effects
@@ -79,9 +82,27 @@ fn unknown(state: &mut State) -> Vec<Effect> {
 }
 
 pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
+    forget_own(state);
     let effects = step(state);
-    say(state, "camera moved: shown, not written; w writes it, c keeps it, 0 goes back");
+    say(
+        state,
+        if state.toggles.camera.is_any() {
+            "camera moved: shown, not written; w writes it, c keeps it, 0 goes back"
+        } else {
+            "the camera is where the scene has it"
+        },
+    );
     effects
+}
+
+/// What is as the scene has it is no change.
+fn forget_own(state: &mut State) {
+    let Some(own) = state.camera else { return };
+    let camera = &mut state.toggles.camera;
+    camera.pose = camera.pose.filter(|pose| *pose != own.pose);
+    camera.fov = camera.fov.filter(|fov| (fov - own.fov).abs() > ROUNDING);
+    let pose = CameraChange { focus: None, ..*camera };
+    camera.focus = camera.focus.filter(|focus| *focus != own.changed(&pose).focus);
 }
 
 /// The camera as it is now is to be put into the scene file.

@@ -6,6 +6,8 @@ use crate::tui::event::Effect;
 use crate::tui::history::ago;
 use crate::tui::state::State;
 
+const NEWEST: &str = "this is the newest picture";
+
 /// The picture that stands goes to those of before.
 pub(super) fn record(state: &mut State) {
     let newest = if state.history.is_open() { state.history.newest() } else { state.picture.clone() };
@@ -18,12 +20,12 @@ pub(super) fn record(state: &mut State) {
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record(state);
     let Some(newest) = newest(state) else { return told(state, "there is no picture yet") };
+    if state.history.leads_to_newest(steps) {
+        return close(state, NEWEST);
+    }
     match state.history.step(steps, newest) {
         Some(shown) => look_at(state, shown),
-        None => told(
-            state,
-            if steps > 0 { "this is the oldest picture that is kept" } else { "this is the newest picture" },
-        ),
+        None => told(state, if steps > 0 { "this is the oldest picture that is kept" } else { NEWEST }),
     }
 }
 

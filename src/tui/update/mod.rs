@@ -76,6 +76,8 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             state.edits += 1;
             let effects = render(state, false);
             state.edit = (!is_own).then_some(state.generation);
+            // A save out of the editor is seen when that has ended at the earliest.
+            let noticed = state.back.map_or(noticed, |back| noticed.max(back));
             state.change = Some(PendingChange { generation: state.generation, noticed });
             effects
         }
@@ -87,6 +89,10 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Shown { generation } => shown(state, generation),
         Event::Tick => tick(state),
         Event::Lost(source) => lost(state, source),
+        Event::Back => {
+            state.back = Some(state.now);
+            Vec::new()
+        }
         Event::NoEditor(why) => {
             say(state, why);
             Vec::new()

@@ -142,7 +142,12 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     }
     state.toggles.camera.focus = Some(distance);
     let effects = camera::step_of_camera(state);
-    say(state, format!("focus {distance} away: shown, not written; w writes it, c keeps it, 0 goes back"));
+    if state.toggles.camera.focus.is_some() {
+        say(
+            state,
+            format!("focus {distance} away: shown, not written; w writes it, c keeps it, 0 goes back"),
+        );
+    }
     effects
 }
 

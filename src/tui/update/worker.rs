@@ -1,10 +1,13 @@
-//! What the worker's events do to the state. Those of older generations do nothing.
+//! What the worker's events do to the state. Those of older generations do nothing, but for what they say of files.
+
+use std::path::PathBuf;
 
 use super::{camera, history, pointer, resized_preview, say};
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, Stage, StageReport, Status};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Unwritten, Written};
+use crate::tui::parting;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
@@ -12,6 +15,15 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         // Whatever is rendered meanwhile, these answer a person.
         Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
+        // Files of pictures of before are there all the same.
+        Event::Written { path, bytes, generation } if generation != state.generation => {
+            note(state, path, bytes, generation);
+            return Vec::new();
+        }
+        Event::Done { generation, report, .. } if generation != state.generation => {
+            describe(state, generation, &report);
+            return Vec::new();
+        }
         event => event,
     };
     if generation(&event) != state.generation {
@@ -24,8 +36,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Started { .. } => started(state),
         Event::Stage { stage, .. } => record(state, stage),
         Event::Asset { progress, .. } => asset(state, progress),
-        Event::Settings { settings, camera, .. } => {
-            state.camera = Some(camera);
+        Event::Settings { settings, camera, exposure, .. } => {
+            (state.camera, state.exposure) = (Some(camera), Some(exposure));
             let pinhole = state.overrides().dof == Some(true) && !settings.dof;
             state.effective = Some(*settings);
             mended(state);
@@ -38,7 +50,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => state.progress = Some(progress),
         Event::Preview { .. } | Event::Files { .. } | Event::CameraKept { .. } | Event::Picked { .. } => {}
-        Event::Written { path, bytes, generation } => wrote(state, Written { path, bytes, generation }),
+        Event::Written { path, bytes, generation } => wrote(state, path, bytes, generation),
         Event::WriteFailed { message, .. } => {
             let is_by_hand = std::mem::take(&mut state.asked_to_write);
             if !is_by_hand {
@@ -113,18 +125,37 @@ fn asset(state: &mut State, progress: AssetProgress) {
     }
 }
 
-fn wrote(state: &mut State, written: Written) {
+fn wrote(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     // What is written of itself stands beside the picture and does not cover the keys.
     if std::mem::take(&mut state.asked_to_write) {
-        say(state, format!("wrote {}", visible(&written.path.to_string_lossy())));
+        say(state, format!("wrote {}", visible(&path.to_string_lossy())));
     }
     // Of several outputs, another one may have failed.
     let is_by_hand = state.activity == Activity::Done;
     if is_by_hand {
         (state.unwritten, state.write_failed) = (None, None);
     }
-    state.written.retain(|other| other.path != written.path);
-    state.written.push(written);
+    note(state, path, bytes, generation);
+}
+
+/// A picture is in a file. Its render may go on; a report that is there already is of this picture.
+fn note(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
+    let made = match &state.report {
+        Some(report) => parting::made(report),
+        None if generation == state.generation => parting::view(state.view()),
+        None => String::new(),
+    };
+    state.written.retain(|other| other.path != path);
+    state.written.push(Written { path, bytes, generation, made });
+}
+
+/// What the files of a request hold that has ended, if it wrote its picture at the end.
+fn describe(state: &mut State, generation: u64, report: &Report) {
+    if report.image.path.is_some() {
+        for written in state.written.iter_mut().filter(|written| written.generation == generation) {
+            written.made = parting::made(report);
+        }
+    }
 }
 
 /// What is new is shown at once; what a person has seen and closed stays closed.
@@ -157,15 +188,12 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.activity = Activity::Done;
     state.set_paused(false);
     state.assets.retain(|asset| asset.finished.is_some());
-    // What was found again took its time before.
-    if report.stages[Stage::Render as usize].status == Status::Done && state.is_written() {
-        state.rendered = Some(report.clone());
-    }
     // The picture of this request is on disk: none is missing any more.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
     if state.is_written() && is_on_disk && state.unwritten.is_none() {
         state.write_failed = None;
     }
+    describe(state, state.generation, &report);
     state.report = Some(report);
     state.unchanged = unchanged;
     state.renders += u64::from(!unchanged);

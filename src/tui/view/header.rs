@@ -151,9 +151,13 @@ pub(super) fn at_work(state: &State) -> Option<&'static str> {
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }
 
-/// How many errors there are.
+/// How many errors there are, and warnings where there are some.
 pub(super) fn errors(state: &State) -> String {
     let Some(problems) = &state.problems else { return String::new() };
-    let errors = problems.diagnostics.iter().filter(|it| it.severity == Severity::Error).count();
-    counted(errors + usize::from(problems.work.is_some()), "error")
+    let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();
+    let errors = counted(count(Severity::Error) + usize::from(problems.work.is_some()), "error");
+    match count(Severity::Warning) {
+        0 => errors,
+        warnings => format!("{errors}, {}", counted(warnings, "warning")),
+    }
 }

@@ -11,7 +11,6 @@ use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::scene::report::summary;
 use crate::scene::sanitize::visible;
-use crate::tui::event::Written;
 use crate::tui::state::{Activity, AssetBar, PreviewKind, State};
 
 /// Columns of a bar.
@@ -24,7 +23,10 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     if area.is_empty() {
         return;
     }
-    let lines = lines(state, area.width);
+    let mut lines = lines(state, area.width, true);
+    if lines.len() > usize::from(area.height) {
+        lines = self::lines(state, area.width, false);
+    }
     let wanted = lines.len().div_ceil(usize::from(area.height));
     let number = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (area.width / ENTRY_WIDTH).max(1));
     let width = area.width / number;
@@ -40,7 +42,8 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-fn lines(state: &State, width: u16) -> Vec<Line> {
+/// With the reasons of stages in full, or with what fits of them beside the stages.
+fn lines(state: &State, width: u16, is_in_full: bool) -> Vec<Line> {
     let is_done = matches!(state.activity, Activity::Done);
     let mut lines = inspected(state, width);
     // The stages and results are not those of an older picture.
@@ -49,7 +52,8 @@ fn lines(state: &State, width: u16) -> Vec<Line> {
     }
     // The stages of a broken scene are of nothing that is to be seen.
     if !is_done && !is_broken(state) {
-        lines.extend(Stage::ALL.iter().map(|stage| stages::line(state, *stage, width)));
+        let of = |stage| if is_in_full { stages::lines } else { stages::short }(state, stage, width);
+        lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
     lines.extend(state.assets.iter().map(|asset| asset_line(state, asset, width)));
     if is_done {
@@ -96,11 +100,10 @@ fn results(state: &State) -> Vec<Line> {
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
     lines.extend(state.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
-    let is_of_now = |written: &Written| state.is_written() || written.generation == state.generation;
-    if !state.written.iter().any(is_of_now) && !state.is_written() {
+    if under::is_in_no_file(state) {
         lines.push(vec![("unwritten: w writes it".to_owned(), Tone::Faint)]);
     }
-    for written in state.written.iter().filter(|written| is_of_now(written)) {
+    for written in under::files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::Plain)]);
         let size = state.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));

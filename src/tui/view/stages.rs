@@ -1,6 +1,6 @@
 //! The stages: a line for each while they are at work, one for all of them when they are done.
 
-use super::text::{Tone, columns, delta, seconds, shortened};
+use super::text::{Tone, columns, delta, seconds, shortened, wrapped};
 use crate::pipeline::protocol::{Stage, StageReport, Status};
 use crate::scene::sanitize::visible;
 use crate::tui::state::{AssetBar, State};
@@ -13,8 +13,48 @@ const SMALL: f64 = 0.02;
 /// Fewer columns of a reason say nothing.
 const LEAST_WHY: u16 = 12;
 
-/// Sign, name, time, how much that changed, and why, as far as there is room.
-pub(super) fn line(state: &State, stage: Stage, room: u16) -> Line {
+/// Sign, name, time, how much that changed, and why: where there is no room beside them, in lines of its own.
+pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<Line> {
+    let mut line = figures(state, stage, room);
+    let why = why(state, stage);
+    if why.is_empty() {
+        return vec![line];
+    }
+    if columns(&why) <= beside(&line, room) {
+        line.push((format!("  {why}"), Tone::Faint));
+        return vec![line];
+    }
+    let below = wrapped(&why, usize::from(room.saturating_sub(2)));
+    let below = below.into_iter().map(|words| vec![(format!("  {words}"), Tone::Faint)]);
+    std::iter::once(line).chain(below).collect()
+}
+
+/// The same in one line, as far as there is room.
+pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<Line> {
+    let mut line = figures(state, stage, room);
+    let (why, room) = (why(state, stage), beside(&line, room));
+    if !why.is_empty() && (room >= LEAST_WHY || columns(&why) <= room) {
+        line.push((format!("  {}", shortened(&why, room)), Tone::Faint));
+    }
+    vec![line]
+}
+
+/// Columns for a reason beside a stage.
+fn beside(line: &Line, room: u16) -> u16 {
+    room.saturating_sub(width(line) + 2)
+}
+
+fn width(line: &Line) -> u16 {
+    line.iter().map(|(text, _)| columns(text)).sum()
+}
+
+fn why(state: &State, stage: Stage) -> String {
+    let report = state.stages.get(stage as usize).and_then(Option::as_ref);
+    visible(report.map_or("", |report| report.why.as_str())).into_owned()
+}
+
+/// Sign, name, time, and how much that changed where there is room.
+fn figures(state: &State, stage: Stage, room: u16) -> Line {
     let report = state.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.is_running();
     let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
@@ -29,14 +69,8 @@ pub(super) fn line(state: &State, stage: Stage, room: u16) -> Line {
     let text_tone = if tone == Tone::Faint { Tone::Faint } else { weight(state, report) };
     let mut line = vec![(sign.to_owned(), tone), (text, text_tone)];
     let change = report.map_or(String::new(), |report| change(state, report));
-    if !change.is_empty() {
+    if !change.is_empty() && width(&line) + 1 + columns(&change) <= room {
         line.push((format!(" {change}"), Tone::Strong));
-    }
-    let used: u16 = line.iter().map(|(text, _)| columns(text)).sum();
-    let room = room.saturating_sub(used + 2);
-    let why = visible(report.map_or("", |report| report.why.as_str()));
-    if !why.is_empty() && (room >= LEAST_WHY || columns(&why) <= room) {
-        line.push((format!("  {}", shortened(&why, room)), Tone::Faint));
     }
     line
 }

@@ -124,7 +124,7 @@ pub(in crate::tui) fn shortened(text: &str, room: u16) -> String {
 }
 
 /// Broken between words where that is possible.
-pub(super) fn wrapped(text: &str, width: usize) -> Vec<String> {
+pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
     for word in text.split_inclusive(' ') {
@@ -167,7 +167,8 @@ pub(super) fn bytes(bytes: u64) -> String {
     }
 }
 
-/// How much longer or shorter a stage took than before, in the unit of its time; empty where that says nothing.
+/// How much longer or shorter a stage took than before: a number in the unit of its time, or with a unit of its own where it is far more
+/// than that; empty where that says nothing.
 pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     /// Times of the same work differ by so much.
     const NOISE: f64 = 0.05;
@@ -182,7 +183,9 @@ pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     if change.abs() <= NOISE * before || amount == ".0" || !change.is_finite() {
         return String::new();
     }
-    format!("{}{amount}", if change < 0.0 { "−" } else { "+" })
+    let sign = if change < 0.0 { "−" } else { "+" };
+    let is_far_more = seconds < 0.999_5 && change.abs() >= 0.999_5;
+    if is_far_more { format!("{sign}{}", self::seconds(change.abs())) } else { format!("{sign}{amount}") }
 }
 
 /// A thin bar: its filled part and the rest, together of this many columns.
@@ -253,7 +256,10 @@ mod tests {
             (1.12, Some(1.42), "−.3"),
             (1.12, Some(1.10), ""),
             (0.023, Some(0.019), "+4.0"),
-            (0.5, Some(1.5), "−1000"),
+            (0.5, Some(1.5), "−1.00 s"),
+            (0.985, Some(4.635), "−3.65 s"),
+            (0.02, Some(200.0), "−3 min 20 s"),
+            (0.9, Some(0.1), "+800"),
             (12.0, Some(1.0), "+11"),
             (2.0, Some(1.96), ""),
             (0.000_02, Some(0.000_01), ""),

@@ -12,6 +12,7 @@ use super::stages;
 use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share};
 use crate::pipeline::protocol::{NoiseProgress, RenderProgress};
 use crate::scene::sanitize::visible;
+use crate::tui::event::Written;
 use crate::tui::state::{Activity, PreviewKind, State};
 
 /// The hint in a narrow window.
@@ -103,7 +104,10 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
         }
     };
     if layout.panel.is_empty() {
-        for written in &state.written {
+        if is_in_no_file(state) {
+            is_room(" unwritten: w writes it".to_owned(), Tone::Faint);
+        }
+        for written in files(state) {
             let name = visible(&written.path.to_string_lossy()).into_owned();
             is_room(format!(" → {name} {}", bytes(written.bytes)), Tone::Faint);
         }
@@ -122,6 +126,16 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
     let seen = seen(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
     put_right(buffer, free, &seen, Tone::Faint, state.depth);
+}
+
+/// The files that hold the picture at hand.
+pub(super) fn files(state: &State) -> impl Iterator<Item = &Written> {
+    state.written.iter().filter(|written| state.is_written() || written.generation == state.generation)
+}
+
+/// Whether the picture at hand is one that is written when it is asked for, and was not.
+pub(super) fn is_in_no_file(state: &State) -> bool {
+    !state.is_written() && files(state).next().is_none()
 }
 
 /// From the save to the first changed cell.

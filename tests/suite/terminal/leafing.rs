@@ -52,7 +52,7 @@ fn pictures_end_at_the_oldest_and_at_the_newest() {
         ("n", "green", "picture 2 of 3"),
         ("n", "red", "picture 1 of 3"),
         ("N", "green", "picture 2 of 3"),
-        ("N", "blue", "picture 3 of 3"),
+        ("N", "blue", "this is the newest picture"),
     ] {
         terminal.press(key);
         terminal.wait_for_color(color);
