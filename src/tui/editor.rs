@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use nix::errno::Errno;
+use nix::sys::signal::Signal;
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 
@@ -46,20 +47,22 @@ pub(super) fn run(editor: &str, place: &FilePlace) -> Result<(), String> {
     let end = wait(id);
     signals::set_child(None);
     match end {
-        Ok(None | Some(0)) => Ok(()),
-        Ok(Some(127)) => Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR")),
-        Ok(Some(code)) => Err(format!("the editor `{editor}` ended with code {code}")),
+        // Those that keys send are the editor's to end by.
+        Ok(WaitStatus::Exited(_, 0) | WaitStatus::Signaled(_, Signal::SIGINT | Signal::SIGQUIT, _)) => Ok(()),
+        Ok(WaitStatus::Exited(_, 127)) => Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR")),
+        Ok(WaitStatus::Exited(_, code)) => Err(format!("the editor `{editor}` ended with code {code}")),
+        Ok(WaitStatus::Signaled(_, signal, _)) => Err(format!("the editor `{editor}` ended with {signal}")),
+        Ok(_) => Ok(()),
         Err(error) => Err(failed(error.into())),
     }
 }
 
-/// Waits for the end of a child; its exit code, none: a signal ended it.
-fn wait(id: Pid) -> Result<Option<i32>, Errno> {
+/// Waits for the end of a child.
+fn wait(id: Pid) -> Result<WaitStatus, Errno> {
     loop {
         match waitpid(id, Some(WaitPidFlag::WUNTRACED)) {
             Ok(WaitStatus::Stopped(..)) => signals::stop(),
-            Ok(WaitStatus::Exited(_, code)) => return Ok(Some(code)),
-            Ok(WaitStatus::Signaled(..)) => return Ok(None),
+            Ok(end @ (WaitStatus::Exited(..) | WaitStatus::Signaled(..))) => return Ok(end),
             Ok(_) | Err(Errno::EINTR) => {}
             Err(error) => return Err(error),
         }

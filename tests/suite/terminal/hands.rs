@@ -197,12 +197,15 @@ fn an_editor_that_hears_no_signal_does_not_keep_the_terminal_raw() {
 #[test]
 fn a_shell_between_does_not_keep_a_signal_from_the_editor() {
     let folder = Folder::new();
-    let command = [folder.program(), "scene.toml"];
-    let terminal = in_editor(&folder, &command, "printf at-work\nexec sleep 1000", " #");
-    terminal.signal(Signal::SIGTERM);
+    // As from a shell with jobs, whose terminal stays.
+    let jobs = format!("set -m; {FROM_SHELL}");
+    let command = ["/bin/sh", "-c", &jobs, folder.program()];
+    let script = "ps -o ppid= -p $PPID > parent\nprintf at-work\nexec sleep 1000";
+    let terminal = in_editor(&folder, &command, script, " #");
+    kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
     let editor = process(&folder, "id");
     terminal.wait("the editor's end", |_| kill(editor, None) == Err(Errno::ESRCH));
-    assert_eq!(terminal.end(), 143);
+    assert_eq!(terminal.end_saying("as before"), 143);
 }
 
 #[test]
