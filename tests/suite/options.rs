@@ -350,8 +350,10 @@ fn a_dash_is_standard_output_where_that_is_free() {
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(report["image"]["path"], "ball.png");
     let (mut ours, theirs) = UnixStream::pair().expect("a socket");
-    let mut child = desk.glimt("ball.toml --once --report - --progress none");
-    let mut child = child.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
+    let mut command = desk.glimt("ball.toml --once --report - --progress none");
+    let mut child = command.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
+    // It holds the other end.
+    drop(command);
     let mut report = String::new();
     ours.read_to_string(&mut report).expect("a report");
     assert!(child.wait().expect("it ends").success() && report.starts_with('{'), "{report}");
