@@ -232,12 +232,11 @@ fn material_files() {
         let desk = Desk::new();
         let Some(_) = make(&desk.path("bad.mtl"), what) else { continue };
         desk.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
-        let (text, place) = scene("a.obj");
-        // The scene has a material for it: nothing is lost.
+        let (text, _) = scene("a.obj");
+        // The scene has a material for it: nothing is lost, nor said.
         desk.write("scene.toml", &text);
         let stderr = desk.expect("scene.toml --once -o a.png", 0);
-        assert!(stderr.contains("warning: a.obj: cannot read bad.mtl"), "{what}: {stderr}");
-        assert!(stderr.contains(&format!("scene.toml:{place}")), "{what}: {stderr}");
+        assert!(!stderr.contains("warning"), "{what}: {stderr}");
         // It has none.
         desk.write("scene.toml", text.trim_end().trim_end_matches("material = \"ball\""));
         refused(

@@ -66,6 +66,8 @@ fn the_focus_goes_to_the_crosshair_and_into_the_file() {
     let focus = text.split("focus ").nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
     let depth: f64 = focus.parse().expect("a number");
     assert!((depth - 3.0).abs() < 0.01, "{depth}");
+    // Before its end, what there is would be written.
+    terminal.wait_for_render(2);
     terminal.press("w");
     terminal.wait_for("wrote scene.png");
     let expected = folder.once(&["--set", &format!("camera.focus={focus}")]);

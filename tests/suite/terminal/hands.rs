@@ -96,6 +96,7 @@ fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
 #[test]
 fn the_focus_goes_where_was_clicked() {
     let folder = Folder::new();
+    folder.write("scene.toml", &SCENE.replace("focus = 4.0", "focus = 3.0"));
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("f");
