@@ -341,6 +341,21 @@ fn escape_ends_what_waits_what_was_said_and_older_pictures() {
 }
 
 #[test]
+fn a_drag_of_a_rectangle_that_is_left_is_none() {
+    for key in [KeyCode::Esc, KeyCode::Char('v'), KeyCode::Char('z')] {
+        let mut desk = desk();
+        desk.press('z');
+        mouse(&mut desk, MouseKind::Press, 12, 10);
+        mouse(&mut desk, MouseKind::Drag, 20, 14);
+        assert!(desk.state.first.is_some());
+        desk.key(KeyPress::special(key));
+        assert!(desk.state.first.is_none() && !desk.state.is_marking, "{key:?}");
+        assert!(mouse(&mut desk, MouseKind::Drag, 30, 16).is_empty(), "{key:?}: it turns nothing");
+        assert!(mouse(&mut desk, MouseKind::Release, 30, 16).is_empty(), "{key:?}: it is no click");
+    }
+}
+
+#[test]
 fn a_digit_without_the_list_says_where_the_list_is() {
     let mut desk = Desk::new();
     desk.finish(RED);

@@ -28,7 +28,9 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     };
     state.dirty |= state.message.take().is_some() | state.inspected.take().is_some();
     state.is_focusing &= action == Action::Focus;
-    state.is_marking &= action == Action::RectangleFirst;
+    if action != Action::RectangleFirst {
+        rectangle::leave(state);
+    }
     act(state, action)
 }
 

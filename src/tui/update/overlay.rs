@@ -2,8 +2,8 @@
 
 use crossterm::event::KeyCode;
 
-use super::history;
 use super::keys::choose_view;
+use super::{history, rectangle};
 use crate::choice::Choice;
 use crate::pipeline::settings::View;
 use crate::tui::event::{Effect, KeyPress};
@@ -49,7 +49,8 @@ fn close(state: &mut State) -> bool {
         state.pane.open = false;
         true
     } else if state.is_focusing || state.is_marking {
-        (state.is_focusing, state.is_marking, state.message) = (false, false, None);
+        (state.is_focusing, state.message) = (false, None);
+        rectangle::leave(state);
         true
     } else if state.inspected.take().is_some() {
         true

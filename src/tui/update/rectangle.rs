@@ -12,7 +12,7 @@ const SIDE: f64 = 1.0 / 3.0;
 /// The key: first it waits for a drag; asked again it takes what is around the crosshair; then there is none any more.
 pub(super) fn press(state: &mut State) -> Vec<Effect> {
     if state.first.take().is_some() {
-        state.is_marking = false;
+        (state.is_marking, state.press) = (false, None);
         let effects = again(state);
         say(state, "no part of the picture comes first any more");
         return effects;
@@ -25,6 +25,13 @@ pub(super) fn press(state: &mut State) -> Vec<Effect> {
         );
     }
     take(state, around(state.crosshair))
+}
+
+/// No drag is waited for any more; one under way is none.
+pub(super) fn leave(state: &mut State) {
+    if std::mem::take(&mut state.is_marking) {
+        (state.first, state.press) = (None, None);
+    }
 }
 
 /// The hand has come from one place to another.
