@@ -64,6 +64,12 @@ pub(super) struct Reference {
     pub(super) unkept: Option<String>,
 }
 
+/// References that are not kept yet.
+pub(super) struct Made {
+    stored: Stored,
+    warnings: Vec<Diagnostic>,
+}
+
 /// Reads both; they may be one file.
 pub(super) fn given(files: &[PathBuf; 2]) -> Result<Reference, Trouble> {
     let pair = Pair::load(&files[0], &files[1]).map_err(|errors| {
@@ -108,10 +114,9 @@ impl Maker<'_> {
     pub(super) fn make(
         &self,
         session: &mut Session,
-        key: &Key,
         amount: Amount,
         mut begin: impl FnMut(usize),
-    ) -> Result<Reference, Trouble> {
+    ) -> Result<Made, Trouble> {
         let half = Amount { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
         begin(2);
         let first = self.render(session, SEEDS[0], half)?;
@@ -125,9 +130,14 @@ impl Maker<'_> {
         let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
             Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
-        let stored = Stored { pair, cost };
+        Ok(Made { stored: Stored { pair, cost }, warnings: first.warnings })
+    }
+
+    /// Keeps what was made for later runs, where there is a place for it.
+    pub(super) fn keep(&self, key: &Key, made: Made) -> Reference {
+        let Made { stored, warnings } = made;
         let unkept = self.cache.and_then(|folder| cache::store(folder, key, &stored).err());
-        Ok(reference(stored, false, first.warnings, unkept.map(|error| error.to_string())))
+        reference(stored, false, warnings, unkept.map(|error| error.to_string()))
     }
 
     fn render(&self, session: &mut Session, seed: u32, amount: Amount) -> Result<Rendered, Trouble> {

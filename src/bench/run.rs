@@ -32,8 +32,9 @@ pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Re
     let runs: Vec<Run<'_>> = order.scenes.iter().map(|path| Run { order, path, token, tell }).collect();
     let mut measure = || {
         check_seeds(order)?;
-        for (run, looked) in runs.iter().zip(all_looked(&runs)?) {
-            results.scenes.push(run.scene(looked, &mut pace, &mut results.threads)?);
+        all_looked(&runs)?;
+        for run in &runs {
+            results.scenes.push(run.scene(&mut pace, &mut results.threads)?);
             pace.end_scene();
         }
         Ok(())
@@ -46,19 +47,19 @@ pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Re
     }
 }
 
-/// What every scene says of itself; or all that is wrong with any of them.
-fn all_looked(runs: &[Run<'_>]) -> Result<Vec<Looked>, Trouble> {
-    let (mut all, mut wrong) = (Vec::new(), Vec::new());
+/// All that is wrong with any of the scenes.
+fn all_looked(runs: &[Run<'_>]) -> Result<(), Trouble> {
+    let mut wrong = Vec::new();
     for run in runs {
-        match run.look() {
-            Ok(looked) => all.push(looked),
+        match run.look(&mut Session::default()) {
+            Ok(_) => {}
             Err(Trouble::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
             Err(trouble @ (Trouble::Failed(Failure::Work(_)) | Trouble::Call(_) | Trouble::Cancelled)) => {
                 return Err(trouble);
             }
         }
     }
-    if wrong.is_empty() { Ok(all) } else { Err(Trouble::Failed(Failure::Scene(wrong))) }
+    if wrong.is_empty() { Ok(()) } else { Err(Trouble::Failed(Failure::Scene(wrong))) }
 }
 
 /// The size at which a scene is measured.
@@ -114,7 +115,7 @@ struct Looked {
 
 impl Run<'_> {
     /// Reads it and everything that it names.
-    fn look(&self) -> Result<Looked, Trouble> {
+    fn look(&self, session: &mut Session) -> Result<Looked, Trouble> {
         let order = self.order;
         self.begins("reading", None);
         let loaded = scene::load(self.path, &order.common.sets)
@@ -129,13 +130,8 @@ impl Run<'_> {
         };
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
-        let asked = match &order.reference {
-            ReferenceOrder::Samples(samples) => Some(*samples),
-            ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
-        };
-        let mut session = Session::default();
-        let key = self.maker(&common).key(&mut session, asked)?;
-        self.check_targets(&session)?;
+        let key = self.key(session, &common)?;
+        self.check_targets(session)?;
         Ok(Looked { scene: Arc::clone(&loaded.scene), given, common, key })
     }
 
@@ -143,13 +139,24 @@ impl Run<'_> {
         Maker { scene: self.path, common, token: self.token, cache: self.order.cache.as_deref() }
     }
 
-    fn scene(&self, looked: Looked, pace: &mut Pace, threads: &mut usize) -> Result<SceneResult, Trouble> {
-        let Looked { scene, given, common, key } = looked;
+    /// What the references depend on as the files are now.
+    fn key(&self, session: &mut Session, common: &Overrides) -> Result<Key, Trouble> {
+        let asked = match &self.order.reference {
+            ReferenceOrder::Samples(samples) => Some(*samples),
+            ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
+        };
+        self.maker(common).key(session, asked)
+    }
+
+    /// Looks again: a person may have saved the scene since, and so they may while it is measured.
+    fn scene(&self, pace: &mut Pace, threads: &mut usize) -> Result<SceneResult, Trouble> {
+        let mut session = Session::default();
+        let Looked { scene, given, common, key } = self.look(&mut session)?;
         let methods = methods(&scene, &self.order.toggles);
         pace.begin_scene(methods.len());
         let reference = match given {
             Some(reference) => reference,
-            None => self.reference(&common, &key, pace)?,
+            None => self.reference(&mut session, &common, &key, pace)?,
         };
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
         self.say_reference(&reference, (width, height));
@@ -161,12 +168,19 @@ impl Run<'_> {
             measured.push(method.measure(pace, threads)?);
             pace.end_method();
         }
+        self.check_same(&mut session, &common, &key)?;
         let scene = self.path.to_string_lossy().into_owned();
         Ok(SceneResult { scene, width, height, reference: reference.result, methods: measured })
     }
 
     /// The references that are kept, if they are good enough, or new ones.
-    fn reference(&self, common: &Overrides, key: &Key, pace: &Pace) -> Result<Reference, Trouble> {
+    fn reference(
+        &self,
+        session: &mut Session,
+        common: &Overrides,
+        key: &Key,
+        pace: &Pace,
+    ) -> Result<Reference, Trouble> {
         let amount = match &self.order.reference {
             ReferenceOrder::Samples(samples) => Amount { samples: *samples, seconds: None },
             ReferenceOrder::InTime | ReferenceOrder::Files(_) => {
@@ -181,7 +195,20 @@ impl Run<'_> {
             let seconds = amount.seconds.map(|seconds| pace.left(seconds * left as f64 / 2.0, true));
             self.begins(&format!("reference {} of 2", 3 - left), seconds);
         };
-        maker.make(&mut Session::default(), key, amount, begin)
+        let made = maker.make(session, amount, begin)?;
+        self.check_same(session, common, key)?;
+        Ok(maker.keep(key, made))
+    }
+
+    /// Figures of two scenes are none.
+    fn check_same(&self, session: &mut Session, common: &Overrides, key: &Key) -> Result<(), Trouble> {
+        if self.key(session, common)? == *key {
+            return Ok(());
+        }
+        let scene = self.path.display();
+        Err(Trouble::Failed(Failure::Work(format!(
+            "{scene} changed while it was measured; let it stay as it is and measure again"
+        ))))
     }
 
     /// No output may be a file that the scene is made of.
@@ -261,13 +288,25 @@ mod tests {
     #[test]
     fn scenes_that_were_done_are_given_back_though_a_later_one_fails() {
         let folder = tempfile::tempdir().expect("a folder");
-        let scenes: Vec<_> = ["a.toml", "b.toml"].map(|name| folder.path().join(name)).into();
-        for scene in &scenes {
-            let text = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n[environment]\ncolor = 1\n";
-            std::fs::write(scene, text).expect("written");
-        }
-        let order = Order {
-            scenes: scenes.clone(),
+        let order = two_scenes(folder.path());
+        // Somebody moves the second one away while the first is measured.
+        let tell = |news| match news {
+            News::Point { .. } => std::fs::remove_file(&order.scenes[1]).unwrap_or_default(),
+            News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+        };
+        let Err(unfinished) = run(&order, &CancelToken::new(), &tell) else { panic!("it is gone") };
+        assert!(matches!(unfinished.trouble, Trouble::Failed(_)), "{:?}", unfinished.trouble);
+        let done: Vec<_> = unfinished.done.scenes.iter().map(|scene| scene.methods.len()).collect();
+        assert_eq!(done, [3]);
+    }
+
+    /// Two scenes in a folder, and an order that measures them quickly and keeps references there.
+    fn two_scenes(folder: &Path) -> Order {
+        let scenes = ["a.toml", "b.toml"].map(|name| folder.join(name));
+        // References of equal scenes would be made once.
+        scenes.iter().zip(["1", "2"]).for_each(|(scene, color)| write(scene, color));
+        Order {
+            scenes: scenes.into(),
             width: Some(4),
             height: Some(4),
             steps: Steps::Samples(vec![1]),
@@ -275,17 +314,63 @@ mod tests {
             seed: 1,
             reference: ReferenceOrder::Samples(2),
             within: 10.0,
+            cache: Some(folder.join("cache")),
             ..Order::default()
+        }
+    }
+
+    /// A sky of one colour.
+    fn write(scene: &Path, color: &str) {
+        let text =
+            format!("[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n[environment]\ncolor = {color}\n");
+        std::fs::write(scene, text).expect("written");
+    }
+
+    #[test]
+    fn a_scene_that_is_saved_before_its_turn_is_measured_as_it_is_then() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let order = two_scenes(folder.path());
+        let save = |news| match news {
+            News::Point { scene, .. } if scene.ends_with("a.toml") => write(&order.scenes[1], "3"),
+            News::Point { .. } | News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
         };
-        // Somebody moves the second one away while the first is measured.
-        let tell = |news| match news {
-            News::Point { .. } => std::fs::remove_file(&scenes[1]).unwrap_or_default(),
-            News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+        let measured = run(&order, &CancelToken::new(), &save).expect("both");
+        for method in measured.scenes.iter().flat_map(|scene| &scene.methods) {
+            assert_eq!(method.steps[0].relmse, 0.0, "{}: the sky of another file", method.name);
+        }
+        // What is kept belongs to the file as it was read: as it was at first, it has no references.
+        let again = |color| {
+            write(&order.scenes[1], color);
+            let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
+            again.scenes[1].reference.is_cached
         };
-        let Err(unfinished) = run(&order, &CancelToken::new(), &tell) else { panic!("it is gone") };
-        assert!(matches!(unfinished.trouble, Trouble::Failed(_)), "{:?}", unfinished.trouble);
-        let done: Vec<_> = unfinished.done.scenes.iter().map(|scene| scene.methods.len()).collect();
-        assert_eq!(done, [3]);
+        assert!(again("3"));
+        assert!(!again("2"));
+    }
+
+    #[test]
+    fn a_scene_that_is_saved_while_it_is_measured_gives_no_figures() {
+        for moment in ["reference 2 of 2", "path, 1 sample, seed 2 of 2"] {
+            let folder = tempfile::tempdir().expect("a folder");
+            let order = two_scenes(folder.path());
+            let save = |news| match news {
+                News::Begins { what, .. } if what.ends_with(&format!("b.toml: {moment}")) => {
+                    write(&order.scenes[1], "3");
+                }
+                News::Point { .. } | News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+            };
+            let Err(unfinished) = run(&order, &CancelToken::new(), &save) else {
+                panic!("saved at {moment}")
+            };
+            let Trouble::Failed(Failure::Work(message)) = &unfinished.trouble else { panic!("{moment}") };
+            assert!(message.contains("b.toml changed while it was measured"), "{message}");
+            assert_eq!(unfinished.done.scenes.len(), 1);
+            // References of two skies are not kept.
+            write(&order.scenes[1], "3");
+            let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
+            assert!(!again.scenes[1].reference.is_cached, "{moment}");
+            assert_eq!(again.scenes[1].methods[0].steps[0].relmse, 0.0, "{moment}");
+        }
     }
 
     #[test]

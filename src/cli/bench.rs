@@ -33,6 +33,7 @@ pub(super) fn run(args: &BenchArgs, console: &Console) -> Exit {
 /// What was wrong is said, and is the exit code of an error.
 fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let order = order(args, console)?;
+    let scenes = order.scenes.len();
     let outputs = Outputs::of(args, &order.scenes, console)?;
     let baseline = outputs.baseline(console)?;
     let token = CancelToken::new();
@@ -55,13 +56,12 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
         Err(unfinished) => {
             let Unfinished { trouble, done } = *unfinished;
             // Nothing is measured where the call is wrong.
-            let is_some = !done.scenes.is_empty();
-            if is_some {
+            if !done.scenes.is_empty() {
                 say(&done, baseline.as_ref(), console);
                 // What could not be written is said; the exit code tells of the first trouble.
                 let _ = outputs.write(&done, &said, console);
             }
-            Err(troubled(&trouble, &ended, is_some, &said, console))
+            Err(troubled(&trouble, &ended, (done.scenes.len(), scenes), &said, console))
         }
     }
 }
@@ -107,11 +107,20 @@ fn broken() -> Unfinished {
     Unfinished { trouble: Trouble::Failed(Failure::Work(what)), done: Results::default() }
 }
 
-fn troubled(trouble: &Trouble, ended: &Ended, is_some: bool, said: &Said, console: &Console) -> Exit {
+/// `scenes` are how many were measured, and of how many.
+fn troubled(
+    trouble: &Trouble,
+    ended: &Ended,
+    scenes: (usize, usize),
+    said: &Said,
+    console: &Console,
+) -> Exit {
     if let Some(number) = ended.by() {
         if let Some(signal) = signals::name(number) {
-            let what = if is_some { "the scene under way is not in it" } else { "nothing was written" };
-            said.cancelled(&format!("ended by {signal}: {what}; finished references are kept"));
+            let (done, all) = scenes;
+            said.cancelled(&format!(
+                "ended by {signal} after {done} of {all} scenes; finished references are kept"
+            ));
         }
         return Exit::signal(number);
     }
