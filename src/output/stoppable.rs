@@ -1,6 +1,11 @@
 //! Developing and encoding in parts small enough to be stopped between.
 
+use std::fs::File;
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
+use std::os::fd::AsFd;
+
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use super::{BitDepth, EncodeOptions, OutputError};
 use crate::control::{CancelToken, Cancelled};
@@ -81,6 +86,31 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
     Ok(())
 }
 
+/// [`write_all`] to a pipe, a socket or a terminal, whose reader may take nothing for as long as it likes.
+pub(super) fn write_as_taken(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
+    /// Linux takes so many bytes at once wherever a pipe is ready for any; see pipe(7).
+    const PART: usize = 4096;
+    for part in bytes.chunks(PART) {
+        wait_for_room(to, token)?;
+        to.write_all(part)?;
+    }
+    Ok(())
+}
+
+fn wait_for_room(to: &File, token: &CancelToken) -> io::Result<()> {
+    /// Milliseconds between two polls of the token.
+    const LOOK: u8 = 50;
+    loop {
+        token.check().map_err(io::Error::other)?;
+        let mut ends = [PollFd::new(to.as_fd(), PollFlags::POLLOUT)];
+        match poll(&mut ends, PollTimeout::from(LOOK)) {
+            Ok(0) | Err(Errno::EINTR) => {}
+            Ok(_) => return Ok(()),
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
 /// What became of writing: having been stopped is no error of the file. Only the error itself says that it was; the token
 /// may have been cancelled later, when the file was there already.
 pub(super) fn or_cancelled<T>(
@@ -133,6 +163,22 @@ mod tests {
         let full = io::Error::from(io::ErrorKind::StorageFull);
         assert!(matches!(told(Err(full)), Err(OutputError::File { .. })));
         assert!(told(Ok(())).is_ok());
+    }
+
+    #[test]
+    fn a_reader_that_takes_nothing_does_not_hold_up_a_cancel() {
+        let (mut reader, writer) = io::pipe().expect("a pipe");
+        let (to, token) = (File::from(std::os::fd::OwnedFd::from(writer)), CancelToken::new());
+        let bytes: Vec<u8> = (0..1_000_003_u32).map(|i| (i % 251) as u8).collect();
+        std::thread::scope(|scope| {
+            let writing = scope.spawn(|| write_as_taken(&to, &bytes, &token));
+            let mut taken = vec![0; 500_000];
+            io::Read::read_exact(&mut reader, &mut taken).expect("it writes");
+            assert_eq!(taken, bytes[..taken.len()]);
+            token.cancel();
+            let stopped = writing.join().expect("no panic");
+            assert!(stopped.is_err_and(|error| error.get_ref().is_some_and(|cause| cause.is::<Cancelled>())));
+        });
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
+use std::os::fd::AsFd;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -114,8 +115,10 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
 /// Appends, so that a descriptor that is a file keeps what it has.
 fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
-        let mut stdout = io::stdout().lock();
-        return stoppable::write_all(&mut stdout, bytes, token).and_then(|()| stdout.flush());
+        // What the program has said before comes first; its own lock is held by nobody while the reader takes its time.
+        io::stdout().flush()?;
+        let stdout = File::from(io::stdout().as_fd().try_clone_to_owned()?);
+        return stoppable::write_as_taken(&stdout, bytes, token);
     }
     let mut options = OpenOptions::new();
     options.append(true);
@@ -124,7 +127,7 @@ fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if is_pipe {
         options.custom_flags(OFlag::O_NONBLOCK.bits());
     }
-    let mut file = options.open(path).map_err(|error| match error.raw_os_error() {
+    let file = options.open(path).map_err(|error| match error.raw_os_error() {
         Some(number) if is_pipe && number == Errno::ENXIO as i32 => {
             io::Error::new(ErrorKind::NotConnected, "nobody reads this pipe")
         }
@@ -133,6 +136,5 @@ fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if is_pipe {
         fcntl(&file, FcntlArg::F_SETFL(OFlag::O_APPEND))?;
     }
-    stoppable::write_all(&file, bytes, token)?;
-    file.flush()
+    stoppable::write_as_taken(&file, bytes, token)
 }
