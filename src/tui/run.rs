@@ -10,18 +10,19 @@ use std::time::{Duration, Instant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::color::{self, ColorChoice, ColorDepth};
+use super::color::{self, ColorDepth};
 use super::display::{Display, Way};
 use super::editor::{self, FilePlace};
+use super::environment::{ask, way};
 use super::event::{Effect, Event, Source};
 use super::graphics::Images;
 use super::input;
-use super::known::Ask;
-use super::options::{Ended, ExitStatus, Options, PreviewChoice, TuiError};
-use super::paint::{Advice, Fidelity, Moment, advise, can_repeat};
+use super::options::{Ended, ExitStatus, Options, TuiError};
+use super::paint::{Advice, Fidelity, Moment, advise};
 use super::parting;
+use super::preview_kind::PreviewKind;
 use super::signals::{self, Listener};
-use super::state::{PreviewKind, Setup, State};
+use super::state::{Setup, State};
 use super::terminal::{self, Screen};
 use super::update::{start, update};
 use super::view;
@@ -116,44 +117,6 @@ fn forward<T: Send + 'static>(
     };
     thread::Builder::new().name(name.to_owned()).spawn(pass).map_err(failed("start a thread for"))?;
     Ok(())
-}
-
-/// What the environment tells of the way to the terminal.
-fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
-    let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
-    let term = variable("TERM").unwrap_or_default();
-    Way {
-        is_multiplexed: is_set("TMUX")
-            || is_set("STY")
-            || term.starts_with("tmux")
-            || term.starts_with("screen"),
-        is_remote: ["SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"].into_iter().any(is_set),
-        can_repeat: can_repeat(variable),
-        ask: Ask::default(),
-    }
-}
-
-/// What to ask the terminal of itself. Multiplexers answer for themselves or not at all, the Linux console and Apple's terminal
-/// may print what they do not know.
-fn ask(
-    preview: PreviewChoice,
-    color: ColorChoice,
-    depth: ColorDepth,
-    variable: impl Fn(&str) -> Option<String>,
-) -> Ask {
-    let get = |name: &str| variable(name).unwrap_or_default();
-    let term = get("TERM");
-    let is_outermost = !way(&variable).is_multiplexed;
-    let is_plain = ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
-        || get("TERM_PROGRAM") == "Apple_Terminal";
-    let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
-    let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
-    Ask {
-        blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
-        true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
-        background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
-        palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
-    }
 }
 
 struct Ui {

@@ -7,11 +7,10 @@ use std::time::{Duration, Instant};
 use super::color::{Ansi, ColorDepth, Shades};
 use super::editor::FilePlace;
 use super::event::{Unwritten, Window, Written};
-use super::graphics::Protocol;
 use super::history::History;
 use super::known::Ask;
 use super::mosaic::Grid;
-use super::options::PreviewChoice;
+use super::preview_kind::PreviewKind;
 use crate::film::Picture;
 use crate::pipeline::protocol::{
     AssetProgress, PreviewSize, RenderProgress, Report, Section, Spot, Stage, StageReport, Viewpoint,
@@ -19,49 +18,6 @@ use crate::pipeline::protocol::{
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
 use crate::scene::diagnostic::Diagnostic;
-
-/// How pictures become cells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum PreviewKind {
-    HalfBlock,
-    Quadrant,
-    Sextant,
-    Octant,
-    Ascii,
-    /// In pixels; in half blocks where words lie over it.
-    Pixels(Protocol),
-    None,
-}
-
-impl PreviewKind {
-    /// How a picture is drawn where it was asked for like this.
-    pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
-        match choice {
-            PreviewChoice::None => Self::None,
-            // Without colours half blocks are a uniform wall.
-            PreviewChoice::Ascii => Self::Ascii,
-            PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
-            PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
-            PreviewChoice::Iterm2 => Self::Pixels(Protocol::Iterm),
-            _ if depth == ColorDepth::None => Self::Ascii,
-            PreviewChoice::Auto | PreviewChoice::HalfBlock => Self::HalfBlock,
-            PreviewChoice::Quadrant => Self::Quadrant,
-            PreviewChoice::Sextant => Self::Sextant,
-            PreviewChoice::Octant => Self::Octant,
-        }
-    }
-
-    /// The parts of a cell; none: cells have none, or there are no cells.
-    pub(super) fn grid(self) -> Option<Grid> {
-        match self {
-            Self::HalfBlock => Some(Grid::Halves),
-            Self::Quadrant => Some(Grid::Quadrants),
-            Self::Sextant => Some(Grid::Sextants),
-            Self::Octant => Some(Grid::Octants),
-            Self::Ascii | Self::Pixels(_) | Self::None => None,
-        }
-    }
-}
 
 /// What the keys changed on top of the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -4,6 +4,7 @@ mod adaptive;
 mod camera;
 mod orders;
 mod photons;
+mod previews;
 mod reuse;
 mod switching;
 mod targets;

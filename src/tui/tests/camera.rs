@@ -6,7 +6,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
-use crate::tui::state::PreviewKind;
+use crate::tui::preview_kind::PreviewKind;
 use crate::tui::{Changed, ColorDepth};
 use crossterm::event::KeyCode;
 

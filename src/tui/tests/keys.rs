@@ -12,7 +12,7 @@ use crate::tui::color::ColorDepth;
 use crate::tui::event::{Effect, Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::keymap::KEYMAP;
-use crate::tui::state::PreviewKind;
+use crate::tui::preview_kind::PreviewKind;
 use crate::tui::{Changed, ExitStatus};
 
 /// Every key of the table does what its line says. The match has an arm for every action.

@@ -4,9 +4,11 @@ mod camera;
 mod flow;
 mod keys;
 mod layout;
+mod noise;
 mod overlay;
 mod pointer;
 mod screen;
+mod warnings;
 
 use ratatui::style::Color;
 

@@ -10,7 +10,7 @@ use crate::tui::Changed;
 use crate::tui::color::ColorDepth;
 use crate::tui::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::tui::fixtures::*;
-use crate::tui::state::PreviewKind;
+use crate::tui::preview_kind::PreviewKind;
 
 /// 80×24, with a picture in 55×21 cells from (0, 1) on.
 fn desk() -> Desk {

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use ratatui::style::Color;
 
 use super::{BLUE, RED, cells_of};
-use crate::pipeline::protocol::{self, Failure, NoiseProgress, RenderProgress, Stage, StageReport, Status};
+use crate::pipeline::protocol::{self, Failure, Stage, StageReport, Status};
 use crate::pipeline::settings::{Overrides, View};
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
@@ -14,7 +14,8 @@ use crate::tui::color::ColorDepth;
 use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::keymap::KEYMAP;
-use crate::tui::state::{FrameReport, PreviewKind};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::FrameReport;
 
 #[test]
 fn the_picture_is_in_half_blocks_in_the_middle_of_its_area() {
@@ -277,17 +278,6 @@ fn work_that_failed_is_said_in_the_pane() {
 }
 
 #[test]
-fn warnings_are_counted_and_shown_on_demand() {
-    let mut desk = Desk::new();
-    desk.worker(done(1, vec![diagnostic(Severity::Warning, "texture `b` is not used")], false));
-    assert!(desk.text().contains("1 warning") && !desk.text().contains("not used"));
-    desk.press('e');
-    assert!(desk.text().contains("warning: texture `b` is not used"));
-    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-    assert!(!desk.text().contains("not used"));
-}
-
-#[test]
 fn a_conflict_opens_the_pane_once_and_stays_until_it_is_solved() {
     let mut desk = Desk::new();
     let conflict = || vec![diagnostic(Severity::Error, "cannot write a.png")];
@@ -390,25 +380,6 @@ proptest! {
 }
 
 #[test]
-fn warnings_are_there_while_the_picture_is_rendered() {
-    let mut desk = Desk::new();
-    desk.worker(protocol::Event::Started { generation: 1 });
-    desk.press('e');
-    assert!(desk.text().contains("files are still being read"), "{}", desk.text());
-    let warnings = vec![diagnostic(Severity::Warning, "texture `b` is not used")];
-    desk.worker(protocol::Event::Warnings { generation: 1, warnings });
-    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
-    assert!(desk.text().contains("1 warning"), "{}", desk.text());
-    desk.press('e');
-    assert!(desk.text().contains("warning: texture `b` is not used"), "{}", desk.text());
-    desk.event(Event::Changed(Changed { noticed: desk.now }));
-    desk.worker(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
-    assert!(!desk.text().contains("not used"), "the scene has none any more: {}", desk.text());
-    desk.press('e');
-    assert!(desk.text().contains("no errors and no warnings"), "{}", desk.text());
-}
-
-#[test]
 fn a_picture_that_could_not_be_written_is_not_called_done() {
     let mut desk = Desk::new();
     let generation = desk.state.generation;
@@ -423,36 +394,6 @@ fn a_picture_that_could_not_be_written_is_not_called_done() {
     assert!(desk.text().contains("not written"), "{}", desk.text());
     desk.worker(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 });
     assert!(first(&mut desk).contains("✓ done"), "{}", desk.text());
-}
-
-#[test]
-fn the_noise_is_told_as_it_falls() {
-    let mut desk = Desk::new();
-    desk.worker(protocol::Event::Started { generation: 1 });
-    let noise = Some(NoiseProgress { now: 0.021, next: Some((0.01, 14.0)) });
-    let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
-    desk.worker(protocol::Event::Progress { generation: 1, progress });
-    for (columns, rows, words) in [
-        (80, 24, "noise 2.1 %, 1 % in 14.0 s · 32/64 samples"),
-        (54, 20, "noise 2.1 % · 32/64 samples"),
-        (36, 20, "32/64 samples"),
-    ] {
-        desk.event(Event::Resize(window(columns, rows)));
-        assert!(desk.text().contains(words), "{words}: {}", desk.text());
-    }
-    assert!(!desk.text().contains("noise"), "{}", desk.text());
-}
-
-#[test]
-fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    assert!(desk.text().contains("0.81 % in all") && !desk.text().contains("a tile"), "{}", desk.text());
-    for (samples, words) in [(64, "0.5 % a tile "), (256, "0.5 % a tile ✓")] {
-        desk.state.effective.as_mut().expect("settings").error = 0.005;
-        desk.state.effective.as_mut().expect("settings").samples = samples;
-        assert!(desk.text().contains(words), "{words}: {}", desk.text());
-    }
 }
 
 #[test]
@@ -484,28 +425,12 @@ fn what_the_last_picture_took_is_in_words_where_there_is_room() {
 }
 
 #[test]
-fn noise_has_two_digits() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.state.report.as_mut().expect("a report").image.error = Some(0.4312);
-    assert!(desk.text().contains("43 % in all"), "{}", desk.text());
-}
-
-#[test]
 fn the_folder_stands_before_the_name() {
     let mut desk = Desk::new();
     desk.finish(RED);
     assert!(desk.text().contains("scenes/cornell.toml  640×480"), "{}", desk.text());
     desk.event(Event::Resize(window(40, 12)));
     assert!(!desk.text().contains("scenes"), "{}", desk.text());
-}
-
-#[test]
-fn warnings_below_errors_are_counted_with_them() {
-    let mut desk = Desk::new();
-    desk.fail(vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")]);
-    desk.event(Event::Settled);
-    assert!(desk.text().contains("─ 1 error, 1 warning ─"), "{}", desk.text());
 }
 
 #[test]

@@ -5,7 +5,8 @@ use crate::tui::color::{ColorDepth, Shades};
 use crate::tui::event::Effect;
 use crate::tui::input::Answer;
 use crate::tui::known::Blocks;
-use crate::tui::state::{PreviewKind, State};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::State;
 use crate::tui::view::ramp;
 
 /// Shows things as the terminal can from now on, where it was asked.

@@ -11,7 +11,8 @@ use crate::tui::ExitStatus;
 use crate::tui::action::Action;
 use crate::tui::event::{Effect, KeyPress};
 use crate::tui::keymap;
-use crate::tui::state::{Pane, PreviewKind, State, Toggles};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::{Pane, State, Toggles};
 
 pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     if let Some(effects) = overlay::update(state, key) {

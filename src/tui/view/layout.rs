@@ -6,7 +6,8 @@
 use ratatui::layout::Rect;
 
 use crate::pipeline::protocol::{PreviewSize, Stage};
-use crate::tui::state::{PreviewKind, State};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::State;
 
 /// The areas of the screen; one that has no room is empty.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -5,7 +5,8 @@ use ratatui::layout::Rect;
 
 use super::text::Tone;
 use crate::pipeline::protocol::{Section, Spot};
-use crate::tui::state::{PreviewKind, State};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::State;
 
 /// Over a picture in these cells.
 pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {

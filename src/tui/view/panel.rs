@@ -11,7 +11,8 @@ use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::scene::report::summary;
 use crate::scene::sanitize::visible;
-use crate::tui::state::{Activity, AssetBar, PreviewKind, State};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::{Activity, AssetBar, State};
 
 /// Columns of a bar.
 const BAR: u16 = 8;

@@ -19,7 +19,8 @@ use crate::tui::color::{ColorDepth, Shades, XTERM};
 use crate::tui::graphics::Placement;
 use crate::tui::mosaic::{Grid, fit};
 use crate::tui::options::PreviewChoice;
-use crate::tui::state::{PreviewKind, Shown, State};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::{Shown, State};
 
 /// The picture of the state, or a word in its place.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {

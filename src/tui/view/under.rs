@@ -13,7 +13,8 @@ use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right
 use crate::pipeline::protocol::{NoiseProgress, RenderProgress};
 use crate::scene::sanitize::visible;
 use crate::tui::event::Written;
-use crate::tui::state::{Activity, PreviewKind, State};
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::state::{Activity, State};
 
 /// The hint in a narrow window.
 const SHORT_HINT: &str = "save it to render again";

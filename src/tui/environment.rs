@@ -1,0 +1,86 @@
+//! What the environment tells of the terminal and of the way to it.
+
+use super::color::{ColorChoice, ColorDepth};
+use super::display::Way;
+use super::known::Ask;
+use super::options::PreviewChoice;
+use super::paint::can_repeat;
+use super::preview_kind::PreviewKind;
+
+/// What the environment tells of the way to the terminal.
+pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
+    let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
+    let term = variable("TERM").unwrap_or_default();
+    Way {
+        is_multiplexed: is_set("TMUX")
+            || is_set("STY")
+            || term.starts_with("tmux")
+            || term.starts_with("screen"),
+        is_remote: ["SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"].into_iter().any(is_set),
+        can_repeat: can_repeat(variable),
+        ask: Ask::default(),
+    }
+}
+
+/// What to ask the terminal of itself. Multiplexers answer for themselves or not at all, the Linux console and Apple's terminal
+/// may print what they do not know.
+pub(super) fn ask(
+    preview: PreviewChoice,
+    color: ColorChoice,
+    depth: ColorDepth,
+    variable: impl Fn(&str) -> Option<String>,
+) -> Ask {
+    let get = |name: &str| variable(name).unwrap_or_default();
+    let term = get("TERM");
+    let is_outermost = !way(&variable).is_multiplexed;
+    let is_plain = ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
+        || get("TERM_PROGRAM") == "Apple_Terminal";
+    let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
+    let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
+    Ask {
+        blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
+        true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
+        background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
+        palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn multiplexers_and_networks_are_known_by_their_variables() {
+        let way = |pairs: &[(&str, &str)]| {
+            way(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
+        };
+        assert!(!way(&[("TERM", "xterm-256color"), ("TMUX", "")]).is_multiplexed);
+        assert!(way(&[("TERM", "xterm-256color"), ("TMUX", "/tmp/tmux-0/default,1,0")]).is_multiplexed);
+        assert!(way(&[("TERM", "tmux-256color")]).is_multiplexed);
+        assert!(way(&[("TERM", "screen.xterm-256color")]).is_multiplexed);
+        assert!(way(&[("STY", "1234.pts-0")]).is_multiplexed);
+        assert!(way(&[("SSH_CONNECTION", "10.0.0.1 5000 10.0.0.2 22")]).is_remote);
+        assert!(!way(&[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_TTY", "")]).is_remote);
+    }
+
+    #[test]
+    fn a_terminal_is_asked_what_is_not_known_of_it() {
+        let ask = |preview, color, depth, pairs: &[(&str, &str)]| {
+            ask(preview, color, depth, |name| {
+                pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+            })
+        };
+        let (auto, xterm) = (PreviewChoice::Auto, ("TERM", "xterm-256color"));
+        let none = Ask::default();
+        let found = ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm]);
+        assert_eq!(found, Ask { blocks: true, true_color: true, ..none });
+        let found = ask(auto, ColorChoice::Ansi16, ColorDepth::Ansi16, &[xterm]);
+        assert_eq!(found, Ask { blocks: true, palette: true, ..none });
+        let tmux = ("TMUX", "/tmp/tmux-0/default,1,0");
+        assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm, tmux]), none);
+        assert_eq!(ask(PreviewChoice::HalfBlock, ColorChoice::Auto, ColorDepth::TrueColor, &[xterm]), none);
+        let found = ask(auto, ColorChoice::None, ColorDepth::None, &[xterm]);
+        assert_eq!(found, Ask { background: true, ..none });
+        assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Ansi16, &[("TERM", "linux")]), none);
+    }
+}

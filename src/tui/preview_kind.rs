@@ -1,0 +1,62 @@
+//! How pictures become cells, by what was asked for and what the terminal can show.
+
+use super::color::ColorDepth;
+use super::graphics::Protocol;
+use super::mosaic::Grid;
+use super::options::PreviewChoice;
+
+/// How pictures become cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PreviewKind {
+    HalfBlock,
+    Quadrant,
+    Sextant,
+    Octant,
+    Ascii,
+    /// In pixels; in half blocks where words lie over it.
+    Pixels(Protocol),
+    None,
+}
+
+impl PreviewKind {
+    /// How a picture is drawn where it was asked for like this.
+    pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
+        match choice {
+            PreviewChoice::None => Self::None,
+            // Without colours half blocks are a uniform wall.
+            PreviewChoice::Ascii => Self::Ascii,
+            PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
+            PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
+            PreviewChoice::Iterm2 => Self::Pixels(Protocol::Iterm),
+            _ if depth == ColorDepth::None => Self::Ascii,
+            PreviewChoice::Auto | PreviewChoice::HalfBlock => Self::HalfBlock,
+            PreviewChoice::Quadrant => Self::Quadrant,
+            PreviewChoice::Sextant => Self::Sextant,
+            PreviewChoice::Octant => Self::Octant,
+        }
+    }
+
+    /// The parts of a cell; none: cells have none, or there are no cells.
+    pub(super) fn grid(self) -> Option<Grid> {
+        match self {
+            Self::HalfBlock => Some(Grid::Halves),
+            Self::Quadrant => Some(Grid::Quadrants),
+            Self::Sextant => Some(Grid::Sextants),
+            Self::Octant => Some(Grid::Octants),
+            Self::Ascii | Self::Pixels(_) | Self::None => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_colours_the_preview_is_a_ramp() {
+        assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
+        assert_eq!(PreviewKind::of(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
+        assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);
+        assert_eq!(PreviewKind::of(PreviewChoice::None, ColorDepth::TrueColor), PreviewKind::None);
+    }
+}
