@@ -1,6 +1,8 @@
 //! How far a film is from the picture of endless samples, judged by its own samples.
 
-use super::{CELLS, Film, Part, Pixels};
+use rayon::prelude::*;
+
+use super::{CELLS, Film, Part, Pixels, is_in_pool};
 use crate::math::DVec3;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
 
@@ -162,8 +164,8 @@ impl Film {
 
     /// Sums over the pixels: of the variance of their luminance, and of their luminance.
     fn noise_sums(&self) -> Option<(f64, f64)> {
-        let (mut variances, mut means) = (0.0, 0.0);
-        for tile in 0..self.tile_count() {
+        let of_tile = |tile: usize| {
+            let (mut variances, mut means) = (0.0, 0.0);
             if self.tile(tile).counts.is_empty() {
                 return None;
             }
@@ -176,8 +178,18 @@ impl Film {
                     means += mean * pixels;
                 }
             }
-        }
-        Some((variances, means))
+            Some((variances, means))
+        };
+        let add = |(variances, means), of_tile: Option<(f64, f64)>| {
+            of_tile.map(|(variance, mean)| (variances + variance, means + mean))
+        };
+        self.of_tiles(of_tile).into_iter().try_fold((0.0, 0.0), add)
+    }
+
+    /// What is told of each tile, in their order. In a pool its threads share the work.
+    pub fn of_tiles<T: Send>(&self, tell: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+        let tiles = 0..self.tile_count();
+        if is_in_pool() { tiles.into_par_iter().map(tell).collect() } else { tiles.map(tell).collect() }
     }
 
     /// The noise in a half of a cell; none where a pixel has fewer than two samples, and where there are no pixels in it.
@@ -256,17 +268,13 @@ impl Film {
 
     /// Mean luminance of the picture; none where a pixel has no sample.
     pub fn mean_luminance(&self) -> Option<f64> {
-        let mut sum = 0.0;
-        for tile in 0..self.tile_count() {
+        let of_tile = |tile: usize| {
             let tile = self.tile(tile);
-            if tile.counts.is_empty() {
-                return None;
-            }
-            for pixel in 0..tile.counts.len() {
-                sum += luminance(tile.mean(pixel)?);
-            }
-        }
-        Some(sum / self.crop().area() as f64)
+            let pixels = Some(0..tile.counts.len()).filter(|pixels| !pixels.is_empty())?;
+            pixels.map(|pixel| tile.mean(pixel).map(luminance)).sum::<Option<f64>>()
+        };
+        let sum: Option<f64> = self.of_tiles(of_tile).into_iter().sum();
+        sum.map(|sum| sum / self.crop().area() as f64)
     }
 }
 

@@ -258,6 +258,7 @@ impl Engine {
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
         let is_written = table
             .run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing))?;
+        let pool = self.pool(ready.plan.threads)?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let finished = Finished {
             scene: &ready.parsed.loaded.path,
@@ -271,7 +272,7 @@ impl Engine {
             photons: photons_key.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
             is_written,
         };
-        Ok(report(&finished, table.stages, watch.seconds()))
+        Ok(pool.install(|| report(&finished, table.stages, watch.seconds())))
     }
 
     /// All stages before photons and light.

@@ -63,69 +63,47 @@ impl Goals {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
-    /// Expect what the samples so far tell, which are a power of two: by the noise of both halves of a tile, and by how it fell.
-    /// What is decided is decided otherwise.
-    fn foresee(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
-        let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
-        let is_open = |tile: &usize| {
-            let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
-            cells
-                .flat_map(|(goals, done)| goals.iter().zip(done))
-                .any(|(goal, done)| *goal == u32::MAX && *done == samples)
-        };
-        let tiles: Vec<usize> = (0..film.tile_count()).filter(is_open).collect();
-        let falls = tiles.iter().filter_map(|tile| film.tile_fall(*tile)).collect();
-        let way = Way::of(film.convergence(), falls, samples);
-        for tile in tiles {
-            let noise: Vec<HalfNoise> =
-                [0, 1].into_iter().filter_map(|half| film.tile_noise(tile, half)).collect();
-            let square = |one: &HalfNoise| {
-                let noise = relative(one, brightness);
-                noise * noise
-            };
-            let mean = noise.iter().map(square).sum::<f64>() / noise.len() as f64;
-            if !mean.is_finite() {
-                continue;
-            }
-            let wanted = way.samples_to(AIM * error, mean.sqrt(), film.tile_fall(tile));
-            let cells = self.expected.iter_mut().zip(&self.decided).zip(done).skip(CELLS * tile).take(CELLS);
-            for ((expected, decided), done) in cells {
-                for half in (0..2).filter(|half| decided[*half] == u32::MAX) {
-                    expected[half] = wanted.max(done[half]).max(LEAST);
-                }
-            }
-        }
-    }
-
     /// Decide for every half that has no goal yet and has now `samples`, a power of two, by the noise of the other one. `done` are
-    /// the samples that all of them have. Before all have enough of them for the picture's brightness, nothing is decided.
+    /// the samples that all of them have. Before all have enough of them for the picture's brightness, nothing is decided. In a pool
+    /// its threads share the work.
     pub(super) fn judge(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
-        if samples >= LEAST {
-            self.decide(film, done, samples, error);
+        let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
+        let aim = Aim { error, brightness, convergence: film.convergence() };
+        let noise =
+            film.of_tiles(|tile| self.is_open(tile, done, samples).then(|| TileNoise::of(film, tile)));
+        if samples >= LEAST && !self.lacks_least(done) {
+            self.brightness = Some(brightness);
+            self.decide(&noise, done, samples, &aim);
         }
-        self.foresee(film, done, samples, error);
+        self.foresee(&noise, done, samples, &aim);
     }
 
-    fn decide(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
-        let open = |goals: &[u32; 2], done: &[u32; 2]| {
-            (0..2).any(|half| goals[half] > done[half] && done[half] < LEAST)
-        };
-        if self.decided.iter().zip(done).any(|(goals, done)| open(goals, done)) {
-            return;
-        }
-        let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
-        self.brightness = Some(brightness);
+    /// Whether a half in a tile has no goal yet, and has now so many samples.
+    fn is_open(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+        let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
+        cells
+            .flat_map(|(goals, done)| goals.iter().zip(done))
+            .any(|(goal, done)| *goal == u32::MAX && *done == samples)
+    }
+
+    /// Whether a half that is to have them has fewer samples than the least.
+    fn lacks_least(&self, done: &[[u32; 2]]) -> bool {
+        let halves = self.decided.as_flattened().iter().zip(done.as_flattened());
+        halves.into_iter().any(|(goal, done)| goal > done && *done < LEAST)
+    }
+
+    fn decide(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &Aim) {
         for (cell, done) in done.iter().enumerate() {
-            if (0..2).all(|half| self.decided[cell][half] < u32::MAX || done[half] != samples) {
+            let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
+            if (0..2).all(|half| was_decided[half] || done[half] != samples) {
                 continue;
             }
-            let [even, odd] = [0, 1].map(|half| film.tile_noise(cell / CELLS, half));
+            let Some(TileNoise { halves: [even, odd], .. }) = noise[cell / CELLS] else { continue };
             // A tile of one pixel has no other half.
             let of_others = [odd.or(even), even.or(odd)];
-            let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
-                let wanted = wanted(&noise, film.convergence(), brightness, error);
+                let wanted = aim.samples(&noise);
                 // Where the other half has no more samples to come, nothing more will be known.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
@@ -134,20 +112,74 @@ impl Goals {
             }
         }
     }
-}
 
-/// Samples that bring noise to the error asked for.
-fn wanted(noise: &HalfNoise, convergence: Convergence, brightness: f64, error: f64) -> u32 {
-    let relative = relative(noise, brightness);
-    if !(relative > 0.0) {
-        return noise.samples;
+    /// Expect what the samples so far tell, which are a power of two: by the noise of both halves of a tile, and by how it fell.
+    /// What is decided is decided otherwise.
+    fn foresee(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &Aim) {
+        let open = |(tile, noise): (usize, &Option<TileNoise>)| {
+            noise.filter(|_| self.is_open(tile, done, samples)).map(|noise| (tile, noise))
+        };
+        let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
+        let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
+        let way = Way::of(aim.convergence, falls, samples);
+        for (tile, TileNoise { halves, fall }) in tiles {
+            let squares = halves.iter().flatten().map(|half| {
+                let noise = aim.relative(half);
+                noise * noise
+            });
+            let mean = squares.sum::<f64>() / halves.iter().flatten().count() as f64;
+            if !mean.is_finite() {
+                continue;
+            }
+            let wanted = way.samples_to(AIM * aim.error, mean.sqrt(), fall);
+            let cells = self.expected.iter_mut().zip(&self.decided).zip(done).skip(CELLS * tile).take(CELLS);
+            for ((expected, decided), done) in cells {
+                for half in (0..2).filter(|half| decided[*half] == u32::MAX) {
+                    expected[half] = wanted.max(done[half]).max(LEAST);
+                }
+            }
+        }
     }
-    convergence.samples_to(AIM * error / relative, noise.samples).min(MOST)
 }
 
-/// Noise over the brightness that it is held against.
-fn relative(noise: &HalfNoise, brightness: f64) -> f64 {
-    noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * brightness)
+/// What the samples of a tile tell of its noise.
+#[derive(Clone, Copy, Debug)]
+struct TileNoise {
+    halves: [Option<HalfNoise>; 2],
+    /// How many times smaller its variance got of late.
+    fall: Option<f64>,
+}
+
+impl TileNoise {
+    fn of(film: &Film, tile: usize) -> Self {
+        Self { halves: [0, 1].map(|half| film.tile_noise(tile, half)), fall: film.tile_fall(tile) }
+    }
+}
+
+/// What noise is held against.
+#[derive(Clone, Copy, Debug)]
+struct Aim {
+    /// The error that is asked for.
+    error: f64,
+    /// Mean luminance of the picture.
+    brightness: f64,
+    convergence: Convergence,
+}
+
+impl Aim {
+    /// Samples that bring noise to the error asked for.
+    fn samples(&self, noise: &HalfNoise) -> u32 {
+        let relative = self.relative(noise);
+        if !(relative > 0.0) {
+            return noise.samples;
+        }
+        self.convergence.samples_to(AIM * self.error / relative, noise.samples).min(MOST)
+    }
+
+    /// Noise over the brightness that it is held against.
+    fn relative(&self, noise: &HalfNoise) -> f64 {
+        noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
+    }
 }
 
 /// How noise is expected to fall from some samples on. What is smooth falls fast, and is below any bound soon: what is left of it then

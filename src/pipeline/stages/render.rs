@@ -223,7 +223,7 @@ impl<'a> Painter<'a> {
                 self.look();
             }
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
-                self.canvas.judge(target, error.into());
+                self.rendering.tracer.pool.install(|| self.canvas.judge(target, error.into()));
                 self.total_units = self.canvas.units_to_come(most);
                 self.foresight.due = Instant::now();
             }
@@ -234,7 +234,8 @@ impl<'a> Painter<'a> {
     /// At the noise, where it is time.
     fn look(&mut self) {
         let least = self.canvas.samples(u32::MAX);
-        self.outlook.look(&self.canvas.film, least, self.canvas.seconds());
+        let (film, seconds) = (&self.canvas.film, self.canvas.seconds());
+        self.rendering.tracer.pool.install(|| self.outlook.look(film, least, seconds));
     }
 
     /// All tiles of a part that have fewer samples than `target`.
