@@ -46,8 +46,8 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
     };
     let watch = Watch { progress, token };
     let bytes = read(path, FILE_LIMIT, watch)?;
-    let source = Source { path, bytes: &bytes, watch };
-    if bytes.is_empty() {
+    let source = Source { path, bytes: text::without_mark(&bytes), watch };
+    if source.bytes.is_empty() {
         return Err(source.wrong("the file is empty"));
     }
     let loaded = parse(&source)?;
@@ -105,6 +105,22 @@ mod tests {
         let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
         assert_eq!(try_bytes("A.OFF", off).expect("read").mesh.triangles, [[0, 1, 2]]);
         assert!(try_bytes("a.xyz", off).expect_err("refused").to_string().contains(".obj, .off or .ply"));
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_first_word() {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+            element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        for (name, text) in [
+            ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+            ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+            ("a.ply", ply),
+        ] {
+            let [plain, marked] = [text.to_owned(), format!("\u{feff}{text}")]
+                .map(|text| try_bytes(name, text.as_bytes()).expect("read"));
+            assert_eq!(marked.mesh.positions, plain.mesh.positions, "{name}");
+            assert!(marked.warnings.is_empty(), "{name}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::text::with_line_feeds;
+use super::text::{with_line_feeds, without_mark};
 use crate::assets::read::{self, Watch};
 use crate::assets::{AssetError, FileMaterial};
 use crate::math::{DVec3, Vec3};
@@ -18,7 +18,7 @@ pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>,
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
     let mut text = String::with_capacity(bytes.len());
-    let bytes = with_line_feeds(&bytes);
+    let bytes = with_line_feeds(without_mark(&bytes));
     for (index, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
         let line = without_comment(line);
         check(line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;

@@ -57,6 +57,14 @@ fn triangles_know_their_materials() {
 }
 
 #[test]
+fn a_byte_order_mark_before_a_library_is_no_part_of_its_first_word() {
+    let object = format!("mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n");
+    let library = "\u{feff}newmtl m\nKd 0 1 0\n";
+    let loaded = read_with(&[("a.obj", object.as_bytes()), ("a.mtl", library.as_bytes())]).expect("whole");
+    assert_eq!(loaded.materials.len(), 1);
+}
+
+#[test]
 fn a_missing_library_is_a_warning_and_a_wrong_one_an_error() {
     let text = format!("mtllib none.mtl\nusemtl red\n{SQUARE}f 1 2 3\n");
     let loaded = read(&text).expect("a mesh all the same");
