@@ -8,14 +8,23 @@ use crate::pipeline::settings::View;
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
-/// What was written, its samples and its seconds, and what came after it.
+/// What was written, its samples and its seconds, what came after it, and what is not kept of it.
 pub(super) fn words(state: &State) -> String {
-    if let Some(failed) = &state.write_failed {
-        return unwritten(state, failed);
-    }
+    let files = match &state.write_failed {
+        Some(failed) => unwritten(state, failed),
+        None => files(&state.written) + &since(state),
+    };
+    let not_kept = if state.toggles.camera.is_any() { "; the camera was moved and is not kept" } else { "" };
+    files + not_kept
+}
+
+/// What came after the files that were written.
+fn since(state: &State) -> String {
     let is_after = state.written.iter().any(|written| written.generation != state.generation);
     let next = if is_after { "the render after it" } else { "the render" };
-    let since = match (state.activity, &state.progress) {
+    match (state.activity, &state.progress) {
+        // Views and moved cameras are shown, not written.
+        (Activity::Done, _) if is_saved_since(state) => "; that was before the last save".to_owned(),
         (Activity::Done, _) => String::new(),
         (Activity::Running { .. } | Activity::Cancelled, Some(progress)) => {
             format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
@@ -25,8 +34,13 @@ pub(super) fn words(state: &State) -> String {
             let name = state.scene.file_name().unwrap_or_default().to_string_lossy();
             format!("; {} has errors since", visible(&name))
         }
-    };
-    files(&state.written) + &since
+    }
+}
+
+/// Whether the files that were written are of a scene that has changed since.
+fn is_saved_since(state: &State) -> bool {
+    let newest = state.written.iter().map(|written| written.generation).max();
+    !state.is_written() && newest.zip(state.edit).is_some_and(|(newest, edit)| newest < edit)
 }
 
 /// What was written, and what it is; files that hold the same together.
@@ -44,13 +58,14 @@ fn files(written: &[Written]) -> String {
     if said.is_empty() { "nothing is written".to_owned() } else { said.join("; ") }
 }
 
-/// That the last picture is not on disk, and why; what is there is of before, but for what was written of it.
+/// What is not on disk, and why; what else was written, of the same picture and of earlier ones.
 fn unwritten(state: &State, failed: &Unwritten) -> String {
-    let mut words = format!("the last picture is not written: {}", visible(&failed.why));
+    let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.written {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         let is_new = written.generation >= failed.generation;
-        words += &if is_new { format!("; wrote {name}") } else { format!("; {name} is an earlier one") };
+        words += if is_new { "; wrote " } else { "; wrote an earlier one to " };
+        words += &name;
     }
     words
 }
@@ -79,6 +94,7 @@ mod tests {
     use super::*;
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::diagnostic::Severity;
+    use crate::tui::Changed;
     use crate::tui::fixtures::{Desk, diagnostic, done, progress};
 
     /// The report of a request, changed.
@@ -106,7 +122,8 @@ mod tests {
         );
         desk.worker(done(begun, Vec::new(), false));
         desk.finish([30, 30, 200]);
-        assert_eq!(words(&desk.state), "wrote big.png: 640×480, 64 samples, 1.93 s");
+        let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
+        assert_eq!(words(&desk.state), format!("{made}; the camera was moved and is not kept"));
         assert!(desk.text().contains("unwritten: w writes it"), "of the one at hand: {}", desk.text());
     }
 
@@ -149,6 +166,25 @@ mod tests {
     }
 
     #[test]
+    fn a_save_that_is_only_shown_is_not_said_to_be_in_the_file() {
+        let made = "wrote a.png: 640×480, 64 samples, 1.93 s";
+        for key in ['v', 'l'] {
+            let mut desk = Desk::new();
+            desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1 });
+            desk.finish([200, 30, 30]);
+            desk.press(key);
+            desk.finish([200, 30, 30]);
+            let before = words(&desk.state);
+            assert!(before.starts_with(made) && !before.contains("save"), "{key}: {before}");
+            desk.event(crate::tui::event::Event::Changed(Changed { noticed: desk.now }));
+            desk.finish([30, 30, 200]);
+            let after = words(&desk.state);
+            assert!(after.starts_with(&format!("{made}; that was before the last save")), "{key}: {after}");
+            assert_eq!(after.contains("the camera was moved and is not kept"), key == 'l', "{after}");
+        }
+    }
+
+    #[test]
     fn what_could_not_be_written_is_told_whatever_is_shown_since() {
         let mut desk = Desk::new();
         let fail = |desk: &mut Desk| {
@@ -161,14 +197,14 @@ mod tests {
             desk.worker(finished(generation, Status::Skipped));
         };
         fail(&mut desk);
-        let failed = "the last picture is not written: cannot write a.png: no space";
+        let failed = "not written: cannot write a.png: no space";
         for key in ['l', 'v', '?'] {
             desk.press(key);
             let generation = desk.state.generation;
             desk.worker(Event::Started { generation });
-            assert_eq!(words(&desk.state), failed, "{key}");
+            assert!(words(&desk.state).starts_with(failed), "{key}");
             desk.worker(finished(generation, Status::Skipped));
-            assert_eq!(words(&desk.state), failed, "{key}");
+            assert!(words(&desk.state).starts_with(failed), "{key}");
         }
         // Back at the scene's own, where the disk has room or the picture of before.
         desk.press('0');
@@ -213,7 +249,8 @@ mod tests {
         desk.worker(Event::WriteFailed { generation: 3, message: "cannot write b.exr: no space".to_owned() });
         desk.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1 });
         desk.worker(done(3, Vec::new(), false));
-        let failed = "the last picture is not written: cannot write b.exr: no space; cornell.png is an earlier one; wrote a.png";
+        let failed =
+            "not written: cannot write b.exr: no space; wrote an earlier one to cornell.png; wrote a.png";
         assert_eq!(words(&desk.state), failed);
         desk.press('r');
         desk.worker(Event::Started { generation: 4 });
