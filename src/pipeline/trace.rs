@@ -149,16 +149,54 @@ impl Drop for StopOnPanic<'_> {
 /// Samples that every pixel has after the next pass: 1, 2, 4, … so that pictures come early, then in steps that
 /// keep a tile short, in a picture of so many pixels. Every power of two is the end of a pass, as noise is judged there.
 pub(super) fn next_pass(done: u32, total: u32, pixels: usize) -> u32 {
-    const LONGEST: usize = 32;
-    const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;
-    let longest = (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32;
+    let longest = longest_pass(pixels);
     let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
     done.saturating_add(done.clamp(1, longest)).min(power).min(total)
+}
+
+/// Samples of the longest pass.
+fn longest_pass(pixels: usize) -> u32 {
+    const LONGEST: usize = 32;
+    const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;
+    (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
+}
+
+/// In how many jobs pixels get from `done` samples to `total` by [`next_pass`], where no job has more than `at_once`.
+pub(super) fn jobs_to_come(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
+    let longest = longest_pass(pixels);
+    let (mut reached, mut jobs) = (done, 0);
+    while reached < longest.min(total) {
+        let end = next_pass(reached, total, pixels);
+        jobs += (end - reached).div_ceil(at_once);
+        reached = end;
+    }
+    jobs + total.saturating_sub(reached).div_ceil(longest.min(at_once))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn jobs_to_come_are_those_of_the_passes() {
+        for (done, total, pixels, at_once) in [
+            (0, 1, 5000, 99),
+            (0, 100, 5000, 99),
+            (3, 100, 5000, 99),
+            (0, 200, 512, 99),
+            (0, 96, 5000, 8),
+            (7, 7, 1, 1),
+        ] {
+            let (mut reached, mut jobs) = (done, 0);
+            while reached < total {
+                let end = next_pass(reached, total, pixels);
+                jobs += (end - reached).div_ceil(at_once);
+                reached = end;
+            }
+            assert_eq!(jobs_to_come(done, total, pixels, at_once), jobs, "{done} {total} {pixels} {at_once}");
+        }
+        assert_eq!(jobs_to_come(0, u32::MAX, 5000, u32::MAX), 6 + (u32::MAX - 32).div_ceil(32));
+    }
 
     #[test]
     fn passes_double_and_then_stay_short() {

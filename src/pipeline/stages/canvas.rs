@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::super::plan::Plan;
 use super::super::trace::{Cost, Job};
 use super::adaptive::Goals;
+use super::cost::{CellCost, PixelShare, Work};
 use crate::film::{CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
 use crate::scene::fingerprint::Key;
 
@@ -22,7 +23,9 @@ pub(in crate::pipeline) struct Canvas {
     /// Seconds of a processor that all of them took.
     seconds: f64,
     /// What the samples of each take of late.
-    recent: Vec<Recent>,
+    costs: Vec<CellCost>,
+    /// What is in that beside the samples.
+    pixel_share: PixelShare,
     /// Samples that they are to have at most.
     pub(super) goals: Goals,
     /// A first picture at the size of the preview, shown where there are no samples yet.
@@ -60,7 +63,8 @@ impl Canvas {
             film: Arc::new(film),
             rays: vec![0; film_cells],
             seconds: 0.0,
-            recent: vec![Recent::default(); film_cells],
+            costs: vec![CellCost::default(); film_cells],
+            pixel_share: PixelShare::default(),
             done,
             goals,
             base: None,
@@ -129,7 +133,7 @@ impl Canvas {
         let base = self.base.as_ref().map_or(0, |base| size_of_val(base.pixels.as_slice()) as u64);
         let cells = size_of_val(self.done.as_slice())
             + size_of_val(self.rays.as_slice())
-            + size_of_val(self.recent.as_slice())
+            + size_of_val(self.costs.as_slice())
             + self.goals.memory_bytes();
         self.film.memory_bytes()
             + cells as u64
@@ -178,8 +182,8 @@ impl Canvas {
                 self.rays[cell] += rays * rect.area() as u64 / job.pixels.rect.area() as u64;
                 let seconds = seconds * rect.area() as f64;
                 self.seconds += seconds;
-                let pixels = job.pixels.part.count(rect.area());
-                self.recent[cell].note(seconds, pixels as f64 * job.samples.len() as f64);
+                let (pixels, samples) = (job.pixels.part.count(rect.area()) as f64, job.samples.len() as f64);
+                self.costs[cell].note(Work { seconds, pixels, samples }, &mut self.pixel_share);
                 match job.pixels.part {
                     Part::All => self.done[cell] = [job.samples.end; 2],
                     Part::Half(half) => self.done[cell][half] = job.samples.end,
@@ -209,28 +213,29 @@ impl Canvas {
         self.seconds
     }
 
-    /// Those that it will take from here on, as far as that is known, to some samples at most. What a sample takes in a cell is told by
-    /// its last ones; where it has none, by the others.
-    pub(super) fn seconds_to_come(&self, most: u32) -> f64 {
-        let (mut seconds, mut units, mut others) = (0.0, 0.0, 0.0);
+    /// Those that it will take from here on, as far as that is known, to some samples at most; `jobs` tells in how many jobs a pixel
+    /// gets from some samples to others. What a sample takes in a cell is told by its last ones; where it has none, by the others.
+    pub(super) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
+        let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
         for cell in (0..self.done.len()).filter(|cell| self.film.cell_rect(*cell).is_some()) {
             let lacks = |half: usize| {
-                let samples = self.to_come(cell, half, most).saturating_sub(self.done[cell][half]);
-                self.film.half_pixel_count(cell, half) as f64 * f64::from(samples)
+                let (done, end) = (self.done[cell][half], self.to_come(cell, half, most));
+                let pixels = self.film.half_pixel_count(cell, half) as f64;
+                let samples = pixels * f64::from(end.saturating_sub(done));
+                self.pixel_share.worth(samples, pixels * f64::from(jobs(done, end)))
             };
-            let lacking = lacks(0) + lacks(1);
-            match self.recent[cell] {
-                Recent { units: 0.0, .. } => others += lacking,
-                recent => {
-                    seconds += lacking * recent.seconds / recent.units;
-                    units += recent.units;
-                }
+            let (lacking, cost) = (lacks(0) + lacks(1), &self.costs[cell]);
+            if cost.is_unknown() {
+                others += lacking;
+                continue;
             }
+            let of_cell = cost.worth(self.pixel_share);
+            seconds += lacking * cost.seconds() / of_cell;
+            known += cost.seconds();
+            worth += of_cell;
         }
         // Before anything is known all samples are alike.
-        let of_unit =
-            if units > 0.0 { self.recent.iter().map(|one| one.seconds).sum::<f64>() / units } else { 1.0 };
-        seconds + others * of_unit
+        seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
     /// Samples of the pixels that have most, now and in the end as far as that is known: as many passes of photons are sent.
@@ -258,24 +263,6 @@ impl Canvas {
     }
 }
 
-/// What the samples of a cell take: the first ones, one at a time, take more than those of later passes.
-#[derive(Clone, Copy, Debug, Default)]
-struct Recent {
-    seconds: f64,
-    /// Pixels times samples.
-    units: f64,
-}
-
-impl Recent {
-    /// What is left of what came before, when more comes.
-    const KEPT: f64 = 0.25;
-
-    fn note(&mut self, seconds: f64, units: f64) {
-        self.seconds = Self::KEPT * self.seconds + seconds;
-        self.units = Self::KEPT * self.units + units;
-    }
-}
-
 /// What all halves of all cells lack, if it is the same.
 fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
@@ -300,7 +287,8 @@ mod tests {
             done: vec![[0; 2]; cells],
             rays: vec![0; cells],
             seconds: 0.0,
-            recent: vec![Recent::default(); cells],
+            costs: vec![CellCost::default(); cells],
+            pixel_share: PixelShare::default(),
             goals: Goals::none(cells),
             base: None,
             previewer: None,
@@ -308,6 +296,10 @@ mod tests {
             ended_by: None,
             render_seconds: 0.0,
         }
+    }
+
+    fn in_one(done: u32, end: u32) -> u32 {
+        u32::from(done < end)
     }
 
     /// A tile has more samples, which took so long.
@@ -325,7 +317,8 @@ mod tests {
         let mut canvas = canvas();
         let mut noted = |tile: usize, samples: Range<u32>, seconds: f64| {
             note(&mut canvas, tile, samples, seconds);
-            [canvas.seconds(), canvas.seconds_to_come(8)].map(|seconds| (seconds * 1e6).round() * 1e-6)
+            [canvas.seconds(), canvas.seconds_to_come(8, in_one)]
+                .map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
         // Of the other one nothing is known: it is like the first.
         assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
@@ -345,10 +338,23 @@ mod tests {
         assert_eq!(canvas.seconds(), 10.0);
         // A quarter of the first and all of the second: 2 seconds for 1.25 samples.
         assert!(
-            (canvas.seconds_to_come(12) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
+            (canvas.seconds_to_come(12, in_one) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
             "{}",
-            canvas.seconds_to_come(12)
+            canvas.seconds_to_come(12, in_one)
         );
+    }
+
+    #[test]
+    fn what_pixels_take_is_counted_for_each_job_to_come() {
+        let mut canvas = canvas();
+        // A second a sample, and three for the pixels.
+        for (samples, seconds) in [(0..1, 4.0), (1..2, 4.0), (2..4, 5.0)] {
+            note(&mut canvas, 0, samples.clone(), seconds);
+            note(&mut canvas, 1, samples, seconds);
+        }
+        let to_come = |jobs: u32| canvas.seconds_to_come(16, |_, _| jobs);
+        assert!((to_come(1) - 2.0 * (12.0 + 3.0)).abs() < 1e-9, "{}", to_come(1));
+        assert!((to_come(2) - 2.0 * (12.0 + 6.0)).abs() < 1e-9, "{}", to_come(2));
     }
 
     #[test]

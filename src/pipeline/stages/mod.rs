@@ -4,6 +4,7 @@ pub(super) mod accel;
 mod adaptive;
 pub(super) mod canvas;
 mod coarse;
+mod cost;
 pub(super) mod films;
 pub(super) mod keys;
 pub(super) mod lights;

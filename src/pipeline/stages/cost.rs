@@ -1,0 +1,114 @@
+//! What samples take, by those before them.
+
+/// What the jobs of a cell take: so much a sample of a pixel, and so much a pixel however many samples it gets, as all of them are
+/// added to the film at once.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct CellCost {
+    seconds: f64,
+    /// Pixels times samples.
+    units: f64,
+    /// Pixels, in each job anew.
+    pixels: f64,
+    last: Option<Work>,
+}
+
+/// A job in a cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Work {
+    pub(super) seconds: f64,
+    pub(super) pixels: f64,
+    /// Of each pixel.
+    pub(super) samples: f64,
+}
+
+impl CellCost {
+    /// What is left of what came before, when more comes: the first samples take more than those of later passes.
+    const KEPT: f64 = 0.25;
+
+    pub(super) fn note(&mut self, work: Work, share: &mut PixelShare) {
+        share.note(self.last, work);
+        self.seconds = Self::KEPT * self.seconds + work.seconds;
+        self.units = Self::KEPT * self.units + work.pixels * work.samples;
+        self.pixels = Self::KEPT * self.pixels + work.pixels;
+        self.last = Some(work);
+    }
+
+    /// Whether nothing is known of it.
+    pub(super) fn is_unknown(&self) -> bool {
+        self.last.is_none()
+    }
+
+    pub(super) fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// What it took its seconds for, in samples of a pixel.
+    pub(super) fn worth(&self, share: PixelShare) -> f64 {
+        share.worth(self.units, self.pixels)
+    }
+}
+
+/// What a pixel takes in a job beside its samples.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PixelShare {
+    /// Sums over jobs with more samples than the one before in the same cell: of s'n − sn' and of s − s', where n samples take s seconds and
+    /// n' of before s'. If a pixel takes as much as b samples, s is to s' as n + b to n' + b, and b is the first over the second.
+    of_pixels: f64,
+    of_samples: f64,
+}
+
+impl PixelShare {
+    /// The most that is believed, in samples.
+    const MOST: f64 = 4.0;
+
+    fn note(&mut self, before: Option<Work>, now: Work) {
+        if let Some(before) =
+            before.filter(|before| before.pixels == now.pixels && before.samples < now.samples)
+        {
+            self.of_pixels += before.seconds * now.samples - now.seconds * before.samples;
+            self.of_samples += now.seconds - before.seconds;
+        }
+    }
+
+    /// What jobs are worth, in samples of a pixel.
+    pub(super) fn worth(self, units: f64, pixels: f64) -> f64 {
+        let share = if self.of_samples > 0.0 { self.of_pixels / self.of_samples } else { 0.0 };
+        units + share.clamp(0.0, Self::MOST) * pixels
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_pixels_take_is_told_apart_from_what_samples_take() {
+        // Cells of 100 pixels, where a sample takes 1 and 3 seconds, and a pixel as much as half a sample.
+        let (mut share, mut cells) = (PixelShare::default(), [CellCost::default(); 2]);
+        for samples in [1.0, 1.0, 2.0, 4.0] {
+            for (cell, rate) in cells.iter_mut().zip([1.0, 3.0]) {
+                let seconds = 100.0 * rate * (samples + 0.5);
+                cell.note(Work { seconds, pixels: 100.0, samples }, &mut share);
+            }
+        }
+        for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
+            assert!((share.worth(800.0, 100.0) - 850.0).abs() < 1e-9);
+            assert!((cell.seconds() / cell.worth(share) - rate).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn chance_in_the_seconds_is_not_believed() {
+        let of = |seconds: [f64; 2]| {
+            let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
+            for (seconds, samples) in seconds.into_iter().zip([1.0, 2.0]) {
+                cell.note(Work { seconds, pixels: 1.0, samples }, &mut share);
+            }
+            share.worth(0.0, 1.0)
+        };
+        assert_eq!(of([1.0, 2.0]), 0.0);
+        assert_eq!(of([1.0, 4.0]), 0.0, "more than twice as long for twice as many");
+        assert_eq!(of([1.0, 0.5]), 0.0, "less for more");
+        assert_eq!(of([1.0, 1.001]), PixelShare::MOST);
+    }
+}
