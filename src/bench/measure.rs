@@ -4,7 +4,7 @@ use super::bias::bias;
 use super::methods::Method;
 use super::order::{Steps, Trouble};
 use super::pace::Pace;
-use super::reference::SEEDS;
+use super::reference::{Keys, SEEDS};
 use super::results::{MethodResult, Picture, Step};
 use super::run::Run;
 use super::statistics::median;
@@ -12,7 +12,7 @@ use super::table::{error, samples};
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 use crate::pipeline::protocol::{Failure, Report, Stage};
-use crate::pipeline::session::Session;
+use crate::pipeline::session::{Rendered, Session};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 
@@ -33,6 +33,8 @@ pub(super) struct Measure<'a> {
     /// What all pictures share with the references.
     pub(super) common: &'a Overrides,
     pub(super) method: &'a Method,
+    /// What the references depend on.
+    pub(super) keys: &'a Keys,
     pub(super) two: &'a TwoReferences,
     /// To which a ladder without given steps climbs.
     pub(super) most_samples: f64,
@@ -45,7 +47,7 @@ impl Measure<'_> {
         // What is made once is made here, and the first picture that counts finds warm caches.
         let begin = Aim { index: 0, samples: 1, budget: None };
         let first = self.render(&mut session, SEEDS[0], begin)?;
-        *threads = first.1.settings.threads;
+        *threads = first.report.settings.threads;
         let mut steps: Vec<Step> = Vec::new();
         let mut took = Vec::new();
         while let Some(aim) = self.next(&steps, &took, pace) {
@@ -53,7 +55,11 @@ impl Measure<'_> {
             steps.push(self.step(&mut session, aim, pace, &took)?);
             took.push(pace.of_method() - before);
         }
-        Ok(MethodResult::new(self.method.name.clone(), setup(&first.1), steps))
+        let last = self.render(&mut session, SEEDS[0], begin)?;
+        if last.key != first.key || self.run.maker(self.common).keys(&mut session)? != *self.keys {
+            return Err(self.run.changed());
+        }
+        Ok(MethodResult::new(self.method.name.clone(), setup(&first.report), steps))
     }
 
     /// What comes after these steps, which took so many seconds each.
@@ -83,7 +89,7 @@ impl Measure<'_> {
         for number in 0..seeds {
             let seed = self.run.order.seed + aim.index * seeds + number;
             self.say_picture(aim, number, pace, took, &pictures);
-            let (image, report) = self.render(session, seed, aim)?;
+            let Rendered { image, report, .. } = self.render(session, seed, aim)?;
             let relmse = self.two.error(&image);
             if !relmse.is_finite() {
                 let name = &self.method.name;
@@ -152,12 +158,7 @@ impl Measure<'_> {
         }
     }
 
-    fn render(
-        &self,
-        session: &mut Session,
-        seed: u32,
-        aim: Aim,
-    ) -> Result<(RadianceImage, Box<Report>), Trouble> {
+    fn render(&self, session: &mut Session, seed: u32, aim: Aim) -> Result<Rendered, Trouble> {
         let Overrides { integrator, photons, shadows, clamp, accel, .. } = self.method.overrides.clone();
         let overrides = Overrides {
             integrator,
@@ -170,8 +171,7 @@ impl Measure<'_> {
             time_seconds: aim.budget,
             ..self.common.clone()
         };
-        let rendered = session.render(self.run.path, &overrides, self.run.token)?;
-        Ok((rendered.image, rendered.report))
+        Ok(session.render(self.run.path, &overrides, self.run.token)?)
     }
 }
 

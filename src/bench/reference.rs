@@ -64,8 +64,13 @@ pub(super) struct Reference {
     pub(super) unkept: Option<String>,
 }
 
+/// What the two references depend on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Keys([Key; 2]);
+
 /// References that are not kept yet.
 pub(super) struct Made {
+    pub(super) keys: Keys,
     stored: Stored,
     warnings: Vec<Diagnostic>,
 }
@@ -90,23 +95,31 @@ pub(super) struct Maker<'a> {
     pub(super) common: &'a Overrides,
     pub(super) token: &'a CancelToken,
     pub(super) cache: Option<&'a Path>,
+    /// Their samples, where that was asked for.
+    pub(super) asked: Option<u32>,
 }
 
 impl Maker<'_> {
-    /// A picture of one sample shows what a reference depends on, and that everything can be read.
-    /// References of a number of samples that was asked for are kept beside those that time made.
-    pub(super) fn key(&self, session: &mut Session, asked: Option<u32>) -> Result<Key, Trouble> {
+    /// Of references of a number of samples that was asked for another one than of those that time made.
+    fn key(&self, Keys(keys): &Keys) -> Key {
         let mut key = Fingerprint::new("references");
-        key.text(env!("CARGO_PKG_VERSION")).u64(asked.unwrap_or(0).into());
-        for seed in SEEDS {
-            key.key(&self.render(session, seed, Amount { samples: 1, seconds: None })?.key);
-        }
-        Ok(key.finish())
+        key.text(env!("CARGO_PKG_VERSION")).u64(self.asked.unwrap_or(0).into());
+        keys.iter().for_each(|one| {
+            key.key(one);
+        });
+        key.finish()
+    }
+
+    /// Pictures of one sample show what the references depend on, and that everything can be read.
+    pub(super) fn keys(&self, session: &mut Session) -> Result<Keys, Trouble> {
+        let [one, two] = SEEDS
+            .map(|seed| self.render(session, seed, Amount { samples: 1, seconds: None }).map(|it| it.key));
+        Ok(Keys([one?, two?]))
     }
 
     /// Those that are kept, if they are good enough.
-    pub(super) fn kept(&self, key: &Key, amount: Amount) -> Option<Reference> {
-        let stored = cache::load(self.cache?, key).filter(|stored| amount.is_met(stored.cost))?;
+    pub(super) fn kept(&self, keys: &Keys, amount: Amount) -> Option<Reference> {
+        let stored = cache::load(self.cache?, &self.key(keys)).filter(|stored| amount.is_met(stored.cost))?;
         Some(reference(stored, true, Vec::new(), None))
     }
 
@@ -130,13 +143,14 @@ impl Maker<'_> {
         let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
             Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
-        Ok(Made { stored: Stored { pair, cost }, warnings: first.warnings })
+        let keys = Keys([first.key, second.key]);
+        Ok(Made { keys, stored: Stored { pair, cost }, warnings: first.warnings })
     }
 
     /// Keeps what was made for later runs, where there is a place for it.
-    pub(super) fn keep(&self, key: &Key, made: Made) -> Reference {
-        let Made { stored, warnings } = made;
-        let unkept = self.cache.and_then(|folder| cache::store(folder, key, &stored).err());
+    pub(super) fn keep(&self, made: Made) -> Reference {
+        let Made { keys, stored, warnings } = made;
+        let unkept = self.cache.and_then(|folder| cache::store(folder, &self.key(&keys), &stored).err());
         reference(stored, false, warnings, unkept.map(|error| error.to_string()))
     }
 

@@ -7,7 +7,7 @@ use super::measure::Measure;
 use super::methods::methods;
 use super::order::{News, Order, ReferenceOrder, Steps, Trouble, Unfinished};
 use super::pace::Pace;
-use super::reference::{Amount, Maker, Reference, SEEDS, given, most_measured};
+use super::reference::{Amount, Keys, Maker, Reference, SEEDS, given, most_measured};
 use super::results::{Results, SceneResult, Step};
 use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
@@ -16,7 +16,6 @@ use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 use crate::scene;
 use crate::scene::description::Scene;
-use crate::scene::fingerprint::Key;
 
 /// Pixels on the longer side where nothing else is said.
 const LONG_SIDE: u32 = 96;
@@ -32,7 +31,7 @@ pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Re
     let runs: Vec<Run<'_>> = order.scenes.iter().map(|path| Run { order, path, token, tell }).collect();
     let mut measure = || {
         check_seeds(order)?;
-        all_looked(&runs)?;
+        check_all(&runs)?;
         for run in &runs {
             results.scenes.push(run.scene(&mut pace, &mut results.threads)?);
             pace.end_scene();
@@ -48,7 +47,7 @@ pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Re
 }
 
 /// All that is wrong with any of the scenes.
-fn all_looked(runs: &[Run<'_>]) -> Result<(), Trouble> {
+fn check_all(runs: &[Run<'_>]) -> Result<(), Trouble> {
     let mut wrong = Vec::new();
     for run in runs {
         match run.look(&mut Session::default()) {
@@ -109,8 +108,7 @@ struct Looked {
     given: Option<Reference>,
     /// The settings that all pictures share with the references.
     common: Overrides,
-    /// What the references depend on.
-    key: Key,
+    keys: Keys,
 }
 
 impl Run<'_> {
@@ -130,45 +128,47 @@ impl Run<'_> {
         };
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
-        let key = self.key(session, &common)?;
+        let keys = self.maker(&common).keys(session)?;
         self.check_targets(session)?;
-        Ok(Looked { scene: Arc::clone(&loaded.scene), given, common, key })
+        Ok(Looked { scene: Arc::clone(&loaded.scene), given, common, keys })
     }
 
-    fn maker<'a>(&'a self, common: &'a Overrides) -> Maker<'a> {
-        Maker { scene: self.path, common, token: self.token, cache: self.order.cache.as_deref() }
-    }
-
-    /// What the references depend on as the files are now.
-    fn key(&self, session: &mut Session, common: &Overrides) -> Result<Key, Trouble> {
+    pub(super) fn maker<'a>(&'a self, common: &'a Overrides) -> Maker<'a> {
         let asked = match &self.order.reference {
             ReferenceOrder::Samples(samples) => Some(*samples),
             ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
         };
-        self.maker(common).key(session, asked)
+        Maker { scene: self.path, common, token: self.token, cache: self.order.cache.as_deref(), asked }
     }
 
-    /// Looks again: a person may have saved the scene since, and so they may while it is measured.
+    /// Looks again: a person may have saved the scene since.
     fn scene(&self, pace: &mut Pace, threads: &mut usize) -> Result<SceneResult, Trouble> {
         let mut session = Session::default();
-        let Looked { scene, given, common, key } = self.look(&mut session)?;
+        let Looked { scene, given, common, keys } = self.look(&mut session)?;
         let methods = methods(&scene, &self.order.toggles);
         pace.begin_scene(methods.len());
         let reference = match given {
             Some(reference) => reference,
-            None => self.reference(&mut session, &common, &key, pace)?,
+            None => self.reference(&mut session, &common, &keys, pace)?,
         };
+        drop(session);
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
         self.say_reference(&reference, (width, height));
         let most_samples = most_measured(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
             pace.begin_method();
-            let method = Measure { run: self, common: &common, method, two: &reference.two, most_samples };
+            let method = Measure {
+                run: self,
+                common: &common,
+                method,
+                keys: &keys,
+                two: &reference.two,
+                most_samples,
+            };
             measured.push(method.measure(pace, threads)?);
             pace.end_method();
         }
-        self.check_same(&mut session, &common, &key)?;
         let scene = self.path.to_string_lossy().into_owned();
         Ok(SceneResult { scene, width, height, reference: reference.result, methods: measured })
     }
@@ -178,7 +178,7 @@ impl Run<'_> {
         &self,
         session: &mut Session,
         common: &Overrides,
-        key: &Key,
+        keys: &Keys,
         pace: &Pace,
     ) -> Result<Reference, Trouble> {
         let amount = match &self.order.reference {
@@ -188,7 +188,7 @@ impl Run<'_> {
             }
         };
         let maker = self.maker(common);
-        if let Some(kept) = maker.kept(key, amount) {
+        if let Some(kept) = maker.kept(keys, amount) {
             return Ok(kept);
         }
         let begin = |left: usize| {
@@ -196,19 +196,15 @@ impl Run<'_> {
             self.begins(&format!("reference {} of 2", 3 - left), seconds);
         };
         let made = maker.make(session, amount, begin)?;
-        self.check_same(session, common, key)?;
-        Ok(maker.keep(key, made))
+        if made.keys == *keys { Ok(maker.keep(made)) } else { Err(self.changed()) }
     }
 
-    /// Figures of two scenes are none.
-    fn check_same(&self, session: &mut Session, common: &Overrides, key: &Key) -> Result<(), Trouble> {
-        if self.key(session, common)? == *key {
-            return Ok(());
-        }
+    /// A person saved the scene, or a file that it names: its figures would be of two scenes.
+    pub(super) fn changed(&self) -> Trouble {
         let scene = self.path.display();
-        Err(Trouble::Failed(Failure::Work(format!(
-            "{scene} changed while it was measured; let it stay as it is and measure again"
-        ))))
+        Trouble::Failed(Failure::Work(format!(
+            "{scene} or a file that it names changed while it was measured; leave them as they are and measure again"
+        )))
     }
 
     /// No output may be a file that the scene is made of.
@@ -363,7 +359,7 @@ mod tests {
                 panic!("saved at {moment}")
             };
             let Trouble::Failed(Failure::Work(message)) = &unfinished.trouble else { panic!("{moment}") };
-            assert!(message.contains("b.toml changed while it was measured"), "{message}");
+            assert!(message.contains("b.toml or a file that it names changed"), "{message}");
             assert_eq!(unfinished.done.scenes.len(), 1);
             // References of two skies are not kept.
             write(&order.scenes[1], "3");
@@ -371,6 +367,23 @@ mod tests {
             assert!(!again.scenes[1].reference.is_cached, "{moment}");
             assert_eq!(again.scenes[1].methods[0].steps[0].relmse, 0.0, "{moment}");
         }
+    }
+
+    #[test]
+    fn a_save_that_the_references_do_not_heed_is_one_too() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let order = two_scenes(folder.path());
+        let text =
+            std::fs::read_to_string(&order.scenes[0]).expect("text") + "[render]\nambient = [1, 1, 1]\n";
+        let save = |news| match news {
+            News::Begins { what, .. } if what.ends_with("a.toml: whitted, 1 sample, seed 2 of 2") => {
+                std::fs::write(&order.scenes[0], &text).expect("written");
+            }
+            News::Point { .. } | News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+        };
+        let Err(unfinished) = run(&order, &CancelToken::new(), &save) else { panic!("it was saved") };
+        let Trouble::Failed(Failure::Work(message)) = &unfinished.trouble else { panic!("of the work") };
+        assert!(message.contains("a.toml or a file that it names changed"), "{message}");
     }
 
     #[test]

@@ -36,12 +36,13 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let scenes = order.scenes.len();
     let outputs = Outputs::of(args, &order.scenes, console)?;
     let baseline = outputs.baseline(console)?;
-    let token = CancelToken::new();
-    let stop = token.clone();
-    let ended = signals::catch(move || stop.cancel())
+    // The first signal ends what is under way, another one the writing of what was measured by then.
+    let (token, writing) = (CancelToken::new(), CancelToken::new());
+    let stop = [token.clone(), writing.clone()];
+    let ended = signals::catch(move || stop[usize::from(stop[0].is_cancelled())].cancel())
         .map_err(|error| console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")))?;
     let mut said = Said::new(args.progress, console);
-    let (news, work) = begin(order, token)
+    let (news, work) = begin(order, token.clone())
         .map_err(|error| console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")))?;
     follow(&news, &mut said);
     let results = work.join().unwrap_or_else(|_| Err(Box::new(broken())));
@@ -49,7 +50,7 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     match results {
         Ok(results) => {
             say(&results, baseline.as_ref(), console);
-            outputs.write(&results, &said, console)?;
+            outputs.write(&results, &said, console, if token.is_cancelled() { &writing } else { &token })?;
             said.done(&results);
             Ok(ended.by().map_or(Exit::DONE, Exit::signal))
         }
@@ -59,7 +60,7 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
             if !done.scenes.is_empty() {
                 say(&done, baseline.as_ref(), console);
                 // What could not be written is said; the exit code tells of the first trouble.
-                let _ = outputs.write(&done, &said, console);
+                let _ = outputs.write(&done, &said, console, &writing);
             }
             Err(troubled(&trouble, &ended, (done.scenes.len(), scenes), &said, console))
         }

@@ -180,8 +180,8 @@ impl Film {
             }
             Some((variances, means))
         };
-        let add = |(variances, means), of_tile: Option<(f64, f64)>| {
-            of_tile.map(|(variance, mean)| (variances + variance, means + mean))
+        let add = |(variances, means), sums: Option<(f64, f64)>| {
+            sums.map(|(variance, mean)| (variances + variance, means + mean))
         };
         self.of_tiles(of_tile).into_iter().try_fold((0.0, 0.0), add)
     }
@@ -270,8 +270,10 @@ impl Film {
     pub fn mean_luminance(&self) -> Option<f64> {
         let of_tile = |tile: usize| {
             let tile = self.tile(tile);
-            let pixels = Some(0..tile.counts.len()).filter(|pixels| !pixels.is_empty())?;
-            pixels.map(|pixel| tile.mean(pixel).map(luminance)).sum::<Option<f64>>()
+            if tile.counts.is_empty() {
+                return None;
+            }
+            (0..tile.counts.len()).map(|pixel| tile.mean(pixel).map(luminance)).sum::<Option<f64>>()
         };
         let sum: Option<f64> = self.of_tiles(of_tile).into_iter().sum();
         sum.map(|sum| sum / self.crop().area() as f64)

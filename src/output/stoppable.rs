@@ -1,7 +1,7 @@
 //! Developing and encoding in parts small enough to be stopped between.
 
 use std::fs::File;
-use std::io::{self, Cursor, Seek, SeekFrom, Write};
+use std::io::{self, Cursor, ErrorKind, Seek, SeekFrom, Write};
 use std::os::fd::AsFd;
 
 use nix::errno::Errno;
@@ -86,13 +86,20 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
     Ok(())
 }
 
-/// [`write_all`] to a pipe, a socket or a terminal, whose reader may take nothing for as long as it likes.
+/// [`write_all`] to a pipe or a socket, whose reader may take nothing for as long as it likes.
 pub(super) fn write_as_taken(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
-    /// Linux takes so many bytes at once wherever a pipe is ready for any; see pipe(7).
+    /// A pipe is ready when a page of it is free: a write of so many bytes does not wait then.
     const PART: usize = 4096;
-    for part in bytes.chunks(PART) {
+    let mut rest = bytes;
+    while !rest.is_empty() {
         wait_for_room(to, token)?;
-        to.write_all(part)?;
+        match to.write(&rest[..rest.len().min(PART)]) {
+            Ok(0) => return Err(ErrorKind::WriteZero.into()),
+            Ok(taken) => rest = &rest[taken..],
+            // Somebody else writes there too, and was faster.
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
+            Err(error) => return Err(error),
+        }
     }
     Ok(())
 }
@@ -169,6 +176,7 @@ mod tests {
     fn a_reader_that_takes_nothing_does_not_hold_up_a_cancel() {
         let (mut reader, writer) = io::pipe().expect("a pipe");
         let (to, token) = (File::from(std::os::fd::OwnedFd::from(writer)), CancelToken::new());
+        nix::fcntl::fcntl(&to, nix::fcntl::FcntlArg::F_SETFL(nix::fcntl::OFlag::O_NONBLOCK)).expect("set");
         let bytes: Vec<u8> = (0..1_000_003_u32).map(|i| (i % 251) as u8).collect();
         std::thread::scope(|scope| {
             let writing = scope.spawn(|| write_as_taken(&to, &bytes, &token));

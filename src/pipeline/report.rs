@@ -198,13 +198,18 @@ pub(super) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds:
 ///
 /// # Errors
 /// Why not, with the file's name.
-pub(super) fn write_report(plan: &Plan, inputs: &Inputs, report: &Report) -> Result<(), OutputError> {
+pub(super) fn write_report(
+    plan: &Plan,
+    inputs: &Inputs,
+    report: &Report,
+    token: &CancelToken,
+) -> Result<(), OutputError> {
     let Some(path) = &plan.report else { return Ok(()) };
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let mut text = serde_json::to_vec_pretty(report).map_err(unwritable)?;
     text.push(b'\n');
-    guarded(plan, inputs, path, |guard| atomic_until(path, &text, guard, &CancelToken::new()))
+    guarded(plan, inputs, path, |guard| atomic_until(path, &text, guard, token))
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {

@@ -161,7 +161,7 @@ fn longest_pass(pixels: usize) -> u32 {
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// In how many jobs pixels get from `done` samples to `total` by [`next_pass`], where no job has more than `at_once`.
+/// In about how many jobs pixels get from `done` samples to `total` by [`next_pass`], where no job has more than `at_once`.
 pub(super) fn jobs_to_come(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = longest_pass(pixels);
     let (mut reached, mut jobs) = (done, 0);

@@ -40,7 +40,7 @@ fn since(state: &State) -> String {
 /// Whether the files that were written are of a scene that has changed since.
 fn is_saved_since(state: &State) -> bool {
     let newest = state.written.iter().map(|written| written.generation).max();
-    !state.is_written() && newest.zip(state.edit).is_some_and(|(newest, edit)| newest < edit)
+    !state.is_written() && newest.zip(state.saved).is_some_and(|(newest, saved)| newest < saved)
 }
 
 /// What was written, and what it is; files that hold the same together.
@@ -181,6 +181,12 @@ mod tests {
             let after = words(&desk.state);
             assert!(after.starts_with(&format!("{made}; that was before the last save")), "{key}: {after}");
             assert_eq!(after.contains("the camera was moved and is not kept"), key == 'l', "{after}");
+            // A save that changes nothing does not make it newer.
+            desk.event(crate::tui::event::Event::Changed(Changed { noticed: desk.now }));
+            let generation = desk.state.generation;
+            desk.worker(Event::Started { generation });
+            desk.worker(done(generation, Vec::new(), true));
+            assert_eq!(words(&desk.state), after);
         }
     }
 

@@ -206,6 +206,8 @@ pub(super) struct State {
     pub history: History,
     /// The request of the last edit.
     pub edit: Option<u64>,
+    /// The last edit that changed the picture.
+    pub saved: Option<u64>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
     /// What each stage took when it was last at work before this request.
     pub before: [Option<f64>; Stage::ALL.len()],
@@ -299,6 +301,7 @@ impl State {
             picked: None,
             history: History::default(),
             edit: None,
+            saved: None,
             stages: Default::default(),
             before: Default::default(),
             assets: Vec::new(),

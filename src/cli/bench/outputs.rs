@@ -114,10 +114,16 @@ impl Outputs {
     }
 
     /// All of them; one that cannot be written does not keep the others from it.
-    pub(super) fn write(&self, results: &Results, said: &Said, console: &Console) -> Result<(), Exit> {
+    pub(super) fn write(
+        &self,
+        results: &Results,
+        said: &Said,
+        console: &Console,
+        token: &CancelToken,
+    ) -> Result<(), Exit> {
         let written = (0..self.files.len()).map(|index| {
             let (_, path, _) = &self.files[index];
-            let written = self.write_one(index, results);
+            let written = self.write_one(index, results, token);
             let bytes = written.map_err(|why| console.fail(Exit::FAILED, &why))?;
             said.written(path, bytes);
             Ok(())
@@ -126,14 +132,14 @@ impl Outputs {
     }
 
     /// Gives its bytes; the error says why not.
-    fn write_one(&self, index: usize, results: &Results) -> Result<usize, String> {
+    fn write_one(&self, index: usize, results: &Results, token: &CancelToken) -> Result<usize, String> {
         let (_, path, kind) = &self.files[index];
         let bytes =
             content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.may_replace(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
         let guard = Guard { is_kept: &is_kept, may_replace: &may_replace };
-        let written = write::atomic_until(path, &bytes, &guard, &CancelToken::new());
+        let written = write::atomic_until(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
 }

@@ -189,7 +189,7 @@ impl Engine {
             Err(Stop::Failed(Failure::Work(_)) | Stop::Cancelled) => {}
         }
         if let Ok(report) = &outcome {
-            self.write_report(report, &findings, sink);
+            self.write_report(report, &findings, sink, meanwhile.writing);
         }
         self.say_files(&findings, sink);
         // What was read to the end stays for whoever comes next, even if the render was stopped.

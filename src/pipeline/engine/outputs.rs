@@ -68,9 +68,15 @@ impl Engine {
         Ok(())
     }
 
-    pub(super) fn write_report(&self, report: &Report, findings: &Findings, sink: &Sink) {
+    pub(super) fn write_report(
+        &self,
+        report: &Report,
+        findings: &Findings,
+        sink: &Sink,
+        token: &CancelToken,
+    ) {
         let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
-        if let Err(error) = write_report(plan, &self.inputs, report) {
+        if let Err(error) = write_report(plan, &self.inputs, report, token) {
             sink.write_failed(error.to_string());
         }
     }

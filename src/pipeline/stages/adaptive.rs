@@ -88,8 +88,8 @@ impl Goals {
 
     /// Whether a half that is to have them has fewer samples than the least.
     fn lacks_least(&self, done: &[[u32; 2]]) -> bool {
-        let halves = self.decided.as_flattened().iter().zip(done.as_flattened());
-        halves.into_iter().any(|(goal, done)| goal > done && *done < LEAST)
+        let mut halves = self.decided.as_flattened().iter().zip(done.as_flattened());
+        halves.any(|(goal, done)| goal > done && *done < LEAST)
     }
 
     fn decide(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &Aim) {

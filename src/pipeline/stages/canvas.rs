@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::super::plan::Plan;
 use super::super::trace::{Cost, Job};
 use super::adaptive::Goals;
-use super::cost::{CellCost, PixelShare, Work};
+use super::cost::{CellCost, JobCost, PixelShare};
 use crate::film::{CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
 use crate::scene::fingerprint::Key;
 
@@ -24,7 +24,7 @@ pub(in crate::pipeline) struct Canvas {
     seconds: f64,
     /// What the samples of each take of late.
     costs: Vec<CellCost>,
-    /// What is in that beside the samples.
+    /// What a pixel takes in a job, beside its samples.
     pixel_share: PixelShare,
     /// Samples that they are to have at most.
     pub(super) goals: Goals,
@@ -183,7 +183,7 @@ impl Canvas {
                 let seconds = seconds * rect.area() as f64;
                 self.seconds += seconds;
                 let (pixels, samples) = (job.pixels.part.count(rect.area()) as f64, job.samples.len() as f64);
-                self.costs[cell].note(Work { seconds, pixels, samples }, &mut self.pixel_share);
+                self.costs[cell].note(JobCost { seconds, pixels, samples }, &mut self.pixel_share);
                 match job.pixels.part {
                     Part::All => self.done[cell] = [job.samples.end; 2],
                     Part::Half(half) => self.done[cell][half] = job.samples.end,

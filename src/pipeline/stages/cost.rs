@@ -1,7 +1,6 @@
 //! What samples take, by those before them.
 
-/// What the jobs of a cell take: so much a sample of a pixel, and so much a pixel however many samples it gets, as all of them are
-/// added to the film at once.
+/// What the jobs of a cell take: so much a sample of a pixel, and so much a pixel however many samples it gets.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CellCost {
     seconds: f64,
@@ -9,12 +8,12 @@ pub(super) struct CellCost {
     units: f64,
     /// Pixels, in each job anew.
     pixels: f64,
-    last: Option<Work>,
+    last: Option<JobCost>,
 }
 
-/// A job in a cell.
+/// What a job took in a cell.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Work {
+pub(super) struct JobCost {
     pub(super) seconds: f64,
     pub(super) pixels: f64,
     /// Of each pixel.
@@ -25,17 +24,17 @@ impl CellCost {
     /// What is left of what came before, when more comes: the first samples take more than those of later passes.
     const KEPT: f64 = 0.25;
 
-    pub(super) fn note(&mut self, work: Work, share: &mut PixelShare) {
-        share.note(self.last, work);
-        self.seconds = Self::KEPT * self.seconds + work.seconds;
-        self.units = Self::KEPT * self.units + work.pixels * work.samples;
-        self.pixels = Self::KEPT * self.pixels + work.pixels;
-        self.last = Some(work);
+    pub(super) fn note(&mut self, job: JobCost, share: &mut PixelShare) {
+        share.note(self.last, job);
+        self.seconds = Self::KEPT * self.seconds + job.seconds;
+        self.units = Self::KEPT * self.units + job.pixels * job.samples;
+        self.pixels = Self::KEPT * self.pixels + job.pixels;
+        self.last = Some(job);
     }
 
     /// Whether nothing is known of it.
     pub(super) fn is_unknown(&self) -> bool {
-        self.last.is_none()
+        !(self.units > 0.0)
     }
 
     pub(super) fn seconds(&self) -> f64 {
@@ -51,9 +50,10 @@ impl CellCost {
 /// What a pixel takes in a job beside its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PixelShare {
-    /// Sums over jobs with more samples than the one before in the same cell: of s'n − sn' and of s − s', where n samples take s seconds and
-    /// n' of before s'. If a pixel takes as much as b samples, s is to s' as n + b to n' + b, and b is the first over the second.
+    /// A cell had n' samples in s' seconds, then n > n' in s. If a pixel costs as much as b samples, s/s' = (n + b)/(n' + b), so that
+    /// b = (s'n − sn')/(s − s'). The sum of the numerators.
     of_pixels: f64,
+    /// The sum of the denominators.
     of_samples: f64,
 }
 
@@ -61,7 +61,7 @@ impl PixelShare {
     /// The most that is believed, in samples.
     const MOST: f64 = 4.0;
 
-    fn note(&mut self, before: Option<Work>, now: Work) {
+    fn note(&mut self, before: Option<JobCost>, now: JobCost) {
         if let Some(before) =
             before.filter(|before| before.pixels == now.pixels && before.samples < now.samples)
         {
@@ -88,7 +88,7 @@ mod tests {
         for samples in [1.0, 1.0, 2.0, 4.0] {
             for (cell, rate) in cells.iter_mut().zip([1.0, 3.0]) {
                 let seconds = 100.0 * rate * (samples + 0.5);
-                cell.note(Work { seconds, pixels: 100.0, samples }, &mut share);
+                cell.note(JobCost { seconds, pixels: 100.0, samples }, &mut share);
             }
         }
         for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
@@ -102,7 +102,7 @@ mod tests {
         let of = |seconds: [f64; 2]| {
             let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
             for (seconds, samples) in seconds.into_iter().zip([1.0, 2.0]) {
-                cell.note(Work { seconds, pixels: 1.0, samples }, &mut share);
+                cell.note(JobCost { seconds, pixels: 1.0, samples }, &mut share);
             }
             share.worth(0.0, 1.0)
         };
@@ -110,5 +110,27 @@ mod tests {
         assert_eq!(of([1.0, 4.0]), 0.0, "more than twice as long for twice as many");
         assert_eq!(of([1.0, 0.5]), 0.0, "less for more");
         assert_eq!(of([1.0, 1.001]), PixelShare::MOST);
+    }
+
+    #[test]
+    fn jobs_of_other_pixels_are_not_compared() {
+        let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
+        // A cell, then a half of it: as long for as many samples.
+        for (pixels, samples) in [(2.0, 1.0), (1.0, 2.0)] {
+            cell.note(JobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
+        }
+        assert_eq!(share.worth(0.0, 1.0), 0.0);
+    }
+
+    #[test]
+    fn a_cell_without_pixels_tells_nothing() {
+        let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
+        cell.note(JobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
+        assert!(!cell.is_unknown());
+        // A half without pixels gets jobs too.
+        for _ in 0..2000 {
+            cell.note(JobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
+        }
+        assert!(cell.is_unknown(), "{cell:?}");
     }
 }

@@ -199,6 +199,9 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.renders += u64::from(!unchanged);
     warn(state, warnings);
     history::record(state);
+    if !unchanged {
+        state.saved = state.edit.or(state.saved);
+    }
     if unchanged && state.edit.take_if(|edit| *edit == state.generation).is_some() {
         state.history.edited_nothing();
     }
