@@ -321,6 +321,19 @@ mod properties {
 }
 
 #[test]
+fn a_value_that_broken_toml_hides_is_not_found_wrong_too() {
+    for (line, what) in [
+        ("samples == 17", "this is not TOML: extra `=`"),
+        ("samples = = 17", "this is not TOML: extra `=`"),
+        ("samples =", "a value is missing"),
+        ("output == \"a.png\"", "this is not TOML: extra `=`"),
+    ] {
+        let all = outcome(&format!("{CAMERA}[render]\n{line}\n")).diagnostics;
+        assert!(all.len() == 1 && all[0].message.contains(what), "{line}: {all:?}");
+    }
+}
+
+#[test]
 fn glass_without_an_inside_is_warned_about() {
     let glass = "[materials.a]\ntype = 'glass'\n[render]\nambient = [1, 1, 1]\n";
     let warnings = |shape: &str, material: &str| {

@@ -166,6 +166,8 @@ impl<'a> Context<'a> {
             issues.retain(|issue| match issue.cause {
                 Cause::Syntax => true,
                 Cause::Absence => false,
+                // What stands for a value that broken TOML hides is at no place.
+                Cause::Value if issue.span == (0..0) => false,
                 Cause::Value => {
                     let line = self.line(issue.span.start);
                     let before = broken_lines.partition_point(|lines| lines.start <= line);
