@@ -80,29 +80,42 @@ def log_between(x, low, high):
     return y0 * (y1 / y0) ** (math.log(x / x0) / math.log(x1 / x0))
 
 
+PARTS = [0.3, 0.45, 0.65, 0.9, 1.1]
+
+
+def where_equal(fixed, runs):
+    """The part of the seconds, and the samples, at which these runs have the mean relMSE of the fixed ones."""
+    goal = statistics.fmean(run[1] for run in fixed)
+    points = [[statistics.fmean(run[1] for run in runs[part]), *(statistics.median(run[k] for run in runs[part]) for k in (0, 2))] for part in PARTS]
+    above = [k for k in range(len(PARTS) - 1) if points[k + 1][0] < goal]
+    k = above[0] if above else len(PARTS) - 2
+    return [log_between(goal, (points[k][0], points[k][i]), (points[k + 1][0], points[k + 1][i])) for i in (1, 2)]
+
+
 def in_time(render, samples, seeds):
-    """Medians of the seconds of both, the samples of both, their ratio and the relMSE that they share."""
+    """Medians of the seconds of both, the samples of both, their ratio, the relMSE that they share, and the standard error of the
+    ratio, by leaving out one seed after the other."""
     render.run("reference.exr", ["--error", 0, "--samples", REFERENCE_TIMES * samples, "--seed", 999])
-    parts = [0.3, 0.45, 0.65, 0.9, 1.1]
-    fixed, runs = [], {part: [] for part in parts}
+    fixed, runs = [], {part: [] for part in PARTS}
     for seed in range(1, seeds + 1):
         fixed.append(render.fixed(samples, seed))
-        for part in parts:
+        for part in PARTS:
             budget = ["--time", max(0.001, part * fixed[-1][0]), "--samples", MOST, "--seed", seed]
             seconds, mean = render.run("picture.exr", ["--error", 0, *budget])
             runs[part].append((seconds / fixed[-1][0], render.error(), mean))
-    goal = statistics.fmean(run[1] for run in fixed)
-    points = [[statistics.fmean(run[1] for run in runs[part]), *(statistics.median(run[k] for run in runs[part]) for k in (0, 2))] for part in parts]
-    above = [k for k in range(len(parts) - 1) if points[k + 1][0] < goal]
-    k = above[0] if above else len(parts) - 2
-    ratio = log_between(goal, (points[k][0], points[k][1]), (points[k + 1][0], points[k + 1][1]))
-    mean = log_between(goal, (points[k][0], points[k][2]), (points[k + 1][0], points[k + 1][2]))
+    ratio, mean = where_equal(fixed, runs)
+    others = []
+    for k in range(seeds if seeds > 2 else 0):
+        without = [row[:k] + row[k + 1 :] for row in (fixed, *runs.values())]
+        others.append(where_equal(without[0], dict(zip(PARTS, without[1:])))[0])
+    error = (seeds - 1) / math.sqrt(seeds) * statistics.stdev(others) if others else math.nan
     seconds = statistics.median(run[0] for run in fixed)
-    return ratio * seconds, seconds, ratio, mean, samples, goal
+    goal = statistics.fmean(run[1] for run in fixed)
+    return ratio * seconds, seconds, ratio, mean, samples, goal, error
 
 
 def compared(render, error, seeds):
-    """Medians of the seconds of both, the samples of both, and the relMSE that they share."""
+    """Medians of the seconds of both, the samples of both, their ratio, the relMSE that they share, and the error of the ratio."""
     _, samples = render.run("picture.exr", ["--error", error, "--samples", MOST])
     render.run("reference.exr", ["--error", 0, "--samples", min(MOST, max(1024, round(REFERENCE_TIMES * samples))), "--seed", 999])
     tried = {}
@@ -131,15 +144,16 @@ def compared(render, error, seeds):
         ratios.append((own, log_between(goal, *around)))
     fixed_samples = log_between(goal, (tried[low][0], low), (tried[high][0], high))
     own, fixed = (statistics.median(column) for column in zip(*ratios))
-    ratio = statistics.median(one / other for one, other in ratios)
-    return own, fixed, ratio, statistics.fmean(run[1] for run in runs), fixed_samples, goal
+    each = [one / other for one, other in ratios]
+    error = statistics.stdev(each) / math.sqrt(seeds) if seeds > 1 else math.nan
+    return own, fixed, statistics.median(each), statistics.fmean(run[1] for run in runs), fixed_samples, goal, error
 
 
 def main():
     asked = arguments()
     scenes = asked.scenes or sorted((ROOT / "scenes").glob("*.toml"))
     print(f"{'--time' if asked.error is None else f'error = {asked.error}'}, {asked.side} pixels, {asked.seeds} seeds")
-    print(f"{'':18} {'seconds':>9} {'samples':>9} {'fixed, s':>9} {'samples':>9} {'relMSE':>10} {'ratio':>7}")
+    print(f"{'':18} {'seconds':>9} {'samples':>9} {'fixed, s':>9} {'samples':>9} {'relMSE':>10} {'ratio':>7} {'±':>6}")
     for scene in scenes:
         with tempfile.TemporaryDirectory() as folder:
             render = Render(asked.glimt, scene, asked.side, folder)
@@ -147,8 +161,8 @@ def main():
                 figures = in_time(render, asked.samples, asked.seeds)
             else:
                 figures = compared(render, asked.error, asked.seeds)
-            own, fixed, ratio, samples, fixed_samples, goal = figures
-        print(f"{scene.stem:18} {own:9.3f} {samples:9.1f} {fixed:9.3f} {fixed_samples:9.1f} {goal:10.2e} {ratio:7.2f}", flush=True)
+            own, fixed, ratio, samples, fixed_samples, goal, error = figures
+        print(f"{scene.stem:18} {own:9.3f} {samples:9.1f} {fixed:9.3f} {fixed_samples:9.1f} {goal:10.2e} {ratio:7.3f} {error:6.3f}", flush=True)
 
 
 if __name__ == "__main__":
