@@ -1,10 +1,14 @@
 //! Each option changes what it says, and nothing else; the report tells.
 
 use std::fs;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::process::Stdio;
+
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 
 use super::desk::{Desk, SCENE};
 
@@ -375,6 +379,32 @@ fn a_dash_is_standard_output_where_that_is_free() {
     // By its path it is a file like others.
     desk.expect("ball.toml --once --report ./-", 0);
     assert!(desk.bytes("-").starts_with(b"{"));
+}
+
+#[test]
+fn a_signal_ends_a_report_that_nobody_reads() {
+    let desk = Desk::new();
+    let (reader, mut writer) = std::io::pipe().expect("a pipe");
+    fcntl(&writer, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("set");
+    while writer.write(&[0; 4096]).is_ok() {}
+    fcntl(&writer, FcntlArg::F_SETFL(OFlag::empty())).expect("set");
+    let mut command = desk.glimt("ball.toml --once --report - --progress none");
+    let child = command.stdout(writer).stderr(Stdio::piped()).spawn().expect("it runs");
+    // The picture comes first.
+    while !desk.path("ball.png").exists() {
+        std::thread::yield_now();
+    }
+    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("it is there");
+    let output = child.wait_with_output().expect("it ends");
+    drop(reader);
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(
+        (output.status.code(), stderr.as_str()),
+        (
+            Some(130),
+            "error: the report is not written: cancelled\nended by SIGINT: only ball.png was written\n"
+        )
+    );
 }
 
 #[test]

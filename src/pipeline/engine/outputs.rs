@@ -10,6 +10,7 @@ use super::super::stages::{Findings, Staged, Stop};
 use super::super::targets::conflicts;
 use super::Engine;
 use crate::control::CancelToken;
+use crate::output::OutputError;
 
 impl Engine {
     /// Whether there is a picture without holes.
@@ -77,7 +78,12 @@ impl Engine {
     ) {
         let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
         if let Err(error) = write_report(plan, &self.inputs, report, token) {
-            sink.write_failed(error.to_string());
+            let is_cancelled = matches!(error, OutputError::Cancelled(_));
+            sink.write_failed(if is_cancelled {
+                format!("the report is not written: {error}")
+            } else {
+                error.to_string()
+            });
         }
     }
 
