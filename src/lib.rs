@@ -71,23 +71,11 @@
 //! - `unsafe` code is in `accel::wide_bvh::simd` alone, with a portable twin that gives the same bits.
 //! - `tui` does not know `world`; `world` does not know pixels or time.
 
-pub mod accel;
-pub mod assets;
-pub mod bench;
-pub mod choice;
-pub mod cli;
-pub mod compare;
-pub mod control;
-pub mod film;
-pub mod geometry;
-pub mod integrators;
-pub mod lights;
-pub mod materials;
-pub mod math;
-pub mod output;
-pub mod pipeline;
-pub mod sampling;
-pub mod scene;
-pub mod system;
-pub mod tui;
-pub mod world;
+pub use glimt_base::{choice, control, film, math, sampling, system};
+pub use glimt_cli::{bench, cli};
+pub use glimt_files::{assets, compare, output};
+pub use glimt_kernel::{accel, geometry, lights, materials};
+pub use glimt_pipeline::pipeline;
+pub use glimt_scene::scene;
+pub use glimt_trace::{integrators, world};
+pub use glimt_tui::tui;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Room → rooms that it may use, read from the `text` block of the map.
 fn map() -> BTreeMap<String, BTreeSet<String>> {
-    let lib = fs::read_to_string(root().join("lib.rs")).expect("src/lib.rs");
+    let lib = fs::read_to_string(root().join("src/lib.rs")).expect("src/lib.rs");
     lib.lines()
         .filter_map(|line| line.strip_prefix("//! ")?.split_once("->"))
         .map(|(from, to)| (from.trim().to_owned(), to.split_whitespace().map(str::to_owned).collect()))
@@ -14,7 +14,27 @@ fn map() -> BTreeMap<String, BTreeSet<String>> {
 }
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+    Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
+}
+
+/// Folders in which rooms stand: the sources of every crate.
+fn houses() -> Vec<PathBuf> {
+    let crates = fs::read_dir(root().join("crates")).expect("the folder of crates");
+    crates.map(|entry| entry.expect("an entry").path().join("src")).chain([root().join("src")]).collect()
+}
+
+/// Every source file, with its path below its crate's sources: `room/file.rs`.
+fn all_sources() -> Vec<(PathBuf, PathBuf)> {
+    let mut found = Vec::new();
+    for house in houses() {
+        let mut files = Vec::new();
+        sources(&house, &mut files);
+        found.extend(files.into_iter().map(|file| {
+            let inside = file.strip_prefix(&house).expect("a file of this crate").to_owned();
+            (file, inside)
+        }));
+    }
+    found
 }
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -40,11 +60,8 @@ fn used(text: &str) -> BTreeSet<String> {
 #[test]
 fn every_arrow_is_on_the_map_and_every_one_there_is_used() {
     let map = map();
-    let mut files = Vec::new();
-    sources(&root(), &mut files);
     let mut drawn: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for file in files {
-        let inside = file.strip_prefix(root()).expect("a file of src");
+    for (file, inside) in all_sources() {
         let room = inside.components().next().expect("a component").as_os_str();
         let room = room.to_str().expect("UTF-8").to_owned();
         if ["lib.rs", "main.rs", "bin"].contains(&room.as_str()) {
@@ -124,11 +141,8 @@ const ELSEWHERE: [&str; 3] = ["tui", "bin", "pipeline/pace.rs"];
 
 #[test]
 fn no_function_of_the_system_s_library_is_between_a_scene_and_its_picture() {
-    let mut files = Vec::new();
-    sources(&root(), &mut files);
     let mut found = Vec::new();
-    for file in files {
-        let inside = file.strip_prefix(root()).expect("a file of src");
+    for (file, inside) in all_sources() {
         let is_test = inside.to_str().is_some_and(|path| path.contains("tests"));
         if is_test || ELSEWHERE.iter().any(|place| inside.starts_with(place)) {
             continue;

@@ -1,8 +1,8 @@
 //! What the operating system says, in plain words, which files have an end, which threads go first, and what they took.
 
 pub mod file;
-pub(crate) mod priority;
-pub(crate) mod processor;
+pub mod priority;
+pub mod processor;
 
 use std::io::{Error, ErrorKind};
 

@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn every_bundled_scene_keeps_its_words() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         let paths: Vec<_> =
             std::fs::read_dir(folder).expect("scenes").map(|entry| entry.expect("a file").path()).collect();
         assert!(paths.len() > 15);

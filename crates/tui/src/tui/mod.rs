@@ -44,4 +44,4 @@ pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiE
 pub use printed::{Named, printed};
 pub use run::run;
 pub use view::preview::shown;
-pub(crate) use view::text::wrapped;
+pub use view::text::wrapped;

@@ -8,7 +8,6 @@ pub mod frame;
 pub mod lanes;
 pub mod limits;
 pub mod origin;
-#[cfg(test)]
 pub mod random;
 pub mod transform;
 

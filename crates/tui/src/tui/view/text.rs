@@ -124,7 +124,7 @@ pub(in crate::tui) fn shortened(text: &str, room: u16) -> String {
 }
 
 /// Broken between words where that is possible.
-pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
+pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
     for word in text.split_inclusive(' ') {

@@ -4,7 +4,7 @@ use nix::time::{ClockId, clock_gettime};
 
 /// Seconds that this thread has had of a processor: those of others, and those in which it was held, do not count. 0 where the system
 /// does not tell.
-pub(crate) fn seconds_of_thread() -> f64 {
+pub fn seconds_of_thread() -> f64 {
     let Ok(time) = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID) else { return 0.0 };
     time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64
 }

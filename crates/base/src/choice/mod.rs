@@ -31,7 +31,7 @@ pub fn serialize<C: Choice, S: serde::Serializer>(choice: &C, serializer: S) -> 
 /// An enum with its names, and `Choice` for it. The doc comment of a value is also what help says that it means.
 ///
 /// ```
-/// glimt::choice! {
+/// glimt_base::choice! {
 ///     /// Directions.
 ///     pub enum Turn {
 ///         /// Against the clock.
@@ -41,7 +41,7 @@ pub fn serialize<C: Choice, S: serde::Serializer>(choice: &C, serializer: S) -> 
 ///     }
 ///     unavailable "back"
 /// }
-/// use glimt::choice::Choice;
+/// use glimt_base::choice::Choice;
 /// assert_eq!(Turn::named("right"), Some(Turn::Right));
 /// assert_eq!(Turn::Left.meaning(), "Against the clock");
 /// ```

@@ -170,7 +170,7 @@ fn a_mesh_file_is_listed_once_however_it_is_written() {
 
 #[test]
 fn an_orbiter_stands_for_position_and_view() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken/scene.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/broken/scene.toml");
     let text = "[camera]\norbiter='files/view.txt'\naperture=0.5\nfov=30";
     let camera = parse(text.into(), &path).scene.expect("a scene").camera;
     let Camera::Orbiter { file, fov, aperture, focus } = camera else { panic!("no orbiter") };

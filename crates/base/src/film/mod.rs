@@ -108,7 +108,7 @@ impl RadianceImage {
     }
 
     /// Takes over the pixels of a rectangle, in rows. What is not finite is black, as in a [`Film`].
-    pub(crate) fn put(&mut self, rect: Rect, pixels: &[Vec3]) {
+    pub fn put(&mut self, rect: Rect, pixels: &[Vec3]) {
         let width = self.width as usize;
         let rows = self.pixels.chunks_exact_mut(width).skip(rect.y as usize);
         for (row, new) in rows.zip(pixels.chunks_exact(rect.width as usize)) {
