@@ -52,7 +52,7 @@
 //! output      -> film math control system
 //! pipeline    -> integrators world assets scene film output lights materials math choice control system
 //! bench       -> pipeline compare output scene film math choice control
-//! tui         -> pipeline scene film math choice
+//! tui         -> pipeline scene film math choice system
 //! cli         -> bench pipeline tui compare output scene film math choice control system
 //! ```
 //!

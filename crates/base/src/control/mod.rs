@@ -79,6 +79,7 @@ impl CancelToken {
     ///
     /// # Errors
     /// [`Cancelled`] once [`CancelToken::cancel`] was called.
+    #[inline]
     pub fn check(&self) -> Result<(), Cancelled> {
         if self.is_paused() {
             self.wait_while_paused();

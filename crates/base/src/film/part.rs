@@ -24,6 +24,7 @@ impl Pixels {
     }
 
     /// Column and row in the picture of the pixel of a number.
+    #[inline]
     pub fn place(&self, number: u32) -> (u32, u32) {
         let index = self.part.index(number, self.rect);
         (self.rect.x + index % self.rect.width, self.rect.y + index / self.rect.width)

@@ -29,16 +29,19 @@ impl Transform {
     }
 
     /// The same map from coordinates that start at `inside` to those that start at `outside`.
+    #[inline]
     pub fn between(self, inside: DVec3, outside: DVec3) -> Self {
         Self { translation: self.translation + self.linear * inside - outside, ..self }
     }
 
     /// A point to the outside.
+    #[inline]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.linear * p + self.translation
     }
 
     /// A direction to the outside.
+    #[inline]
     pub fn vector(&self, v: DVec3) -> DVec3 {
         self.linear * v
     }
@@ -50,16 +53,19 @@ impl Transform {
     }
 
     /// A normal to the outside, by the inverse transpose; not normalised.
+    #[inline]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.inverse_linear.transpose() * n
     }
 
     /// A point from the outside.
+    #[inline]
     pub fn inverse_point(&self, p: DVec3) -> DVec3 {
         self.inverse_linear * (p - self.translation)
     }
 
     /// A direction from the outside.
+    #[inline]
     pub fn inverse_vector(&self, v: DVec3) -> DVec3 {
         self.inverse_linear * v
     }

@@ -32,6 +32,7 @@ pub struct FilterSample {
 
 impl PixelFilter {
     /// Warp a point of the unit square.
+    #[inline]
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
             Self::Box => FilterSample { offset: u - Vec2::splat(0.5), is_negative: false },

@@ -85,11 +85,13 @@ fn pixel_seed(seed: u32, x: u32, y: u32) -> u32 {
 
 impl PixelSampler {
     /// For sample number `sample` of pixel (x, y) of the whole picture.
+    #[inline]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32) -> Self {
         Self { seed: pixel_seed(seed, x, y), sample }
     }
 
     /// Two numbers in [0, 1) for one decision.
+    #[inline]
     pub fn pair(&self, path: u32, decision: Decision) -> Vec2 {
         let [[x], [y]] = scrambled([self.sample], [mix(self.seed ^ decision.dimension(path)) ^ mix(0)]);
         Vec2::new(x, y)

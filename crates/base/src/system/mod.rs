@@ -1,5 +1,7 @@
 //! What the operating system says, in plain words, which files have an end, which threads go first, and what they took.
 
+#[allow(unsafe_code)]
+pub mod abort;
 pub mod file;
 pub mod priority;
 pub mod processor;

@@ -30,6 +30,8 @@ use crate::scene::sanitize::visible;
 /// Do what the command line says; gives the exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     crate::output::write::prepare_process();
+    // Without the handler an abort ends the process as it always did.
+    let _ = crate::system::abort::catch();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let args = match Args::try_parse_from(&arguments) {
         Ok(args) => args,

@@ -25,6 +25,7 @@ pub struct Stretch {
 impl Stretch {
     /// Of a ray's line in a box; none where it misses that between the ray's ends. By the plain slab test: what only touches a box
     /// may go either way.
+    #[inline]
     pub fn new(bounds: &Aabb, ray: &Ray) -> Option<Self> {
         let (mut enter, mut leave) = ((f32::NEG_INFINITY, 0), (f32::INFINITY, 0));
         for axis in 0..3 {

@@ -25,6 +25,7 @@ impl Bounds {
     }
 
     /// Around references.
+    #[inline]
     pub fn around(references: &[Reference]) -> Self {
         references.iter().fold(Self::EMPTY, |mut all, reference| {
             all.grow(&reference.bounds);
@@ -57,11 +58,13 @@ impl Bounds {
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 
+    #[inline]
     pub fn aabb(&self) -> Aabb {
         Aabb { min: self.min.truncate(), max: self.max().truncate() }
     }
 
     /// The parts below and above a plane.
+    #[inline]
     pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
         let (mut left, mut right) = (*self, *self);
         left.minus_max[axis] = -at;
@@ -103,6 +106,7 @@ impl Reference {
     }
 
     /// Of the whole triangle.
+    #[inline]
     pub fn new(id: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.extend(0.0));
         // `min` and `max` drop a NaN: it is put back.

@@ -25,6 +25,7 @@ impl TriangleMesh {
     pub const MOST_TRIANGLES: u32 = 1 << 27;
 
     /// The three corners of a triangle.
+    #[inline]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
     }

@@ -80,6 +80,7 @@ macro_rules! of_any {
 
 impl Shape {
     /// The nearest hit.
+    #[inline]
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         of_any!(self, it => it.intersect(ray))
     }
@@ -116,11 +117,13 @@ impl Shape {
     }
 
     /// The surface at a hit.
+    #[inline]
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         of_any!(self, it => it.surface(ray, hit))
     }
 
     /// The surface at a hit, as far as it is asked for.
+    #[inline]
     pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         match self {
             Self::Sphere(sphere) if !asked.uv => sphere.bare_surface(ray, hit),
@@ -129,6 +132,7 @@ impl Shape {
     }
 
     /// The box around it; none where it has no end.
+    #[inline]
     pub fn bounds(&self) -> Option<Aabb> {
         match self {
             Self::Sphere(sphere) => Some(sphere.bounds()),
@@ -179,6 +183,7 @@ impl Shape {
     }
 
     /// Whether a point is inside, or of a plane behind it; none where the shape encloses nothing.
+    #[inline]
     pub fn encloses(&self, point: DVec3) -> Option<bool> {
         let is_closed = match self {
             Self::Sphere(_) | Self::Box(_) | Self::Torus(_) => true,
@@ -196,6 +201,7 @@ impl Shape {
     }
 
     /// Mean curvature at a point of a part, > 0 where it bulges to the front.
+    #[inline]
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         match self {
             Self::Quad(_) | Self::Plane(_) | Self::Box(_) | Self::Triangle(_) | Self::Disk(_) => 0.0,

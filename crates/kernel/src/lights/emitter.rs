@@ -136,6 +136,7 @@ impl AreaLight {
     }
 
     /// The same without its pattern.
+    #[inline]
     pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: Arrival| {
             let Arrival { direction, target, factor } = sample;

@@ -122,6 +122,7 @@ impl Met {
 impl Light {
     /// Density in sr⁻¹ with which its samples for the point `from` of a surface with this normal come from what a ray from there
     /// met; 0 where none does, and of lights that no ray meets.
+    #[inline]
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
         match self {
             Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => 0.0,
@@ -142,6 +143,7 @@ impl Light {
     }
 
     /// The same, as if it sent the same radiance from everywhere.
+    #[inline]
     pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => {

@@ -50,6 +50,7 @@ impl Pattern {
     }
 
     /// At a point of the lamp; `primitive` is the triangle of a mesh that it is on.
+    #[inline]
     pub fn at(&self, point: Vec3, primitive: u32) -> Vec3 {
         self.texture.lookup(&TexturePoint::sharp(self.chart.uv(point.as_dvec3(), primitive)))
     }

@@ -49,6 +49,7 @@ pub struct Samples<'a>(Option<(Picks, Cut<'a>)>);
 
 impl Samples<'_> {
     /// How often it is expected to sample the light of this number.
+    #[inline]
     pub fn of(&self, number: u32) -> f32 {
         self.0.as_ref().map_or(1.0, |(picks, cut)| picks.count as f32 * cut.probability(number))
     }
@@ -91,6 +92,7 @@ impl Lights {
 
     /// How often a vertex that picks in this way samples lights, at a point of a surface with this normal, if nothing else is known
     /// of that.
+    #[inline]
     pub fn samples_at(&self, picks: Picks, point: Vec3, normal: Vec3) -> Samples<'_> {
         // What is not picked from is not moved: a cut is large.
         let Some(tree) = &self.tree else { return Samples(None) };
@@ -161,6 +163,7 @@ impl Lights {
     }
 
     /// All with their numbers.
+    #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {
         (0..).zip(&self.all)
     }
@@ -203,6 +206,7 @@ impl Lights {
     }
 
     /// The light that a primitive of an object is, with its number.
+    #[inline]
     pub fn of_hit(&self, object: u32, primitive: u32) -> Option<(u32, &Light)> {
         let number = match self.by_object.get(&object)? {
             OfObject::Whole(number) => *number,

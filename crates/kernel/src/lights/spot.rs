@@ -58,6 +58,7 @@ impl SpotLight {
 
     /// The power over the intensity on the axis, in sr: that of the inner cone of the half angle (1 − blend)·H, and the integral
     /// of (H − θ)/(blend·H) over the directions around it.
+    #[inline]
     pub fn solid_angle(&self) -> f64 {
         let Cones { inner, faded, .. } = self.cones();
         inner + faded

@@ -30,6 +30,7 @@ impl Emission {
     }
 
     /// The radiance at texture coordinates; adds to `lookups`.
+    #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         let Some(texture) = self.texture.as_ref().filter(|_| self.shines()) else { return self.scale };
         *lookups += 1;

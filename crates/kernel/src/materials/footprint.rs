@@ -32,6 +32,7 @@ impl Footprint {
     /// Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021, section 5): as wide
     /// across the direction, and by one over the cosine wider along it. `tangents` are the changes of the point with u and v; a
     /// point where they span nothing.
+    #[inline]
     pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
         let cosine = normal.dot(direction);
         let along =

@@ -5,6 +5,7 @@ use crate::math::Vec3;
 /// Unpolarised reflectance, and the cosine of the transmitted direction unless all is reflected. `cos_incident` ≥ 0 on
 /// the side of the ray, `eta` = n(far side)/n(ray's side). Exact equations of both polarisations (Born and
 /// Wolf, *Principles of Optics*, section 1.5.2).
+#[inline]
 pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     let (cos_i, eta) = (f64::from(cos_incident.clamp(0.0, 1.0)), f64::from(eta));
     // 1 − sin²θₜ without the cancellation that grazing rays make of it.

@@ -25,6 +25,7 @@ impl Glass {
     }
 
     /// What is left of light after `distance` inside (Beer's law).
+    #[inline]
     pub fn transmittance(&self, distance: f32) -> Vec3 {
         if self.density == Vec3::ZERO {
             Vec3::ONE

@@ -79,6 +79,7 @@ impl Bsdf {
     }
 
     /// Its main colour, and how many texture look-ups that took.
+    #[inline]
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Phong(phong) => phong.diffuse.at(at, lookups),

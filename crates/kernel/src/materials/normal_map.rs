@@ -19,6 +19,7 @@ pub struct NormalMap {
 impl NormalMap {
     /// The bent shading normal, on the same side as `normal`; the tangents need not be unit or perpendicular, and where
     /// there are none (0) any frame of the normal serves.
+    #[inline]
     pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
         let slope = mapped.truncate() * self.strength;

@@ -36,6 +36,7 @@ pub struct PhongBsdf {
 
 impl Phong {
     /// Look its textures up.
+    #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PhongBsdf {
         let diffuse = self.diffuse.at(at, lookups);
         PhongBsdf {
@@ -49,6 +50,7 @@ impl Phong {
 
 impl Phong {
     /// What it is everywhere, if it has no textures.
+    #[inline]
     pub fn constant(&self) -> Option<PhongBsdf> {
         let diffuse = self.diffuse.constant()?;
         Some(PhongBsdf {

@@ -6,7 +6,8 @@
 use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, Once, PoisonError};
+use std::os::fd::AsFd;
+use std::sync::{Mutex, Once, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
@@ -18,12 +19,14 @@ use crossterm::terminal::{
     enable_raw_mode,
 };
 use crossterm::{execute, terminal};
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, SetArg, Termios, tcflush, tcgetattr, tcsetattr};
 
 use super::event::Window;
 use super::graphics;
 use super::options::TuiError;
 use super::writer;
+use crate::system::abort;
 
 /// Whether the screen is taken.
 static TAKEN: AtomicBool = AtomicBool::new(false);
@@ -56,6 +59,7 @@ impl Screen {
     /// Takes the terminal: raw mode, alternate screen, no cursor.
     pub(super) fn open() -> Result<Self, TuiError> {
         chain_panic_hook();
+        prepare_abort();
         take().map_err(|source| TuiError::Terminal { action: "set up", source })?;
         Ok(Self(()))
     }
@@ -170,6 +174,51 @@ pub(super) fn rescue() {
     }
 }
 
+/// What an abort needs to give the terminal back without an allocation.
+static LAST_WORDS: OnceLock<LastWords> = OnceLock::new();
+
+struct LastWords {
+    /// The modes of the terminal before it was first taken.
+    modes: Option<nix::libc::termios>,
+    /// The bytes that delete images.
+    delete_images: Vec<u8>,
+    /// The bytes that give the screen back.
+    leave: Vec<u8>,
+}
+
+/// Has an abort, as of a failed allocation, give the terminal back.
+fn prepare_abort() {
+    LAST_WORDS.get_or_init(|| {
+        let (mut delete_images, mut leave) = (Vec::new(), Vec::new());
+        // Writing to memory does not fail.
+        let _ = leave_images(&mut delete_images).and_then(|()| leave_text(&mut leave));
+        LastWords { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
+    });
+    abort::give_back_by(give_back_at_once);
+}
+
+/// Gives the terminal back by async-signal-safe calls alone: no lock, no allocation. A terminal that takes nothing is
+/// waited for no longer than [`STUCK`].
+fn give_back_at_once() {
+    let Some(words) = LAST_WORDS.get() else { return };
+    if TAKEN.swap(false, Ordering::AcqRel) {
+        let out = io::stdout();
+        let _ = tcflush(&out, FlushArg::TCOFLUSH);
+        let mut room = [PollFd::new(out.as_fd(), PollFlags::POLLOUT)];
+        if poll(&mut room, PollTimeout::try_from(STUCK).unwrap_or(PollTimeout::ZERO)).is_ok_and(|ready| ready > 0) {
+            if HAS_IMAGES.load(Ordering::Acquire) {
+                let _ = nix::unistd::write(&out, &words.delete_images);
+            }
+            let _ = nix::unistd::write(&out, &words.leave);
+        }
+    }
+    if let Some(modes) = words.modes
+        && RAW.swap(false, Ordering::AcqRel)
+    {
+        let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes.into());
+    }
+}
+
 /// From now on the terminal may keep kitty's images, or have been cut in the middle of a string.
 pub(super) fn will_have_images() {
     HAS_IMAGES.store(true, Ordering::Release);
@@ -184,10 +233,20 @@ fn enter(out: &mut impl Write) -> io::Result<()> {
 /// The bytes that give it back, from any state that a frame can be cut in.
 fn leave(out: &mut impl Write) -> io::Result<()> {
     if HAS_IMAGES.load(Ordering::Acquire) {
-        // A string that was cut would take what follows for its own.
-        out.write_all(b"\x1b\\")?;
-        out.write_all(&graphics::delete_all())?;
+        leave_images(out)?;
     }
+    leave_text(out)
+}
+
+/// The bytes that delete the images that the terminal keeps.
+fn leave_images(out: &mut impl Write) -> io::Result<()> {
+    // A string that was cut would take what follows for its own.
+    out.write_all(b"\x1b\\")?;
+    out.write_all(&graphics::delete_all())
+}
+
+/// The bytes that end what a frame may have begun, and show the shell's screen.
+fn leave_text(out: &mut impl Write) -> io::Result<()> {
     execute!(
         out,
         EndSynchronizedUpdate,

@@ -66,6 +66,7 @@ impl Crown {
     }
 
     /// A bit for each subtree whose box has a point in common with another one.
+    #[inline]
     pub(super) fn meeting(&self, other: &Aabb) -> u32 {
         let mut met = [TRUE; PACKET];
         for axis in 0..3 {

@@ -135,6 +135,7 @@ impl<'a> Cut<'a> {
     }
 
     /// The probability with which [`Cut::pick`] picks a light.
+    #[inline]
     pub fn probability(&self, light: u32) -> f32 {
         let place = self.tree.places[light as usize];
         if place == NOWHERE || !(self.total() > 0.0) {

@@ -34,6 +34,13 @@ const MOST_ROOM: u64 = node::MOST as u64 / 2;
 /// One leaf with all triangles is always possible.
 const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
+/// Leaves and references for each triangle at most: several times what meshes need, a small part of what triangles that
+/// share a vertex would take.
+const MOST_PER_TRIANGLE: u64 = 24;
+
+/// A tree of fewer triangles than this has the room of so many.
+const FEW: u64 = 64;
+
 /// No triangle yet.
 const NOWHERE: u32 = u32::MAX;
 
@@ -60,7 +67,8 @@ pub fn build(
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
 ) -> Result<Built, Cancelled> {
-    build_within(MOST_ROOM, count, corners, token)
+    let room = MOST_ROOM.min(MOST_PER_TRIANGLE * (u64::from(count) + FEW));
+    build_within(room, count, corners, token)
 }
 
 /// [`build`] with so much room for leaves and references together.
@@ -166,6 +174,27 @@ fn part(
 mod tests {
     use super::*;
     use crate::accel::kd_tree::node::Kind;
+
+    /// A disk of triangles around one vertex.
+    fn fan(count: u32) -> impl Fn(u32) -> [Vec3; 3] + Sync {
+        move |id| {
+            let at = |id: u32| {
+                let angle = std::f32::consts::TAU * id as f32 / count as f32;
+                Vec3::new(angle.cos(), 0.1 * (7.0 * angle).sin(), angle.sin())
+            };
+            [Vec3::ZERO, at(id), at(id + 1)]
+        }
+    }
+
+    #[test]
+    fn triangles_that_share_a_vertex_get_no_more_room_than_others() {
+        for count in [500, 20_000] {
+            let built = build(count, fan(count), &CancelToken::new()).expect("nobody cancels");
+            let size = (built.nodes.len() / 2 + built.references.len()) as u64;
+            assert!(size <= MOST_PER_TRIANGLE * (u64::from(count) + FEW), "{size} for {count}");
+            assert!(size > 4 * u64::from(count), "{size} for {count}: what room there is is used");
+        }
+    }
 
     #[test]
     fn a_tree_without_room_makes_leaves_early() {
