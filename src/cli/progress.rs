@@ -5,6 +5,7 @@ mod json;
 mod plain;
 
 pub(super) use self::bars::style;
+pub(super) use self::json::line as json_line;
 use super::args::Progress;
 use super::console::Console;
 use crate::pipeline::protocol::Event;

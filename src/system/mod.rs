@@ -1,8 +1,9 @@
-//! What the operating system says, in plain words, which files have an end, which threads go first, and what they took.
+//! What the operating system says, in plain words, what a terminal shows as it is, which files have an end, which threads go first, and what they took.
 
 pub mod file;
 pub(crate) mod priority;
 pub(crate) mod processor;
+pub mod text;
 
 use std::io::{Error, ErrorKind};
 
