@@ -151,6 +151,7 @@ impl Writes {
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. }
             | Event::Files { .. } => {}

@@ -38,7 +38,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         force: false,
         first: None,
     })));
-    let mut reporter = progress::reporter(order.progress, console);
+    let mut reporter = progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut deadline = Deadline::default();
     let mut written = Vec::new();
     let exit = follow(&worker, order, console, &mut *reporter, &mut written, || {
@@ -113,6 +113,7 @@ fn follow(
             | Event::WriteFailed { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. }
             | Event::Failed { .. }
@@ -146,6 +147,7 @@ fn follow(
             | Event::Preview { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. } => {}
         }

@@ -86,6 +86,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::Preview { .. }
         | Event::Refused { .. }
         | Event::WritePostponed { .. }
+        | Event::Edited { .. }
         | Event::CameraKept { .. }
         | Event::Picked { .. } => return None,
     })

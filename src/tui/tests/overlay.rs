@@ -214,6 +214,35 @@ fn errors_lie_beside_the_picture_where_there_is_room() {
 }
 
 #[test]
+fn keys_do_not_open_errors_again_that_were_closed() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let fault = || vec![diagnostic(Severity::Error, "unknown key `heigth`")];
+    desk.fail(fault());
+    desk.key(ESCAPE);
+    desk.press('v');
+    desk.fail(fault());
+    assert!(!desk.state.pane.open, "{}", desk.text());
+    desk.fail(vec![diagnostic(Severity::Error, "another one")]);
+    assert!(desk.state.pane.open, "what is new is shown");
+}
+
+#[test]
+fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    let first = desk.press('h');
+    assert!(request(&first).is_some());
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    assert!(request(&desk.press('h')).is_none(), "the first has no picture yet");
+    let generation = desk.state.generation;
+    let picture = plain_picture(50, 38, RED);
+    let effects = desk.event(Event::Picture { generation, picture, range: None, section: None });
+    assert!(request(&effects).is_some(), "the newest step follows");
+}
+
+#[test]
 fn of_more_errors_than_anybody_reads_the_first_are_shown() {
     let mut desk = Desk::with(state(120, 40));
     desk.fail((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
