@@ -122,7 +122,7 @@ impl AtHand {
             write::atomic_until(&path, text.as_bytes(), &guard, &CancelToken::new())
                 .map_err(|error| error.to_string())?;
         }
-        let is_own = Loaded::camera_of(&text, &self.sets) == Some((*camera).into());
+        let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
         Ok(Kept { path, is_new, is_own })
     }
 }

@@ -11,6 +11,7 @@ type Said = (usize, usize, &'static str);
 
 /// Every file of `tests/broken` with all that it is told, in order.
 const BROKEN: &[(&str, &[Said])] = &[
+    ("away", &[(15, 1, "warning: this light shines away from everything; all shapes are behind it")]),
     (
         "brackets",
         &[
@@ -82,6 +83,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (5, 8, "`fov` must be greater than 0 and less than 180; found 0"),
         ],
     ),
+    ("dark", &[(1, 1, "warning: nothing lights this scene")]),
     ("deep_key", &[(16, 1, "arrays or tables are nested too deeply")]),
     (
         "duplicates",
