@@ -179,6 +179,8 @@ pub(super) struct State {
     pub generation: u64,
     /// What the keys had changed for the newest request.
     pub requested_toggles: Toggles,
+    /// Whether the newest request is the picture of before, brighter or darker.
+    pub is_exposed: bool,
     /// The preview size of the newest request.
     pub requested: Option<PreviewSize>,
     pub activity: Activity,
@@ -226,7 +228,7 @@ pub(super) struct State {
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
     pub unchanged: bool,
-    /// Requests that were rendered and finished.
+    /// Requests that were rendered and finished; another exposure is no render.
     pub renders: u64,
     /// Changes of the files that the scene is made of.
     pub edits: u64,
@@ -290,6 +292,7 @@ impl State {
             is_light: setup.is_light,
             generation: 0,
             requested_toggles: Toggles::default(),
+            is_exposed: false,
             requested: None,
             activity: Activity::Running { since: now },
             paused: false,

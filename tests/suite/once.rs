@@ -303,6 +303,19 @@ fn check_says_what_there_is() {
 }
 
 #[test]
+fn check_warns_of_meshes_in_the_dark() {
+    let desk = Desk::new();
+    desk.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+    desk.write("a.mtl", "newmtl a\nKd 1 1 1\n");
+    let scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[mesh]]\nfile = \"a.obj\"\n";
+    desk.write("dark.toml", scene);
+    let said = |name: &str| String::from_utf8_lossy(&desk.run(&format!("check {name}")).stderr).into_owned();
+    assert!(said("dark.toml").contains("nothing lights this scene"), "{}", said("dark.toml"));
+    desk.write("lit.toml", format!("{scene}[[light]]\n"));
+    assert!(!said("lit.toml").contains("nothing lights"), "{}", said("lit.toml"));
+}
+
+#[test]
 fn a_scene_of_very_many_shapes_is_checked() {
     use std::fmt::Write;
     const COUNT: u32 = 200_000;

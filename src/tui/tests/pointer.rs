@@ -381,6 +381,7 @@ fn an_exposure_is_no_picture_of_its_own_in_the_history() {
         desk.press(']');
         desk.finish(color);
     }
+    assert_eq!(desk.state.renders, 2, "nor is it a run");
     desk.press('n');
     assert!(desk.text().contains("picture 1 of 2"), "{}", desk.text());
     desk.press('N');

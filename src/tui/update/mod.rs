@@ -115,7 +115,8 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.picture = state.history.close().or_else(|| state.picture.take());
     let before = std::mem::replace(&mut state.requested_toggles, state.toggles);
     let now = Toggles { exposure: before.exposure, ..state.toggles };
-    if before == now && before != state.toggles {
+    state.is_exposed = before == now && before != state.toggles;
+    if state.is_exposed {
         // The same light, shown brighter or darker.
         state.history.go_on(state.generation);
     }

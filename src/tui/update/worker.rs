@@ -198,7 +198,7 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     describe(state, state.generation, &report);
     state.report = Some(report);
     state.unchanged = unchanged;
-    state.renders += u64::from(!unchanged);
+    state.renders += u64::from(!unchanged && !state.is_exposed);
     warn(state, warnings);
     history::record(state);
     if !unchanged {
