@@ -124,10 +124,7 @@ impl Edits<'_> {
     /// How the line ends that this key is in; how the one before does if it is the last and has no end.
     fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
         let (before, after) = self.text.split_at(key.value.span().end);
-        let (line, _) = after
-            .split_once('\n')
-            .or_else(|| before.rsplit_once('\n').map(|(line, key)| (line, key)))
-            .unwrap_or_default();
+        let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();
         if line.ends_with('\r') { "\r\n" } else { "\n" }
     }
 

@@ -40,7 +40,8 @@ impl Engine {
         sink: &Sink,
         meanwhile: &Meanwhile<'_>,
     ) -> Result<(), Stop> {
-        let Some(good) = self.good.clone() else { return Ok(()) };
+        let is_it = |good: &&Good| good.parsed.loaded.path == newest.scene;
+        let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(()) };
         let request = Request { force: false, ..newest.clone() };
         // Put the scene and the request together.
         let (loaded, path) = (&good.parsed.loaded, &request.scene);
