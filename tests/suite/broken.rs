@@ -265,8 +265,8 @@ const BROKEN: &[(&str, &[Said])] = &[
     (
         "other_names",
         &[
-            (3, 17, "commas are missing: write [0, 0, 0]"),
-            (4, 21, "a comma is missing: write [0.1, 0.1, 0.1]"),
+            (3, 15, "commas are missing: write [0, 0, 0]"),
+            (4, 17, "a comma is missing: write [0.1, 0.1, 0.1]"),
             (6, 2, "unknown table `camra`; did you mean `camera`?"),
             (11, 1, "unknown key `color` in [materials.wall]; did you mean `diffuse`?"),
             (12, 1, "unknown key `roughness` in [materials.wall]; did you mean `shininess`?"),
@@ -501,7 +501,7 @@ fn nesting_of_any_depth_is_an_error_and_no_overflow() {
 fn numbers_up_to_255_get_the_text_that_is_meant() {
     let scene = |kind: &str, key: &str| {
         format!(
-            "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n[[sphere]]\nmaterial = \"a\"\n\
+            "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"a\"\n\
              [materials.a]\ntype = \"{kind}\"\n{key} = [160, 15, 12]\n"
         )
     };

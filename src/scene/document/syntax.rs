@@ -13,7 +13,7 @@ use super::context::{Context, Issue};
 pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec<Range<usize>> {
     let mut lines = BTreeSet::new();
     errors.sort_by_key(|error| error.span.start);
-    let mut in_open_array = false;
+    let (mut in_open_array, mut opened) = (false, BTreeSet::new());
     for error in errors {
         let lacks_comma = error.what == MISSING_COMMA;
         let is_new = lines.insert(context.line(error.span.start)) && !(lacks_comma && in_open_array);
@@ -24,15 +24,20 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
         match unclosed(context, &error) {
             // All that follows up to here was taken for a part of the list.
             Some(open) => {
-                let first = context.line(open);
-                if lines.insert(first) || lacks_comma {
-                    let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
-                    context.report(issue.help("expected `]`").syntax());
-                }
-                lines.extend(first..context.line(error.span.start));
+                lines.extend(context.line(open)..context.line(error.span.start));
+                opened.insert(open);
             }
             None => context.report(issue(context, error).syntax()),
         }
+    }
+    // The parser takes the end of the file for the end of a list.
+    if let Some(open) = open_at_end(context.file()) {
+        lines.insert(context.line(open));
+        opened.insert(open);
+    }
+    for open in opened {
+        let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
+        context.report(issue.help("expected `]`").syntax());
     }
     lines.into_iter().map(|line| line..end_of_damage(context, line)).collect()
 }
@@ -52,6 +57,14 @@ fn unclosed(context: &Context<'_>, SyntaxError { span, what, .. }: &SyntaxError)
     let is_header = line.starts_with('[') && line.ends_with(']') && !line.contains([',', ' ']);
     let is_later = context.line(open) < context.line(span.start);
     (what == MISSING_COMMA && is_later && (is_key || is_header)).then_some(open)
+}
+
+/// The place of a list that the file ends in, if its last bracket is open and stands in no comment and no text.
+fn open_at_end(text: &str) -> Option<usize> {
+    let open = text.rfind('[').filter(|open| !text[*open..].contains(']'))?;
+    let line = text[..open].rsplit('\n').next().unwrap_or_default();
+    let is_value = line.contains('=') && !line.contains(['#', '"', '\'']);
+    is_value.then_some(open)
 }
 
 /// The last bracket that is open at the end of a text.
@@ -128,7 +141,10 @@ fn issue(context: &Context<'_>, SyntaxError { span, what, expected }: SyntaxErro
         what if what.contains("recurs") => {
             error("arrays or tables are nested too deeply").help("a scene needs three levels")
         }
-        what if what.contains("must be quoted") => not_a_value(span, &written),
+        what if what.contains("must be quoted") => match with_commas(context, span.start) {
+            Some(words) => error(&words),
+            None => not_a_value(span, &written),
+        },
         what => {
             let issue = Issue::error(span, format!("this is not TOML: {what}"));
             match expected.as_str() {
