@@ -197,7 +197,7 @@ fn all_scenes_are_looked_at_before_the_first_is_measured() {
             .replace("lamp = { emission = [8, 8, 8] }", "[materials.lamp]\nemission = 8"),
     );
     std::os::unix::fs::symlink("skin.ppm", desk.path("a.svg")).expect("a link");
-    let (stdout, stderr) = bench(&desk, &format!("box.toml skin.toml {SMALL} --plot a.svg"), 2);
+    let (stdout, stderr) = bench(&desk, &format!("box.toml skin.toml {SMALL} --plot a.svg --force"), 2);
     assert_eq!(stdout, "");
     assert!(
         stderr.starts_with("error: cannot write a.svg: it is a file that skin.toml is made of"),
@@ -255,7 +255,7 @@ fn no_output_is_an_input_or_another_output() {
         ),
         ("box.toml --plot a.png", "cannot write a.png: the plot is an SVG; use a name that ends in .svg"),
         (
-            "skin.toml --csv skin.csv",
+            "skin.toml --force --csv skin.csv",
             "cannot write skin.csv: it is a file that skin.toml is made of; name another file",
         ),
     ] {
@@ -267,12 +267,9 @@ fn no_output_is_an_input_or_another_output() {
     for (line, words) in [
         (
             "--csv ball.toml",
-            "it is there already and no table, such as a.csv; name another file with --csv FILE",
+            "there is a file of this name that glimt did not write; name another file with --csv FILE",
         ),
-        (
-            "--json ball.toml box.toml",
-            "it is there already and holds no results, such as a.json; name another",
-        ),
+        ("--json ball.toml box.toml", "there is a file of this name that glimt did not write; name another"),
     ] {
         let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
         assert!(stderr.starts_with("error: cannot write ball.toml: ") && stderr.contains(words), "{stderr}");

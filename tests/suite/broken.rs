@@ -11,6 +11,7 @@ type Said = (usize, usize, &'static str);
 
 /// Every file of `tests/broken` with all that it is told, in order.
 const BROKEN: &[(&str, &[Said])] = &[
+    ("away", &[(15, 1, "warning: this light shines away from everything; all shapes are behind it")]),
     (
         "brackets",
         &[
@@ -82,6 +83,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (5, 8, "`fov` must be greater than 0 and less than 180; found 0"),
         ],
     ),
+    ("dark", &[(1, 1, "warning: nothing lights this scene")]),
     ("deep_key", &[(16, 1, "arrays or tables are nested too deeply")]),
     (
         "duplicates",
@@ -257,7 +259,25 @@ const BROKEN: &[(&str, &[Said])] = &[
             (5, 16, "this text is not closed"),
             (6, 12, "there is more on this line than one value"),
             (9, 10, "a key without a value"),
-            (11, 1, "a comma is missing"),
+            (10, 11, "`[` opened here is not closed"),
+        ],
+    ),
+    (
+        "other_names",
+        &[
+            (3, 15, "commas are missing: write [0, 0, 0]"),
+            (4, 17, "a comma is missing: write [0.1, 0.1, 0.1]"),
+            (6, 2, "unknown table `camra`; did you mean `camera`?"),
+            (11, 1, "unknown key `color` in [materials.wall]; did you mean `diffuse`?"),
+            (12, 1, "unknown key `roughness` in [materials.wall]; did you mean `shininess`?"),
+            (
+                19,
+                15,
+                r##"`reflectance` must be a colour: [r, g, b], a number, "#rrggbb" or a name; this looks like 0–255"##,
+            ),
+            (21, 3, "unknown table `cube`; did you mean `box`?"),
+            (32, 1, "unknown key `strength` in [[light]]; did you mean `intensity`?"),
+            (35, 8, r#"`type` cannot be "sun"; did you mean "directional"?"#),
         ],
     ),
     ("output_ending", &[(3, 10, "`output`: unknown file ending .tiff")]),
@@ -474,5 +494,53 @@ fn nesting_of_any_depth_is_an_error_and_no_overflow() {
         assert_eq!(said(&of_bytes(text.as_bytes())).0, 1);
         let header = format!("[{}a]\nb = 1\n", "a.".repeat(200_000));
         assert_eq!(said(&of_bytes(header.as_bytes())).0, 1);
+    }
+}
+
+#[test]
+fn numbers_up_to_255_get_the_text_that_is_meant() {
+    let scene = |kind: &str, key: &str| {
+        format!(
+            "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"a\"\n\
+             [materials.a]\ntype = \"{kind}\"\n{key} = [160, 15, 12]\n"
+        )
+    };
+    for (kind, key, severity) in [
+        ("phong", "diffuse", Severity::Warning),
+        ("phong", "specular", Severity::Warning),
+        ("mirror", "reflectance", Severity::Error),
+        ("glass", "tint", Severity::Error),
+    ] {
+        let found = of_bytes(scene(kind, key).as_bytes());
+        assert_eq!(found.severity, severity, "{key}");
+        assert!(
+            found.place.as_ref().is_some_and(|place| place.label == "this looks like 0–255"),
+            "{found:?}"
+        );
+        assert!(found.help.as_ref().is_some_and(|help| help.starts_with("write \"#a00f0c\"")), "{found:?}");
+    }
+    let text = scene("phong", "emission").replace("[160", "[16");
+    assert!(!text.is_empty() && diagnostics_of(&text).is_empty(), "radiance may be any");
+    let text = scene("phong", "diffuse").replace("[160, 15, 12]", "[2, 0, 0]");
+    let said = diagnostics_of(&text);
+    assert!(said.len() == 1 && said[0].message.contains("reflects more light"), "{said:?}");
+    assert!(!said[0].place.as_ref().is_some_and(|place| place.label.contains("255")));
+}
+
+/// Everything that is said of this text.
+fn diagnostics_of(text: &str) -> Vec<Diagnostic> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, text).expect("written");
+    diagnostics(&path)
+}
+
+#[test]
+fn an_open_bracket_is_said_before_all_that_follows_from_it() {
+    for rest in ["fov = 30\nup = [0, 1, 0]\n", "[render]\nwidth = 3\n", "", "[[sphere]]\nradius = 1\n"] {
+        let said = diagnostics_of(&format!("[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0\n{rest}"));
+        assert_eq!(said[0].message, "`[` opened here is not closed", "{rest:?}: {said:?}");
+        let place = said[0].place.as_ref().expect("a place");
+        assert_eq!(line_and_column(&place.source, place.span.start), (3, 11), "{rest:?}");
     }
 }

@@ -12,6 +12,8 @@ mod extremes;
 mod hostile;
 mod house;
 mod inputs;
+mod json;
+mod keeping;
 mod kernel;
 mod mutation;
 mod once;

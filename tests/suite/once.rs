@@ -253,6 +253,32 @@ fn a_file_that_cannot_be_written_is_1() {
 }
 
 #[test]
+fn each_output_that_cannot_be_written_has_a_line() {
+    let desk = Desk::new();
+    for name in ["a.png", "b.ppm"] {
+        std::os::unix::fs::symlink("/dev/full", desk.path(name)).expect("a link");
+    }
+    let stderr = desk.expect("ball.toml --once --progress none -o a.png -o c.png -o b.ppm", 1);
+    let lines: Vec<&str> = stderr.lines().collect();
+    assert_eq!(lines.len(), 2, "{stderr}");
+    assert!(lines[0].starts_with("error: cannot write a.png: no space left"), "{stderr}");
+    assert!(lines[1].starts_with("error: cannot write b.ppm: no space left"), "{stderr}");
+    assert!(desk.path("c.png").is_file());
+}
+
+#[test]
+fn a_command_that_is_said_can_be_pasted() {
+    let desk = Desk::new();
+    let name = "it's my \"scene\" $HOME.toml";
+    let output = desk.glimt("new").arg(name).output().expect("it runs");
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    let command = stderr.lines().find_map(|line| line.strip_prefix("now: glimt ")).expect("a command");
+    let command = command.split("    (").next().expect("its end");
+    let echoed = std::process::Command::new("sh").args(["-c", &format!("printf %s {command}")]).output();
+    assert_eq!(String::from_utf8_lossy(&echoed.expect("it runs").stdout), name, "{command}");
+}
+
+#[test]
 fn help_and_version_are_answers() {
     let desk = Desk::new();
     for (line, word) in
@@ -274,6 +300,19 @@ fn check_says_what_there_is() {
     desk.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = desk.expect("check ball.toml", 2);
     assert!(stderr.contains("bal") && stderr.contains("ball.toml:17:"), "{stderr}");
+}
+
+#[test]
+fn check_warns_of_meshes_in_the_dark() {
+    let desk = Desk::new();
+    desk.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+    desk.write("a.mtl", "newmtl a\nKd 1 1 1\n");
+    let scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[mesh]]\nfile = \"a.obj\"\n";
+    desk.write("dark.toml", scene);
+    let said = |name: &str| String::from_utf8_lossy(&desk.run(&format!("check {name}")).stderr).into_owned();
+    assert!(said("dark.toml").contains("nothing lights this scene"), "{}", said("dark.toml"));
+    desk.write("lit.toml", format!("{scene}[[light]]\n"));
+    assert!(!said("lit.toml").contains("nothing lights"), "{}", said("lit.toml"));
 }
 
 #[test]

@@ -342,6 +342,12 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
         assert!(desk.expect(call, 2).contains("there is no such scene file"), "{call}");
     }
+    // Before the screen opens, too.
+    let stderr = desk.expect("bal.toml", 2);
+    assert!(
+        stderr.contains("there is no such scene file") && stderr.contains("did you mean ball.toml?"),
+        "{stderr}"
+    );
     desk.write("schema", SCENE);
     desk.expect("schema --once -o a.png", 0);
 }

@@ -16,7 +16,7 @@ use glimt::scene::description::{
     Material, MaterialKind, Mesh, Object, Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape,
     Texture, TextureFilter, Tonemap, Wrap,
 };
-use glimt::world::{Geometry, Image, MeshTree, Parts, World, lights, origin, sky, textures_needed};
+use glimt::world::{Geometry, Image, Lookups, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 
 use super::v;
 
@@ -217,7 +217,7 @@ impl Build {
 
     pub fn world(&self) -> World {
         let mut parts = self.parts.clone();
-        for needed in textures_needed(&self.scene, &[]) {
+        for needed in textures_needed(&self.scene, &[], Lookups::ALL) {
             let texels = match needed.declared {
                 Some(number) => &self.texels[number],
                 None => self.sky.as_ref().expect("a map of the environment"),

@@ -1,10 +1,11 @@
-//! What the operating system says, in plain words, which files have an end, which threads go first, and what they took.
+//! What the operating system says, in plain words, what a terminal shows as it is, which files have an end, which threads go first, and what they took.
 
 #[allow(unsafe_code)]
 pub mod abort;
 pub mod file;
 pub mod priority;
 pub mod processor;
+pub mod text;
 
 use std::io::{Error, ErrorKind};
 

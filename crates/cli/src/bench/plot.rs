@@ -6,6 +6,7 @@ mod panel;
 use plotters::prelude::{IntoDrawingArea, SVGBackend, WHITE};
 
 use super::results::Results;
+use crate::output::signed;
 
 /// Size of a panel, in pixels of the SVG.
 const PANEL: (u32, u32) = (640, 480);
@@ -31,7 +32,7 @@ pub fn svg(results: &Results) -> Result<String, String> {
         };
         draw().map_err(|error| error.to_string())?;
     }
-    Ok(text)
+    Ok(signed(&text))
 }
 
 #[cfg(test)]

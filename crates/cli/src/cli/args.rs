@@ -159,6 +159,9 @@ pub struct RenderArgs {
     /// Write settings, timings and counters of the render as JSON; with --once, - is stdout
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub report: Option<PathBuf>,
+    /// Let the report and the default picture replace a file that glimt did not write, too
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
 
     /// Pixels across
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Picture")]
@@ -231,6 +234,7 @@ impl RenderArgs {
             sets: self.sets.clone(),
             outputs: self.outputs.clone(),
             report: self.report.clone(),
+            replaces_foreign: self.force,
             width: self.width,
             height: self.height,
             samples: self.samples,

@@ -14,7 +14,7 @@ use crate::compare::{self, Bias, Errors, Measured, PIXELS_PER_DEGREE, Pair};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::output::write::{self, Guard};
-use crate::output::{self, EncodeOptions, FileIdentity, Format, OutputError};
+use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError};
 use crate::tui::wrapped;
 
 pub(super) fn run(args: &CompareArgs, console: &Console) -> Exit {
@@ -118,7 +118,7 @@ impl<'a> Diff<'a> {
         write::atomic_until(
             self.path,
             &bytes,
-            &Guard { is_kept: &is_kept, may_replace: &may_replace },
+            &Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Allowed },
             &token,
         )
     }
@@ -193,7 +193,7 @@ impl<'a> Summary<'a> {
 
 /// A value that is not finite becomes null.
 fn say_json(summary: &Summary<'_>, console: &Console) {
-    match serde_json::to_string(summary) {
+    match output::json::in_a_line(summary) {
         Ok(text) => console.answer(&text),
         Err(error) => console.say(&format!("error: {error}")),
     }

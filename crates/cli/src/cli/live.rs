@@ -1,5 +1,6 @@
 //! The terminal UI: worker, watcher and front end wired together.
 
+use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -10,15 +11,19 @@ use super::lower::Order;
 use crate::pipeline::protocol::{Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
 use crate::pipeline::watch::{Watcher, missing_folder};
-use crate::scene::NO_SUCH_FILE;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
+use crate::scene::{NO_SUCH_FILE, text_now};
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
 /// How long the end waits for a picture that is being written, after a signal; after a key until a person is told what it waits for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(order: Order, console: &Console) -> Exit {
+    if let Some(mistyped) = mistyped(&order.scene) {
+        console.diagnostics(&[mistyped]);
+        return Exit::WRONG;
+    }
     match live(order, console) {
         Ok(exit) => exit,
         Err((exit, message)) => console.fail(exit, &message),
@@ -95,6 +100,19 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
+/// What is said of a scene that is not there while one with nearly its name is; others are waited for.
+fn mistyped(scene: &Path) -> Option<Diagnostic> {
+    if scene.symlink_metadata().is_ok() {
+        return None;
+    }
+    text_now(scene).err().map(|problem| *problem).filter(has_near_name)
+}
+
+fn has_near_name(problem: &Diagnostic) -> bool {
+    problem.message == NO_SUCH_FILE
+        && problem.help.as_ref().is_some_and(|help| help.starts_with("did you mean"))
+}
+
 /// What became of pictures.
 #[derive(Clone, Debug, Default)]
 struct Writes(Arc<Mutex<Heard>>);
@@ -151,6 +169,7 @@ impl Writes {
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. }
             | Event::Files { .. } => {}

@@ -93,13 +93,14 @@ mod tests {
         let order = lowered(
             "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
-             --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --progress json --color 256 --poll",
+             --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll",
         )
         .expect("right");
         let expected = Overrides {
             sets: vec!["a.b=1".into(), "a.c=x".into()],
             outputs: vec!["a.png".into(), "b.exr".into()],
             report: Some("r.json".into()),
+            replaces_foreign: true,
             width: Some(3),
             height: Some(4),
             samples: Some(5),

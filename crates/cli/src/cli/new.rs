@@ -21,8 +21,10 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
     match create(file, starter().as_bytes()) {
         Ok(()) => {
             console.say(&format!("wrote {name}"));
-            console
-                .say(&format!("now: glimt {name}    (see it, edit it, save it, see it again; ? for help)"));
+            console.say(&format!(
+                "now: glimt {}    (see it, edit it, save it, see it again; ? for help)",
+                quoted(file)
+            ));
             Exit::DONE
         }
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
@@ -53,8 +55,34 @@ fn misnamed(file: &Path) -> Option<String> {
     Some(format!(
         "{} is the name of {what}; scenes end in .toml: glimt new {}",
         file.display(),
-        scene.display()
+        quoted(&scene)
     ))
+}
+
+/// A file as a shell takes it for one word, and glimt for no option and no command.
+fn quoted(file: &Path) -> String {
+    let name = file.to_string_lossy();
+    let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
+    let name = if is_bare { format!("./{name}") } else { name.into_owned() };
+    // A name with a zero in it is no name of a file.
+    shlex::try_quote(&name).map_or(name.clone(), |quoted| quoted.into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_one_word_for_a_shell() {
+        for name in
+            ["ball.toml", "my scene.toml", "it's.toml", "a \"b\" $HOME `c`.toml", "a;b.toml", "tilde~.toml"]
+        {
+            assert_eq!(shlex::split(&quoted(Path::new(name))), Some(vec![name.to_owned()]), "{name}");
+        }
+        assert_eq!(quoted(Path::new("ball.toml")), "ball.toml");
+        assert_eq!(quoted(Path::new("-b.toml")), "./-b.toml");
+        assert_eq!(quoted(Path::new("check")), "./check");
+    }
 }
 
 /// Whether a name is that of a picture, of a format that glimt writes or will.

@@ -38,7 +38,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         force: false,
         first: None,
     })));
-    let mut reporter = progress::reporter(order.progress, console);
+    let mut reporter = progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut deadline = Deadline::default();
     let mut written = Vec::new();
     let exit = follow(&worker, order, console, &mut *reporter, &mut written, || {
@@ -88,7 +88,7 @@ fn follow(
     written: &mut Vec<PathBuf>,
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
-    let mut unwritten: Option<String> = None;
+    let mut unwritten: Vec<String> = Vec::new();
     let mut idle: Vec<Diagnostic> = Vec::new();
     loop {
         if is_over() {
@@ -113,6 +113,7 @@ fn follow(
             | Event::WriteFailed { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. }
             | Event::Failed { .. }
@@ -121,19 +122,22 @@ fn follow(
         reporter.event(&event);
         match event {
             Event::Written { path, .. } => written.push(path),
-            // A picture that cannot be written fails the request: this is the report.
-            Event::WriteFailed { message, .. } => unwritten = Some(message),
+            // The report, or one of several pictures; the last picture that cannot be written fails the request.
+            Event::WriteFailed { message, .. } => unwritten.push(message),
             Event::Done { report, warnings, .. } => {
                 reporter.end();
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(&report, written, unwritten.as_deref(), console, reporter);
+                return done(&report, written, &unwritten, console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
-                let is_said = reporter.says_diagnostics();
-                return if is_said { exit_of(&failure) } else { failed(&failure, console) };
+                if reporter.says_diagnostics() {
+                    return exit_of(&failure);
+                }
+                unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
+                return failed(&failure, console);
             }
             Event::Cancelled { .. } => return Exit::FAILED,
             Event::Started { .. }
@@ -146,6 +150,7 @@ fn follow(
             | Event::Preview { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. } => {}
         }
@@ -175,18 +180,17 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
 fn done(
     report: &Report,
     written: &[PathBuf],
-    unwritten: Option<&str>,
+    unwritten: &[String],
     console: &Console,
     reporter: &dyn Reporter,
 ) -> Exit {
     if reporter.says_results() {
         written.iter().for_each(|path| console.say(&wrote(path, report)));
     }
-    match unwritten {
-        Some(_) if reporter.says_diagnostics() => Exit::FAILED,
-        Some(message) => console.fail(Exit::FAILED, message),
-        None => Exit::DONE,
+    if !reporter.says_diagnostics() {
+        unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
     }
+    if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
 }
 
 fn failed(failure: &Failure, console: &Console) -> Exit {

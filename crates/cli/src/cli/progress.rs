@@ -5,6 +5,7 @@ mod json;
 mod plain;
 
 pub(super) use self::bars::style;
+pub(super) use self::json::line as json_line;
 use super::args::Progress;
 use super::console::Console;
 use crate::pipeline::protocol::Event;
@@ -29,10 +30,10 @@ pub(super) trait Reporter {
     }
 }
 
-/// The reporter that was asked for.
-pub(super) fn reporter(progress: Progress, console: &Console) -> Box<dyn Reporter> {
+/// The reporter that was asked for, of a render that ends after a time if there is one.
+pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console) -> Box<dyn Reporter> {
     match progress {
-        Progress::Auto if console.is_terminal => Box::new(bars::Bars::new()),
+        Progress::Auto if console.is_terminal => Box::new(bars::Bars::new(time)),
         Progress::Auto | Progress::Plain => Box::new(plain::Plain::new(console.clone())),
         Progress::Json => Box::new(json::Json),
         Progress::None => Box::new(Silent),

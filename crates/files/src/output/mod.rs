@@ -3,12 +3,14 @@
 //! [`check_target`] before hours of work, [`encode`] into memory, [`write::atomic`] to disk: a file is whole, or it is
 //! the one that was there before. [`FileIdentity`] tells whether two paths lead to one file.
 
+mod attributes;
 mod error;
 mod exr;
 mod format;
 mod hdr;
 mod identity;
 mod jpeg;
+pub mod json;
 mod origin;
 mod place;
 mod png;
@@ -19,11 +21,12 @@ pub mod write;
 
 use std::path::Path;
 
+pub use attributes::Losses;
 pub use error::OutputError;
 pub use exr::mean_luminance_error;
 pub use format::{BitDepth, Format};
 pub use identity::FileIdentity;
-pub use origin::{Replaced, holds_foreign_report, holds_foreign_table, replaced_picture, replaced_report};
+pub use origin::{Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, signed};
 
 use crate::control::CancelToken;
 use crate::film::RadianceImage;

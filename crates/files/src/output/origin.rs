@@ -1,16 +1,20 @@
-//! Whose file it is that a write would replace.
+//! Whether glimt wrote the file that a write would replace: the content says so, whatever the name ends in.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use super::PROGRAM;
-use super::place::{self, Place, Target};
+use memchr::memmem;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
-/// Of the chunks before a picture's pixels; those of glimt take some hundred.
+use super::place::{self, Place, Target};
+use super::{PROGRAM, SOFTWARE};
+
+/// Bytes of the chunks before a picture's pixels; those of glimt take some hundred.
 const HEADER_BYTES: usize = 1 << 20;
-/// Of the start of a report.
-const START_BYTES: u64 = 64;
+/// Bytes of the largest plot that is looked into.
+const PLOT_BYTES: u64 = 64 << 20;
 
 /// What a write would replace.
 #[derive(Debug)]
@@ -37,36 +41,55 @@ impl Replaced {
             Some(Err(error)) => Self::Unreadable(error),
         }
     }
+
+    /// As [`Self::of`], for texts: an empty file may be replaced too.
+    fn of_text(path: &Path, is_own: impl Fn(File) -> bool) -> Self {
+        let is_empty = |file: &File| file.metadata().is_ok_and(|found| found.len() == 0);
+        Self::of(replaced(path), |file| is_empty(&file) || is_own(file))
+    }
+
+    /// Why the file is not replaced; `None` if it may be.
+    pub fn why_kept(&self) -> Option<String> {
+        match self {
+            Self::Own => None,
+            Self::Foreign => Some("there is a file of this name that glimt did not write".to_owned()),
+            Self::Unreadable(error) => {
+                Some(format!("the file of this name cannot be read: {}", crate::system::in_words(error)))
+            }
+        }
+    }
 }
 
-/// A PNG picture is glimt's own where its text chunk says so.
+/// Whether a picture may be replaced: a PNG whose text chunk names glimt.
 pub fn replaced_picture(path: &Path) -> Replaced {
     Replaced::of(replaced(path), is_own_picture)
 }
 
-/// A report may replace an earlier report, an empty file, any file that ends in `.json`.
-pub fn replaced_report(path: &Path) -> Replaced {
-    if has_ending(path, "json") { Replaced::Own } else { Replaced::of(replaced(path), is_own_report) }
+/// Whether a file of JSON may be replaced: a report, the results of `bench`, an empty file.
+pub fn replaced_json(path: &Path) -> Replaced {
+    Replaced::of_text(path, is_own_json)
 }
 
-/// Whether a file is there that a report must not replace. So is one that cannot be read.
-pub fn holds_foreign_report(path: &Path) -> bool {
-    !matches!(replaced_report(path), Replaced::Own)
-}
-
-/// Whether a file is there that would be replaced and is no table: neither empty, nor with this first line, nor one that
-/// ends in `.csv`.
-pub fn holds_foreign_table(path: &Path, first_line: &str) -> bool {
-    let is_own = |file: File| {
+/// Whether a table may be replaced: one with this first line, or an empty file.
+pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
+    Replaced::of_text(path, |file| {
         let mut start = Vec::new();
         let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
-        is_read && (start.is_empty() || start == first_line.as_bytes())
-    };
-    !has_ending(path, "csv") && !matches!(Replaced::of(replaced(path), is_own), Replaced::Own)
+        is_read && start == first_line.as_bytes()
+    })
 }
 
-fn has_ending(path: &Path, wanted: &str) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
+/// Whether a plot may be replaced: one that is [`signed`], one of an older version, or an empty file.
+pub fn replaced_plot(path: &Path) -> Replaced {
+    Replaced::of_text(path, is_own_plot)
+}
+
+/// A plot that says which program drew it.
+pub fn signed(svg: &str) -> String {
+    match svg.split_once('>') {
+        Some((start, rest)) => format!("{start}>\n<desc>{SOFTWARE}</desc>{rest}"),
+        None => svg.to_owned(),
+    }
 }
 
 /// The regular file that a write would replace, open if it can be read.
@@ -92,13 +115,32 @@ fn is_program(software: &str) -> bool {
     software.split_once(' ').is_some_and(|(name, _)| name == PROGRAM)
 }
 
-fn is_own_report(file: File) -> bool {
-    let mut start = Vec::new();
-    if file.take(START_BYTES).read_to_end(&mut start).is_err() {
+/// What reports and results have in common, in every version.
+#[derive(Deserialize)]
+struct OwnJson {
+    #[serde(rename = "glimt")]
+    _version: String,
+    #[serde(rename = "seconds")]
+    _seconds: f64,
+    #[serde(rename = "scene", alias = "scenes")]
+    _scenes: IgnoredAny,
+}
+
+fn is_own_json(file: File) -> bool {
+    let mut reader = BufReader::new(file);
+    // Large files of somebody else are not read to their end for nothing.
+    let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
+    is_object && serde_json::from_reader::<_, OwnJson>(reader).is_ok()
+}
+
+fn is_own_plot(file: File) -> bool {
+    let mut text = Vec::new();
+    if file.take(PLOT_BYTES).read_to_end(&mut text).is_err() || !text.starts_with(b"<svg ") {
         return false;
     }
-    let key = start.trim_ascii_start().strip_prefix(b"{").map(<[u8]>::trim_ascii_start);
-    start.is_empty() || key.is_some_and(|key| key.starts_with(b"\"glimt\""))
+    let has = |part: &str| memmem::find(&text, part.as_bytes()).is_some();
+    // Older versions left the names of the axes alone.
+    has(&format!("<desc>{PROGRAM} ")) || (has("\nseconds of rendering\n") && has("\nrelMSE\n"))
 }
 
 #[cfg(test)]
@@ -117,5 +159,17 @@ mod tests {
         assert!(
             matches!(replaced, Replaced::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
         );
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_read_is_said_with_the_system_s_reason() {
+        let why = |number| {
+            Replaced::Unreadable(io::Error::from_raw_os_error(number)).why_kept().expect("it is kept")
+        };
+        assert_eq!(why(nix::libc::EACCES), "the file of this name cannot be read: permission denied");
+        assert_eq!(why(nix::libc::EMFILE), "the file of this name cannot be read: too many open files");
+        let foreign = Replaced::Foreign.why_kept();
+        assert_eq!(foreign.as_deref(), Some("there is a file of this name that glimt did not write"));
+        assert_eq!(Replaced::Own.why_kept(), None);
     }
 }

@@ -272,7 +272,8 @@ fn what_a_format_cannot_hold_is_said() {
     assert_eq!(BitDepth::try_from(16).expect("known"), BitDepth::Sixteen);
 }
 
-const NOTHING_KEPT: write::Guard<'_> = write::Guard { is_kept: &|_| false, may_replace: &|_| Ok(()) };
+const NOTHING_KEPT: write::Guard<'_> =
+    write::Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Allowed };
 
 #[test]
 fn what_is_cancelled_is_neither_encoded_nor_written() {
@@ -308,4 +309,46 @@ fn a_guard_is_asked_of_the_real_file_when_the_new_one_is_whole() {
     let refused = write::atomic_until(&link, b"new", &guard, &CancelToken::new()).expect_err("refused");
     assert_eq!((refused.to_string().as_str(), asked.get(), entries()), ("it stays", 1, 2));
     assert_eq!(std::fs::read(&real).expect("read"), b"old");
+}
+
+/// Who writes a file of somebody else cannot give it back. Only root can try: a thread of its own becomes `nobody`
+/// towards the file system (setfsuid(2)).
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
+    use nix::unistd::{Gid, Uid, geteuid, setfsgid, setfsuid};
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    if !geteuid().is_root() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let permit = |path: &Path, mode| {
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).expect("permitted");
+    };
+    permit(folder.path(), 0o777);
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, "old").expect("written");
+    permit(&path, 0o4664);
+    let write = |losses| {
+        let as_nobody = || {
+            let guard = write::Guard { losses, ..NOTHING_KEPT };
+            setfsgid(Gid::from_raw(65534));
+            setfsuid(Uid::from_raw(65534));
+            write::atomic_until(&path, b"new", &guard, &CancelToken::new())
+        };
+        std::thread::scope(|scope| {
+            std::thread::Builder::new()
+                .spawn_scoped(scope, as_nobody)
+                .expect("a thread")
+                .join()
+                .expect("no panic")
+        })
+    };
+    let refused = write(Losses::Refused).expect_err("its owner is root").to_string();
+    assert!(refused.contains("its owner and its group cannot be kept"), "{refused}");
+    assert_eq!(std::fs::read(&path).expect("read"), b"old");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
+    write(Losses::Allowed).expect("written");
+    let found = std::fs::metadata(&path).expect("a file");
+    assert_eq!((found.uid(), found.mode() & 0o7777), (65534, 0o644));
 }

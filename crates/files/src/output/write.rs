@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsFd;
-use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Once};
@@ -12,17 +12,18 @@ use std::sync::{Arc, Once};
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 
+use super::attributes::{Attributes, Carried};
 use super::place::{self, Place, Target};
 use super::temporary::{self, Temporary};
-use super::{OutputError, stoppable};
+use super::{Losses, OutputError, stoppable};
 use crate::control::CancelToken;
 
 /// Standard output. It is open: opening it by this name would fail where it is a socket.
 pub const STDOUT: &str = "/dev/stdout";
 
 /// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At
-/// any moment, whatever ends the process, the file is the old one or the new one. Its permissions stay; a link
-/// stays and what it points to is replaced. Temporary files of killed writers in the same directory are removed.
+/// any moment, whatever ends the process, the file is the old one or the new one. Its permissions, its access list and
+/// its attributes stay, as does its owner if this process may give files away; a link stays and what it points to is replaced. Temporary files of killed writers in the same directory are removed.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
@@ -30,7 +31,7 @@ pub const STDOUT: &str = "/dev/stdout";
 /// Names the path, what the system said and the way out; the old file is untouched then, and no temporary file is
 /// left.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()) };
+    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Allowed };
     atomic_until(path, bytes, &guard, &CancelToken::new())
 }
 
@@ -40,6 +41,8 @@ pub struct Guard<'a> {
     pub is_kept: &'a dyn Fn(&Path) -> bool,
     /// Whether the new file may take the place of this one, there or not; or whether it may be written to in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
+    /// Whether a file whose owner, access list or attributes cannot be kept may be replaced.
+    pub losses: Losses,
 }
 
 /// [`atomic`] that can be stopped as long as the new file is not whole, and that a guard watches.
@@ -56,7 +59,11 @@ pub fn atomic_until(
     let named = |error| OutputError::file(path, error);
     match place::find(path)? {
         Place::File(target) => {
-            let new = stoppable::or_cancelled(beside(&target, bytes, guard, token), named)?;
+            let (new, carried) = beside(&target, guard).map_err(named)?;
+            if let Some(carried) = carried.as_ref().filter(|_| guard.losses == Losses::Refused) {
+                nothing_lost(path, carried)?;
+            }
+            stoppable::or_cancelled(fill(&new, bytes, carried.as_ref(), token), named)?;
             (guard.may_replace)(&target.path)?;
             new.rename_to(&target.path).and_then(|()| sync_directory(target.directory())).map_err(named)
         }
@@ -78,28 +85,33 @@ pub fn prepare_process() {
     });
 }
 
-/// The new file, whole and beside the one that it is to replace.
-fn beside(target: &Target, bytes: &[u8], guard: &Guard<'_>, token: &CancelToken) -> io::Result<Temporary> {
+/// The new file, empty, beside the one that it is to replace, with what that one has besides its bytes. Until it is
+/// whole, only its owner and those whom an access list names can read it.
+fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<Carried>)> {
     let directory = target.directory();
     temporary::remove_stale(directory, guard.is_kept);
-    let mode = target.existing.as_ref().map_or(0o666, |existing| existing.mode() & 0o777);
+    let mode = if target.existing.is_some() { 0o600 } else { 0o666 };
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
     let new = Temporary::create(directory, name, mode)?;
-    stoppable::write_all(&new.file, bytes, token)?;
-    if let Some(existing) = &target.existing {
-        keep_owner(&new.file, existing);
-        new.file.set_permissions(fs::Permissions::from_mode(existing.mode() & 0o7777))?;
-    }
-    new.file.sync_all()?;
-    Ok(new)
+    let old = target.existing.as_ref().map(|existing| Attributes::of(&target.path, existing));
+    let carried = old.map(|old| old.carry_over(&new.file));
+    Ok((new, carried))
 }
 
-/// As far as this process may: root writes other people's files.
-fn keep_owner(file: &File, existing: &fs::Metadata) {
-    let same = |new: fs::Metadata| (new.uid(), new.gid()) == (existing.uid(), existing.gid());
-    if !file.metadata().is_ok_and(same) {
-        let _ = std::os::unix::fs::fchown(file, Some(existing.uid()), Some(existing.gid()));
+fn nothing_lost(path: &Path, carried: &Carried) -> Result<(), OutputError> {
+    if carried.lost.is_empty() {
+        return Ok(());
     }
+    let why = format!("{} cannot be kept", carried.lost.join(" and "));
+    Err(OutputError::Target { path: path.to_owned(), why, way_out: "change a copy of it" })
+}
+
+fn fill(new: &Temporary, bytes: &[u8], carried: Option<&Carried>, token: &CancelToken) -> io::Result<()> {
+    stoppable::write_all(&new.file, bytes, token)?;
+    if let Some(carried) = carried {
+        carried.permit(&new.file)?;
+    }
+    new.file.sync_all()
 }
 
 /// So that the rename survives a loss of power. File systems and directories that do not let themselves be synchronised are

@@ -7,9 +7,9 @@ use std::sync::mpsc;
 use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::scene::description::{Lowered, Object, Shape};
-use crate::scene::diagnostic::Diagnostic;
+use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::world::file_emits;
 
 /// What a scene that is right consists of.
@@ -47,12 +47,21 @@ pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
         (None, None) => false,
     };
     let lights = scene.lights.iter().filter(|light| light.sends()).count();
+    let mut warnings = warnings;
     let environment = scene.environment.iter().filter(|environment| environment.sends()).count();
+    let count = lights + environment + scene.objects.iter().filter(emits).count();
+    // Whether meshes have lights of their own is known only now.
+    let has_own = scene.objects.iter().any(|object| object.material.is_none());
+    if count == 0 && has_own && scene.render.ambient == Vec3::ZERO {
+        let (severity, message) = (Severity::Warning, "nothing lights this scene".to_owned());
+        let help = "the mesh's own materials emit nothing; add a [[light]] or an [environment]".to_owned();
+        warnings.push(parsed.loaded.diagnostic_at(0..0, severity, message, Some(help)));
+    }
     Ok(Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
         textures: textures.images.len() as u64,
-        lights: (lights + environment + scene.objects.iter().filter(emits).count()) as u64,
+        lights: count as u64,
         warnings,
     })
 }

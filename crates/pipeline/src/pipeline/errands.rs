@@ -12,7 +12,7 @@ use crate::control::CancelToken;
 use crate::film::Quantity;
 use crate::integrators::RenderSettings;
 use crate::math::DVec2;
-use crate::output::{OutputError, write};
+use crate::output::{Losses, OutputError, write};
 use crate::scene::{Loaded, text_now};
 use crate::system::{file, in_words};
 use crate::world::World;
@@ -114,11 +114,15 @@ impl AtHand {
             }
             let refused = || OutputError::Refused { reason: changed() };
             let may_replace = |_: &std::path::Path| is_as_read().then_some(()).ok_or_else(refused);
-            let guard = write::Guard { is_kept: &|path| inputs.contain(path), may_replace: &may_replace };
+            let guard = write::Guard {
+                is_kept: &|path| inputs.contain(path),
+                may_replace: &may_replace,
+                losses: Losses::Refused,
+            };
             write::atomic_until(&path, text.as_bytes(), &guard, &CancelToken::new())
                 .map_err(|error| error.to_string())?;
         }
-        let is_own = Loaded::camera_of(&text, &self.sets) == Some((*camera).into());
+        let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
         Ok(Kept { path, is_new, is_own })
     }
 }

@@ -31,6 +31,7 @@ pub(super) struct Plan {
     pub(super) outputs: Vec<PathBuf>,
     pub(super) named_by: NamedBy,
     pub(super) report: Option<PathBuf>,
+    pub(super) replaces_foreign: bool,
     pub(super) effective: Effective,
 }
 
@@ -67,6 +68,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         outputs,
         named_by,
         report: overrides.report.clone(),
+        replaces_foreign: overrides.replaces_foreign,
         scene: with_accel(scene, render.accel),
     })
 }

@@ -136,6 +136,13 @@ pub enum Event {
         /// The scene's own exposure, in stops.
         exposure: f32,
     },
+    /// The scene file holds another text than that of the last scene that could be read.
+    Edited {
+        /// Of which request.
+        generation: u64,
+        /// What differs, in a few words.
+        what: String,
+    },
     /// The render went on.
     Progress {
         /// Of which request.

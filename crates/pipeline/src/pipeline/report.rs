@@ -13,7 +13,7 @@ use crate::control::CancelToken;
 use crate::film::stretch::Stretch;
 use crate::integrators::{RayCounters, picks};
 use crate::lights::LightTree;
-use crate::output::{OutputError, write::atomic_until};
+use crate::output::{OutputError, json, write::atomic_until};
 use crate::world::World;
 
 /// The report of one finished request: the JSON of `--report`.
@@ -207,9 +207,8 @@ pub(super) fn write_report(
     let Some(path) = &plan.report else { return Ok(()) };
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
-    let mut text = serde_json::to_vec_pretty(report).map_err(unwritable)?;
-    text.push(b'\n');
-    guarded(plan, inputs, path, |guard| atomic_until(path, &text, guard, token))
+    let text = json::file(report).map_err(unwritable)?;
+    guarded(plan, inputs, path, |guard| atomic_until(path, text.as_bytes(), guard, token))
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {

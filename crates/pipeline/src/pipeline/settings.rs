@@ -18,6 +18,8 @@ pub struct Overrides {
     pub outputs: Vec<PathBuf>,
     /// Where the report of each finished request is written, as JSON.
     pub report: Option<PathBuf>,
+    /// Whether the report and the picture that nobody named may replace a file that glimt did not write.
+    pub replaces_foreign: bool,
     /// Pixels across.
     pub width: Option<u32>,
     /// Pixels down.

@@ -12,6 +12,8 @@ pub(super) struct StageTable<'a> {
     /// By which work is held: that time does not count.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
+    /// Whether nobody is told.
+    pub(super) is_silent: bool,
 }
 
 impl StageTable<'_> {
@@ -26,11 +28,17 @@ impl StageTable<'_> {
     ) -> Result<T, Stop> {
         let watch = Stopwatch::start(self.token);
         let report = |status, why| StageReport { name, status, seconds: watch.seconds(), why };
-        self.sink.stage(report(Status::Running, String::new()));
+        self.say(report(Status::Running, String::new()));
         let staged = work()?;
         let report = report(staged.status, staged.why);
-        self.sink.stage(report.clone());
+        self.say(report.clone());
         self.stages.push(report);
         Ok(staged.value)
+    }
+
+    fn say(&self, report: StageReport) {
+        if !self.is_silent {
+            self.sink.stage(report);
+        }
     }
 }

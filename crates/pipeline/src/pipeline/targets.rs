@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use super::inputs::{Input, Inputs};
 use super::plan::Plan;
 use crate::output::write::Guard;
-use crate::output::{FileIdentity, OutputError, Replaced, replaced_picture, replaced_report};
+use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::system::in_words;
 
 /// Who named the files for the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +59,11 @@ pub(super) fn guarded<T>(
             None => Ok(()),
         }
     };
-    write(&Guard { is_kept: &|path| inputs.contain(path), may_replace: &may_replace })
+    write(&Guard {
+        is_kept: &|path| inputs.contain(path),
+        may_replace: &may_replace,
+        losses: Losses::Allowed,
+    })
 }
 
 /// For messages that have no room for more.
@@ -92,7 +95,7 @@ fn conflict(
             return Some(is_twin(target, twin.path));
         }
     }
-    is_foreign(target, at)
+    if plan.replaces_foreign { None } else { is_foreign(target, at) }
 }
 
 fn is_input(target: Target<'_>, input: &Input) -> Diagnostic {
@@ -117,31 +120,15 @@ fn is_twin(target: Target<'_>, twin: &Path) -> Diagnostic {
 
 /// What is there already and was not written by glimt.
 fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
-    let name = target.path.display();
-    let way_out = way_out(target.kind);
-    let (replaced, whose, help) = match target.kind {
+    let (name, way_out) = (target.path.display(), way_out(target.kind));
+    let (replaced, help) = match target.kind {
         Kind::Picture(NamedBy::Nobody) => {
-            (replaced_picture(at), "that glimt did not write", format!("{way_out}; -o {name} replaces it"))
+            (replaced_picture(at), format!("{way_out}; -o {name} or --force replaces it"))
         }
-        Kind::Report => {
-            let help = format!("{way_out}, such as {name}.json, or remove that file");
-            (replaced_report(at), "that is no report", help)
-        }
+        Kind::Report => (replaced_json(at), format!("{way_out}; --force replaces it")),
         Kind::Picture(NamedBy::Call | NamedBy::Scene) => return None,
     };
-    let why = why_kept(&replaced, whose)?;
-    Some(of_call(format!("cannot write {name}: {why}"), Some(help)))
-}
-
-/// Why what is there is not replaced; none: it may be.
-fn why_kept(replaced: &Replaced, whose: &str) -> Option<String> {
-    match replaced {
-        Replaced::Own => None,
-        Replaced::Foreign => Some(format!("there is a file of this name {whose}")),
-        Replaced::Unreadable(error) => {
-            Some(format!("the file of this name cannot be read: {}", in_words(error)))
-        }
-    }
+    Some(of_call(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))
 }
 
 fn way_out(kind: Kind) -> &'static str {
@@ -156,24 +143,4 @@ fn way_out(kind: Kind) -> &'static str {
 /// What is about the call stands at no place of the scene.
 fn of_call(message: String, help: Option<String>) -> Diagnostic {
     Diagnostic { severity: Severity::Error, message, path: PathBuf::new(), place: None, help }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_that_cannot_be_read_is_said_with_the_system_s_reason() {
-        let why = |number| {
-            let error = std::io::Error::from_raw_os_error(number);
-            why_kept(&Replaced::Unreadable(error), "that glimt did not write").expect("it is kept")
-        };
-        assert_eq!(why(nix::libc::EACCES), "the file of this name cannot be read: permission denied");
-        assert_eq!(why(nix::libc::EMFILE), "the file of this name cannot be read: too many open files");
-        assert_eq!(
-            why_kept(&Replaced::Foreign, "that is no report").as_deref(),
-            Some("there is a file of this name that is no report")
-        );
-        assert_eq!(why_kept(&Replaced::Own, "that is no report"), None);
-    }
 }

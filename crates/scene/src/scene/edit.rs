@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::description::{Pose, Viewpoint};
+use super::description::{Pose, Viewpoint, is_same_distance};
 use super::document::{FOV_DEGREES, camera_of};
 use super::source::Source;
 use super::toml::{self, Entries, Item, KeyValue, Value};
@@ -21,7 +21,7 @@ pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, Stri
     let mut edits = Edits { text, table, replaced: Vec::new(), added: Vec::new() };
     edits.camera(wanted);
     let new = edits.applied();
-    let is_right = camera_of(&Source::file(new.as_str().into())) == Some((*wanted).into());
+    let is_right = camera_of(&Source::file(new.as_str().into())).is_some_and(|new| new.is_nearly(wanted));
     is_right
         .then_some(new)
         .ok_or_else(|| "the table [camera] is written in a way that glimt cannot change".to_owned())
@@ -54,7 +54,11 @@ impl Edits<'_> {
         self.vector("up", up, Some(DVec3::Y));
         self.number("fov", fov, FOV_DEGREES);
         self.number("aperture", aperture, 0.0);
-        self.number("focus", focus, wanted.pose.distance());
+        match self.table.get("focus") {
+            // The steps of a camera round its distance a little.
+            Some(given) if wanted.is_focused_on_look_at() && is_near(&given.value, focus) => {}
+            Some(_) | None => self.number("focus", focus, wanted.pose.distance()),
+        }
     }
 
     fn number(&mut self, name: &str, wanted: f64, default: f64) {
@@ -110,11 +114,18 @@ impl Edits<'_> {
 
     /// What stands between a key with its value and the next one.
     fn between(&self, key: &KeyValue<'_>) -> String {
-        if self.has_line(key) { format!("{}{}", self.line_end(), self.indent(key)) } else { ", ".to_owned() }
+        if self.has_line(key) {
+            format!("{}{}", self.line_end(key), self.indent(key))
+        } else {
+            ", ".to_owned()
+        }
     }
 
-    fn line_end(&self) -> &'static str {
-        if self.text.contains("\r\n") { "\r\n" } else { "\n" }
+    /// How the line ends that this key is in; how the one before does if it is the last and has no end.
+    fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
+        let (before, after) = self.text.split_at(key.value.span().end);
+        let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();
+        if line.ends_with('\r') { "\r\n" } else { "\n" }
     }
 
     fn applied(mut self) -> String {
@@ -138,6 +149,20 @@ impl Edits<'_> {
         }
         new + &self.text[done..]
     }
+}
+
+/// Whether a value is a distance that rounding may make of this one.
+fn is_near(value: &Value<'_>, distance: f64) -> bool {
+    let given: Option<f64> = match value.item() {
+        Item::Integer { digits, radix: 10 } | Item::Float(digits) => digits.parse().ok(),
+        Item::Integer { .. }
+        | Item::String(_)
+        | Item::Boolean(_)
+        | Item::Datetime
+        | Item::Array(_)
+        | Item::Table(_) => None,
+    };
+    given.is_some_and(|given| is_same_distance(given, distance))
 }
 
 fn array(vector: DVec3) -> String {
@@ -196,6 +221,29 @@ mod tests {
         ] {
             assert_eq!(written(&text, &wanted), expected);
         }
+    }
+
+    #[test]
+    fn an_added_key_ends_its_line_as_its_neighbour_does() {
+        let wanted = Viewpoint { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
+        // One line of the file ends otherwise than the camera's.
+        for (first, end) in [("\r\n", "\n"), ("\n", "\r\n")] {
+            let text = format!("# a{first}[camera]{end}position = [0, 1, 4]{end}look_at = [0, 1, 0]");
+            assert_eq!(written(&text, &wanted), format!("{text}{end}fov = 35.5"), "at the end of the file");
+            let text = format!("{text}{end}[render]{first}");
+            let expected = text.replace("[0, 1, 0]", &format!("[0, 1, 0]{end}fov = 35.5"));
+            assert_eq!(written(&text, &wanted), expected);
+        }
+    }
+
+    #[test]
+    fn a_distance_that_rounding_changes_stays_as_it_is_written() {
+        let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\nfocus = 4\n";
+        let orbited = view([2.8283, 1.0, 2.8285]);
+        assert!(orbited.focus != 4.0 && (orbited.focus - 4.0).abs() < 1e-3);
+        assert_eq!(written(text, &orbited), text.replace("[0, 1, 4]", "[2.8283, 1, 2.8285]"));
+        let nearer = view([0.0, 1.0, 3.8]);
+        assert!(written(text, &nearer).contains("focus = 3.8"), "a step towards it is no rounding");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! [`load`] reads a file safely, [`parse`] turns its text into a [`description::Scene`] and a list of
 //! [`diagnostic::Diagnostic`]s; [`report`] makes text of those.
 
+mod changes;
 pub mod description;
 pub mod diagnostic;
 mod document;
@@ -19,6 +20,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use changes::changes;
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use source::Source;

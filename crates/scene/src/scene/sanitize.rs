@@ -3,6 +3,8 @@
 
 use std::borrow::Cow;
 
+use crate::system::text::is_plain;
+
 /// The text with every character that a terminal would act on, or not show at all, replaced by a visible
 /// stand-in: `␛` for ESC and `␊` for a line end (control pictures), four spaces for a tab, `\u{202e}` for C1
 /// bytes, directional marks, zero-width characters and the like. The result is one line.
@@ -31,25 +33,6 @@ pub fn shortened(text: &str, limit: usize) -> String {
         return shown.into_owned();
     }
     shown.chars().take(limit.saturating_sub(1)).chain(['…']).collect()
-}
-
-/// Whether a terminal shows this character as itself, in its place.
-fn is_plain(c: char) -> bool {
-    !matches!(c,
-        '\0'..='\u{1f}'
-        | '\u{7f}'..='\u{9f}'           // DEL and C1
-        | '\u{ad}'                      // soft hyphen
-        | '\u{61c}'                     // Arabic letter mark
-        | '\u{115f}' | '\u{1160}'       // Hangul fillers
-        | '\u{180e}'                    // Mongolian vowel separator
-        | '\u{200b}'..='\u{200f}'       // zero width, direction marks
-        | '\u{2028}'..='\u{202e}'       // line and paragraph separators, embeddings, overrides
-        | '\u{2060}'..='\u{206f}'       // word joiner, isolates, deprecated marks
-        | '\u{3164}' | '\u{ffa0}'       // more fillers
-        | '\u{feff}'                    // byte order mark
-        | '\u{fff9}'..='\u{fffb}'       // interlinear annotations
-        | '\u{e0000}'..='\u{e0fff}'     // tags, variation selectors
-    )
 }
 
 #[cfg(test)]

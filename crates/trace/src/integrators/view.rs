@@ -2,6 +2,7 @@
 
 use crate::choice;
 use crate::film::Quantity;
+use crate::world::Lookups;
 
 choice! {
     /// What a picture shows.
@@ -69,6 +70,23 @@ impl View {
             Self::Barycentric => Shown::FirstHit(FirstHit::Barycentric),
             Self::Uv => Shown::FirstHit(FirstHit::Uv),
             Self::Albedo => Shown::FirstHit(FirstHit::Albedo),
+        }
+    }
+}
+
+impl View {
+    /// The textures that a picture of it looks up.
+    pub fn lookups(self) -> Lookups {
+        match self.shown() {
+            Shown::FirstHit(FirstHit::Normal) => Lookups { normals: true, ..Lookups::NONE },
+            Shown::FirstHit(FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv) => Lookups::NONE,
+            // What surfaces reflect does not count; where they face and what lights send does.
+            Shown::Light(Measure::ArrivingShare) => Lookups { colors: false, ..Lookups::ALL },
+            // Boxes are drawn over the picture; photons come by way of all surfaces.
+            Shown::Light(Measure::Radiance(_) | Measure::Work)
+            | Shown::FirstHit(FirstHit::Albedo | FirstHit::Photons)
+            | Shown::Bounds
+            | Shown::Film(_) => Lookups::ALL,
         }
     }
 }

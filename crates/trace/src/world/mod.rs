@@ -28,7 +28,9 @@ pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use object::Object;
 pub use origin::origin;
-pub use textures::{NeededTexture, TextureSource, declared_source, environment_source, textures_needed};
+pub use textures::{
+    Lookups, NeededTexture, TextureSource, declared_source, environment_source, textures_needed,
+};
 
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;

@@ -50,9 +50,34 @@ impl NeededTexture {
     }
 }
 
-/// The image files that materials of objects look up, each once. Textures that no such material names are not among
-/// them.
-pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededTexture> {
+/// What a picture looks up in textures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lookups {
+    /// Colours of surfaces.
+    pub colors: bool,
+    /// Pictures on lights, and the map of the environment.
+    pub lights: bool,
+    /// Normal maps.
+    pub normals: bool,
+}
+
+impl Lookups {
+    /// Everything.
+    pub const ALL: Self = Self { colors: true, lights: true, normals: true };
+    /// Nothing.
+    pub const NONE: Self = Self { colors: false, lights: false, normals: false };
+
+    fn has(self, used: TextureUse, is_emission: bool) -> bool {
+        match used {
+            TextureUse::Color => self.colors || (self.lights && is_emission),
+            TextureUse::Normal => self.normals,
+        }
+    }
+}
+
+/// The image files that materials of objects look up for such a picture, each once. Textures that no such material names
+/// are not among them.
+pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Lookups) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
     let mut known = HashMap::new();
     let mut add = |texture: NeededTexture| match known.entry(texture.source.clone()) {
@@ -64,7 +89,9 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
     };
     let (used_materials, own_materials) = in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
-        for (texture, used) in material.textures() {
+        let is_emission = |texture| material.emits() && material.emission.texture == Some(texture);
+        let textures = material.textures().into_iter();
+        for (texture, used) in textures.filter(|(texture, used)| lookups.has(*used, is_emission(*texture))) {
             add(NeededTexture {
                 source: declared_source(scene, texture, used),
                 name: scene.textures[texture].name.clone(),
@@ -76,7 +103,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
         }
     }
     for (file, mesh) in meshes.iter().enumerate().filter(|(file, _)| own_materials[*file]) {
-        for (path, used) in mesh.materials.iter().flat_map(file_textures) {
+        for (path, used) in mesh.materials.iter().flat_map(|own| file_textures(own, lookups)) {
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             add(NeededTexture {
                 source: file_source(path, used),
@@ -88,7 +115,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>]) -> Vec<NeededT
             });
         }
     }
-    if let Some(file) = environment_file(scene) {
+    if let Some(file) = environment_file(scene).filter(|_| lookups.lights) {
         add(NeededTexture::of_environment(file));
     }
     needed
@@ -152,8 +179,13 @@ pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
     TextureSource { path: path.to_owned(), encoding }
 }
 
-fn file_textures(material: &FileMaterial) -> impl Iterator<Item = (&Path, TextureUse)> {
-    let color = [&material.diffuse_texture, &material.specular_texture, &material.emission_texture];
-    let colors = color.into_iter().flatten().map(|path| (path.as_path(), TextureUse::Color));
-    colors.chain(material.normal_texture.iter().map(|path| (path.as_path(), TextureUse::Normal)))
+fn file_textures(material: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (&Path, TextureUse)> {
+    let all = [
+        (&material.diffuse_texture, TextureUse::Color, false),
+        (&material.specular_texture, TextureUse::Color, false),
+        (&material.emission_texture, TextureUse::Color, true),
+        (&material.normal_texture, TextureUse::Normal, false),
+    ];
+    let looked_up = all.into_iter().filter(move |(_, used, is_emission)| lookups.has(*used, *is_emission));
+    looked_up.filter_map(|(path, used, _)| Some((path.as_deref()?, used)))
 }

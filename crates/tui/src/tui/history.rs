@@ -1,6 +1,6 @@
 //! The last pictures, within bounds.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use super::state::Shown;
@@ -15,6 +15,8 @@ pub(super) struct History {
     past: VecDeque<Past>,
     /// Edits of the scene so far.
     edits: u64,
+    /// What edits changed, by their numbers.
+    texts: BTreeMap<u64, String>,
     /// Which one is looked at, and the newest picture meanwhile.
     open: Option<(usize, Shown)>,
 }
@@ -32,6 +34,22 @@ impl History {
         self.edits += 1;
     }
 
+    /// What the last edit changed.
+    pub(super) fn describe_edit(&mut self, what: String) {
+        self.texts.insert(self.edits, what);
+    }
+
+    /// What the last edit changed, if it is known.
+    pub(super) fn last_edit(&self) -> Option<&str> {
+        self.texts.get(&self.edits).map(String::as_str)
+    }
+
+    /// What the edit changed that the picture is after which is looked at.
+    pub(super) fn edit_of_open(&self) -> Option<&str> {
+        let (at, _) = self.open.as_ref()?;
+        self.texts.get(&self.past.get(*at)?.edits).map(String::as_str)
+    }
+
     /// The camera that keys had moved since this request was written into the scene: an edit, which its pictures are after.
     pub(super) fn kept_camera(&mut self, since: u64) {
         self.edits += 1;
@@ -43,6 +61,13 @@ impl History {
     /// That edit changed nothing that is seen.
     pub(super) fn edited_nothing(&mut self) {
         self.edits = self.edits.saturating_sub(1);
+    }
+
+    /// The next request is the same picture as this one, shown otherwise: it takes its place.
+    pub(super) fn go_on(&mut self, generation: u64) {
+        for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
+            past.shown.generation = generation + 1;
+        }
     }
 
     /// Keeps a picture, in place of an earlier one of the same request.
@@ -60,6 +85,8 @@ impl History {
                 *at = at.saturating_sub(1);
             }
         }
+        let oldest = self.past.front().map_or(0, |past| past.edits);
+        self.texts.retain(|edit, _| *edit >= oldest);
     }
 
     /// Whether an older picture is looked at.

@@ -123,6 +123,10 @@ pub(super) enum Overlay {
     LineDown,
     PageUp,
     PageDown,
+    ColumnLeft,
+    ColumnRight,
+    Take,
+    Find,
     Close,
 }
 
@@ -132,7 +136,7 @@ pub(super) const OVERLAY: &[Binding<Overlay>] = &[
         &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
         "j k",
         Overlay::LineDown,
-        "or down, up: scroll the help or the errors",
+        "or down, up: scroll help, errors; choose a view",
         "scroll",
     ),
     binding(&[KeyPress::plain('k'), KeyPress::special(KeyCode::Up)], "", Overlay::LineUp, "", ""),
@@ -144,6 +148,16 @@ pub(super) const OVERLAY: &[Binding<Overlay>] = &[
         "page",
     ),
     binding(&[KeyPress::special(KeyCode::PageUp)], "", Overlay::PageUp, "", ""),
+    binding(&[LEFT, KeyPress::plain('h')], "", Overlay::ColumnLeft, "", ""),
+    binding(&[RIGHT, KeyPress::plain('l')], "", Overlay::ColumnRight, "", ""),
+    binding(
+        &[KeyPress::special(KeyCode::Enter)],
+        "Enter /",
+        Overlay::Take,
+        "the list of views: close it; find a name",
+        "",
+    ),
+    binding(&[KeyPress::plain('/')], "", Overlay::Find, "", ""),
     binding(
         &[KeyPress::special(KeyCode::Esc)],
         "esc",

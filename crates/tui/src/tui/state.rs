@@ -71,6 +71,15 @@ pub(super) struct PendingChange {
     pub noticed: Instant,
 }
 
+/// The list of views, while it is shown.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct ViewList {
+    /// When it goes by itself.
+    pub until: Instant,
+    /// What was typed of a name after `/`; `None` while no name is looked for.
+    pub name: Option<String>,
+}
+
 /// Text over the picture that can be scrolled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Pane {
@@ -168,6 +177,10 @@ pub(super) struct State {
 
     /// Of the newest request.
     pub generation: u64,
+    /// What the keys had changed for the newest request.
+    pub requested_toggles: Toggles,
+    /// Whether the newest request is the picture of before, brighter or darker.
+    pub is_exposed: bool,
     /// The preview size of the newest request.
     pub requested: Option<PreviewSize>,
     pub activity: Activity,
@@ -215,7 +228,7 @@ pub(super) struct State {
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
     pub unchanged: bool,
-    /// Requests that were rendered and finished.
+    /// Requests that were rendered and finished; another exposure is no render.
     pub renders: u64,
     /// Changes of the files that the scene is made of.
     pub edits: u64,
@@ -239,8 +252,7 @@ pub(super) struct State {
     pub are_warnings_known: bool,
     pub pane: Pane,
     pub help: Pane,
-    /// How long the list of views is shown.
-    pub views: Option<Instant>,
+    pub views: Option<ViewList>,
     /// Whether the picture has the screen for itself.
     pub is_alone: bool,
     pub message: Option<String>,
@@ -279,6 +291,8 @@ impl State {
             ask: setup.ask,
             is_light: setup.is_light,
             generation: 0,
+            requested_toggles: Toggles::default(),
+            is_exposed: false,
             requested: None,
             activity: Activity::Running { since: now },
             paused: false,
@@ -370,10 +384,18 @@ impl State {
     /// Whether the last step of the camera has no picture yet.
     pub(super) fn awaits_step(&self) -> bool {
         let is_shown = self.picture.as_ref().is_some_and(|shown| shown.generation == self.generation);
-        self.nudge.request == Some(self.generation)
-            && self.is_running()
-            && self.requested.is_some()
-            && !is_shown
+        // While the scene is broken, the last good one is rendered.
+        let is_at_work = match self.activity {
+            Activity::Running { .. } => true,
+            Activity::Waiting | Activity::Broken => self.camera.is_some() && self.work_goes_on(),
+            Activity::Done | Activity::Cancelled => false,
+        };
+        self.nudge.request == Some(self.generation) && is_at_work && self.requested.is_some() && !is_shown
+    }
+
+    /// Whether what failed was the scene, not the work.
+    fn work_goes_on(&self) -> bool {
+        self.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 
     /// The view that the run was started with: the only one that is written without being asked.
@@ -422,10 +444,11 @@ impl State {
             .clamp(0.02, 50.0)
     }
 
-    /// Shows the list of views for a moment.
+    /// Shows the list of views for a moment more.
     pub(super) fn list_views(&mut self) {
         const MOMENT: Duration = Duration::from_secs(4);
-        self.views = Some(self.now + MOMENT);
+        let name = self.views.take().and_then(|views| views.name);
+        self.views = Some(ViewList { until: self.now + MOMENT, name });
         self.dirty = true;
     }
 
@@ -460,6 +483,7 @@ impl State {
         const CLOCK: Duration = Duration::from_millis(250);
         let clock = (self.is_running() && !self.paused).then(|| self.now + CLOCK);
         let bars = self.assets.iter().filter_map(AssetBar::end).min();
-        [clock, self.resize_due, bars, self.views].into_iter().flatten().min()
+        let views = self.views.as_ref().map(|views| views.until);
+        [clock, self.resize_due, bars, views].into_iter().flatten().min()
     }
 }

@@ -5,8 +5,8 @@
 
 use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::os::fd::AsFd;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, Once, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
@@ -205,7 +205,9 @@ fn give_back_at_once() {
         let out = io::stdout();
         let _ = tcflush(&out, FlushArg::TCOFLUSH);
         let mut room = [PollFd::new(out.as_fd(), PollFlags::POLLOUT)];
-        if poll(&mut room, PollTimeout::try_from(STUCK).unwrap_or(PollTimeout::ZERO)).is_ok_and(|ready| ready > 0) {
+        if poll(&mut room, PollTimeout::try_from(STUCK).unwrap_or(PollTimeout::ZERO))
+            .is_ok_and(|ready| ready > 0)
+        {
             if HAS_IMAGES.load(Ordering::Acquire) {
                 let _ = nix::unistd::write(&out, &words.delete_images);
             }

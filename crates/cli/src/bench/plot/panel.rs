@@ -6,6 +6,7 @@ use plotters::prelude::*;
 use super::axes::{Axis, plain, power};
 use crate::bench::results::{MethodResult, SceneResult, Step, Verdict};
 use crate::bench::slope::Slope;
+use crate::scene::sanitize::visible;
 
 /// Colours that the colour-blind tell apart, also in this order (Okabe and Ito).
 const COLORS: [RGBColor; 7] = [
@@ -35,7 +36,7 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Fai
     let errors = steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]);
     let up = Axis::around(errors.chain([noise]), of_legend(scene.methods.len()));
     let mut chart = ChartBuilder::on(place)
-        .caption(format!("{}, {}×{}", scene.scene, scene.width, scene.height), ("sans-serif", 20))
+        .caption(caption(scene), ("sans-serif", 20))
         .margin(14)
         .x_label_area_size(50)
         .y_label_area_size(80)
@@ -60,6 +61,11 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Fai
         line(&mut chart, method, number)?;
     }
     legend(&mut chart)
+}
+
+/// The scene's name may hold what XML cannot.
+fn caption(scene: &SceneResult) -> String {
+    format!("{}, {}×{}", visible(&scene.scene), scene.width, scene.height)
 }
 
 /// The part of the height that the legend has for itself.

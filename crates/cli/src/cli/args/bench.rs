@@ -34,6 +34,9 @@ pub struct BenchArgs {
     /// Draw the error against the seconds on log axes
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     pub plot: Option<PathBuf>,
+    /// Replace files that glimt did not write, too
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
     /// Say what became slower or worse since the run that wrote this file by --json, and whether it is noise
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub baseline: Option<PathBuf>,

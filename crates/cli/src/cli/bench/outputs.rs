@@ -11,7 +11,7 @@ use crate::cli::exit::Exit;
 use crate::cli::lower::STANDARD;
 use crate::control::CancelToken;
 use crate::output::write::{self, Guard};
-use crate::output::{self, FileIdentity, OutputError, holds_foreign_report, holds_foreign_table};
+use crate::output::{self, FileIdentity, Losses, OutputError, replaced_json, replaced_plot, replaced_table};
 use crate::system::{file, in_words};
 
 /// What is written, and what must not be.
@@ -21,6 +21,8 @@ pub(super) struct Outputs {
     /// What it is to this call, and the file.
     inputs: Vec<(&'static str, PathBuf)>,
     baseline: Option<PathBuf>,
+    /// Whether files that glimt did not write may be replaced.
+    replaces_foreign: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -44,7 +46,8 @@ impl Outputs {
         let references = args.reference.iter().map(|file| ("a reference of this call", file.clone()));
         let baseline = args.baseline.iter().map(|file| ("the baseline of this call", file.clone()));
         let inputs = scenes.chain(references).chain(baseline).collect();
-        let outputs = Self { files, inputs, baseline: args.baseline.clone() };
+        let (baseline, replaces_foreign) = (args.baseline.clone(), args.force);
+        let outputs = Self { files, inputs, baseline, replaces_foreign };
         for (index, (_, path, kind)) in outputs.files.iter().enumerate() {
             outputs.check(index, path, *kind).map_err(|error| match error {
                 OutputError::Refused { reason } => console.fail(Exit::WRONG, &reason),
@@ -74,7 +77,7 @@ impl Outputs {
     fn may_replace(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let Some(identity) = FileIdentity::of(real) else { return Ok(()) };
         let is_it = |path: &Path| FileIdentity::of(path).as_ref() == Some(&identity);
-        let (option, path, kind) = &self.files[index];
+        let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(
                 "cannot write {}: it is {what}; name another file with {option} FILE",
@@ -88,16 +91,20 @@ impl Outputs {
         if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
             return refused(&format!("the file of {other}"));
         }
-        // `--csv scene.toml` has its file's name left out.
-        match kind {
-            Kind::Csv if holds_foreign_table(path, csv::HEAD) => {
-                refused("there already and no table, such as a.csv")
-            }
-            Kind::Json if holds_foreign_report(path) => {
-                refused("there already and holds no results, such as a.json")
-            }
-            Kind::Csv | Kind::Json | Kind::Plot => Ok(()),
-        }
+        if self.replaces_foreign { Ok(()) } else { self.check_own(index, real) }
+    }
+
+    /// What is there must be glimt's own: `--csv scene.toml` has its file's name left out.
+    fn check_own(&self, index: usize, real: &Path) -> Result<(), OutputError> {
+        let (option, path, kind) = &self.files[index];
+        let replaced = match kind {
+            Kind::Csv => replaced_table(real, csv::HEAD),
+            Kind::Json => replaced_json(real),
+            Kind::Plot => replaced_plot(real),
+        };
+        let Some(why) = replaced.why_kept() else { return Ok(()) };
+        let way_out = format!("name another file with {option} FILE, or --force replaces it");
+        Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {way_out}", path.display()) })
     }
 
     /// The older run with its name.
@@ -138,7 +145,7 @@ impl Outputs {
             content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.may_replace(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace };
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Allowed };
         let written = write::atomic_until(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
@@ -167,10 +174,7 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
 fn content(kind: Kind, results: &Results) -> Result<Vec<u8>, String> {
     match kind {
         Kind::Csv => Ok(csv::csv(results).into_bytes()),
-        Kind::Json => {
-            let text = serde_json::to_string_pretty(results).map_err(|error| error.to_string())?;
-            Ok((text + "\n").into_bytes())
-        }
+        Kind::Json => Ok(output::json::file(results).map_err(|error| error.to_string())?.into_bytes()),
         Kind::Plot => Ok(plot::svg(results)?.into_bytes()),
     }
 }

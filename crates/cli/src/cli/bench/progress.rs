@@ -1,17 +1,16 @@
 //! What is said on stderr while it is measured.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::chart::Lines;
 use crate::bench::{News, Results};
 use crate::cli::args::Progress;
 use crate::cli::console::Console;
-use crate::cli::progress::{seconds, style};
+use crate::cli::progress::{json_line, seconds, style};
 use crate::scene::sanitize::visible;
 
 /// Longest silence of plain lines.
@@ -70,7 +69,7 @@ impl Said {
                 self.last = Instant::now();
                 match &self.way {
                     Way::Plain => self.console.say(&line),
-                    Way::Json => object(&json!({ "event": "step", "what": line })),
+                    Way::Json => json_line(&json!({ "event": "step", "what": line })),
                     Way::Bar(..) | Way::Silent => {}
                 }
             }
@@ -85,7 +84,7 @@ impl Said {
                 Way::Plain | Way::Silent => self.console.diagnostics(&warnings),
                 Way::Json => {
                     let messages: Vec<&str> = warnings.iter().map(|one| one.message.as_str()).collect();
-                    object(&json!({ "event": "warnings", "messages": messages }));
+                    json_line(&json!({ "event": "warnings", "messages": messages }));
                 }
             },
         }
@@ -117,7 +116,7 @@ impl Said {
                 let percent = self.fraction * 100.0;
                 self.console.say(&format!("{percent:3.0}% {} {to_go}", self.what));
             }
-            Way::Json if is_due => object(&json!({
+            Way::Json if is_due => json_line(&json!({
                 "event": "progress", "stage": "bench", "what": self.what, "fraction": self.fraction,
                 "elapsed_seconds": elapsed, "eta_seconds": left,
             })),
@@ -144,7 +143,7 @@ impl Said {
         if self.is_for_people() {
             self.console.say(message);
         } else {
-            object(&json!({ "event": "failed", "kind": kind, "message": message }));
+            json_line(&json!({ "event": "failed", "kind": kind, "message": message }));
         }
     }
 
@@ -152,7 +151,7 @@ impl Said {
         if self.is_for_people() {
             self.console.say(message);
         } else {
-            object(&json!({ "event": "cancelled" }));
+            json_line(&json!({ "event": "cancelled" }));
         }
     }
 
@@ -160,7 +159,7 @@ impl Said {
         match self.way {
             Way::Bar(..) | Way::Plain => self.console.say(&format!("wrote {}", path.display())),
             Way::Json => {
-                object(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }));
+                json_line(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }));
             }
             Way::Silent => {}
         }
@@ -168,11 +167,7 @@ impl Said {
 
     pub(super) fn done(&self, results: &Results) {
         if !self.is_for_people() {
-            object(&json!({ "event": "done", "seconds": results.seconds }));
+            json_line(&json!({ "event": "done", "seconds": results.seconds }));
         }
     }
-}
-
-fn object(value: &Value) {
-    let _ = writeln!(std::io::stderr().lock(), "{value}");
 }

@@ -8,6 +8,10 @@ use super::{Reporter, seconds};
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, Status};
 use crate::scene::sanitize::visible;
 
+/// Columns that the bar keeps at least.
+const LEAST_BAR: usize = 10;
+/// Columns where the size is not known.
+const PLAIN_COLUMNS: usize = 80;
 /// Steps of the render's bar.
 const STEPS: u64 = 1000;
 
@@ -16,13 +20,15 @@ pub(super) struct Bars {
     stage: ProgressBar,
     assets: HashMap<String, ProgressBar>,
     render: Option<ProgressBar>,
+    /// The seconds after which the render ends, if the call says so.
+    time: Option<f64>,
 }
 
 impl Bars {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(time: Option<f64>) -> Self {
         let all = MultiProgress::new();
         let stage = all.add(ProgressBar::new_spinner().with_style(style("{spinner} {msg}")));
-        Self { all, stage, assets: HashMap::new(), render: None }
+        Self { all, stage, assets: HashMap::new(), render: None, time }
     }
 
     fn asset(&mut self, progress: &AssetProgress) {
@@ -44,9 +50,10 @@ impl Bars {
         let bar = self.render.get_or_insert_with(|| {
             all.add(ProgressBar::new(STEPS).with_style(style("  {wide_bar} {percent:>3}% {msg}")))
         });
-        let eta = progress.eta_seconds.map_or(String::new(), |eta| format!(", {} left", seconds(eta)));
+        // Each time anew: the terminal may have another size.
+        let columns = crossterm::terminal::size().map_or(PLAIN_COLUMNS, |(columns, _)| usize::from(columns));
         bar.set_position((progress.fraction * STEPS as f64) as u64);
-        bar.set_message(format!("{} of {} samples{eta}", progress.samples, progress.total_samples));
+        bar.set_message(words(progress, self.time, columns));
     }
 }
 
@@ -72,6 +79,7 @@ impl Reporter for Bars {
             | Event::WriteFailed { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. }
             | Event::Done { .. }
@@ -91,7 +99,57 @@ impl Reporter for Bars {
     }
 }
 
+/// What stands beside the bar: as much as leaves it [`LEAST_BAR`] columns. Under a time limit, seconds are counted.
+fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
+    let done = match time {
+        Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),
+        None => format!("{} of {} samples", progress.samples, progress.total_samples),
+    };
+    let left = progress.eta_seconds.map(|eta| format!("{} left", seconds(eta)));
+    let whole = match (&left, time) {
+        (Some(left), None) => format!("{done}, {left}"),
+        (_, _) => done.clone(),
+    };
+    let room = columns.saturating_sub(LEAST_BAR + "   100% ".len());
+    let shorter = [Some(whole), left, Some(done)].into_iter().flatten();
+    shorter.into_iter().find(|words| words.chars().count() <= room).unwrap_or_default()
+}
+
 /// A style by its template; should it not be understood, the library's own.
 pub(in crate::cli) fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn progress() -> RenderProgress {
+        RenderProgress {
+            fraction: 0.25,
+            elapsed_seconds: 2.5,
+            eta_seconds: Some(7.5),
+            samples: 1000,
+            total_samples: 4096,
+            noise: None,
+        }
+    }
+
+    #[test]
+    fn a_narrow_terminal_keeps_its_bar() {
+        let progress = progress();
+        assert_eq!(words(&progress, None, 80), "1000 of 4096 samples, 7.50 s left");
+        for columns in 0..200 {
+            let said = words(&progress, None, columns).chars().count();
+            assert!(said == 0 || columns >= said + "  ".len() + LEAST_BAR + " 100% ".len(), "{columns}");
+        }
+        assert_eq!(words(&progress, None, 30), "7.50 s left");
+    }
+
+    #[test]
+    fn under_a_time_limit_seconds_are_counted() {
+        for columns in [80, 40] {
+            assert_eq!(words(&progress(), Some(10.0), columns), "2.50 s of 10.0 s");
+        }
+    }
 }

@@ -20,6 +20,7 @@ use std::io::Write;
 use serde_json::{Value, json};
 
 use super::Reporter;
+use crate::output::json::in_a_line;
 use crate::pipeline::protocol::{Event, Failure};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::line_and_column;
@@ -29,8 +30,7 @@ pub(super) struct Json;
 impl Reporter for Json {
     fn event(&mut self, event: &Event) {
         if let Some(value) = value(event) {
-            // JSON escapes control characters by itself, C1 and the like are not shown by programs that read it.
-            let _ = writeln!(std::io::stderr().lock(), "{value}");
+            line(&value);
         }
     }
 
@@ -40,6 +40,13 @@ impl Reporter for Json {
 
     fn says_diagnostics(&self) -> bool {
         true
+    }
+}
+
+/// A line on stderr; nothing can be done where nobody reads it.
+pub(in crate::cli) fn line(value: &Value) {
+    if let Ok(text) = in_a_line(value) {
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 }
 
@@ -79,6 +86,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::Preview { .. }
         | Event::Refused { .. }
         | Event::WritePostponed { .. }
+        | Event::Edited { .. }
         | Event::CameraKept { .. }
         | Event::Picked { .. } => return None,
     })

@@ -67,6 +67,7 @@ impl Reporter for Plain {
             | Event::WriteFailed { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. }
             | Event::Done { .. }

@@ -18,7 +18,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub(super) use self::orders::{Meanwhile, Orders};
 use self::outcome::Outcome;
-use self::unfinished::Unfinished;
+use self::unfinished::Good;
 use super::cache::{Memo, Pool};
 use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
@@ -27,9 +27,9 @@ use super::pace::Stopwatch;
 use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
-use super::settings::Overrides;
+use super::settings::{Overrides, View};
 use super::sink::Sink;
-use super::stages::accel::{AccelCache, accel, needed};
+use super::stages::accel::{AccelCache, accel};
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
 use super::stages::lights::{SkyMemo, lights};
@@ -38,7 +38,7 @@ use super::stages::parse::{Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::preview::Screen;
 use super::stages::render::{Rendering, render};
-use super::stages::textures::{TextureCache, Textures, add_declared, textures};
+use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
 use super::stages::world::{Eye, Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop, keys};
@@ -50,6 +50,7 @@ use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
+use crate::scene::changes;
 use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
@@ -91,8 +92,8 @@ pub(super) struct Engine {
     /// What the current film is rendered by.
     plan: Option<Plan>,
     at_hand: Option<AtHand>,
-    /// The picture whose render was stopped, until another one is begun.
-    unfinished: Option<Unfinished>,
+    /// The last scene that could be read, with what it names.
+    good: Option<Good>,
     /// Pixels of first pictures that are traced in a second, as the last one was.
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
@@ -135,7 +136,7 @@ impl Engine {
             written: Written::default(),
             plan: None,
             at_hand: None,
-            unfinished: None,
+            good: None,
             coarse_rate: Cell::new(None),
             pool: None,
             assets: Vec::new(),
@@ -193,7 +194,7 @@ impl Engine {
         }
         self.say_files(&findings, sink);
         // What was read to the end stays for whoever comes next, even if the render was stopped.
-        let is_read = self.unfinished.as_ref().is_some_and(|it| it.request.generation == generation);
+        let is_read = self.good.as_ref().is_some_and(|good| good.generation == generation);
         self.end(outcome.is_ok() || is_read);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
@@ -225,10 +226,42 @@ impl Engine {
         findings: &mut Findings,
     ) -> Result<Report, Stop> {
         let watch = Stopwatch::start(meanwhile.token);
-        let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new() };
+        let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: false };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
         let ready = self.prepare(request, &mut table, reading, findings)?;
+        let photons = self.light(request, &ready, &mut table, sink, meanwhile)?;
+        let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, meanwhile))?;
+        // Links and files may have changed during the render.
+        self.look_for_conflicts(request, &ready.plan, findings, sink)?;
+        let is_written = table
+            .run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing))?;
+        let pool = self.pool(ready.plan.threads)?;
+        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let finished = Finished {
+            scene: &ready.parsed.loaded.path,
+            plan: &ready.plan,
+            world: &ready.world.1,
+            canvas,
+            films: &self.films,
+            rays,
+            texels_loaded: ready.texels_loaded,
+            texture_memory_bytes: ready.texture_memory_bytes,
+            photons: photons.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
+            is_written,
+        };
+        Ok(pool.install(|| report(&finished, table.stages, watch.seconds())))
+    }
+
+    /// Sends photons, and makes this the picture at hand. Gives the key of the photons that the picture gathers.
+    fn light(
+        &mut self,
+        request: &Request,
+        ready: &Ready,
+        table: &mut StageTable<'_>,
+        sink: &Sink,
+        meanwhile: &Meanwhile<'_>,
+    ) -> Result<Option<Key>, Stop> {
         let pool = self.pool(ready.plan.threads)?;
         let (plan, world) = (&ready.plan, &ready.world.1);
         let sending = Sending { world, plan, pool: &pool, token: meanwhile.token, sink };
@@ -250,29 +283,7 @@ impl Engine {
         let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
         self.at_hand = Some(at_hand);
-        let unfinished = Unfinished { request: request.clone(), ready: ready.clone(), photons: photons_key };
-        self.unfinished = Some(unfinished);
-        let rays = table.run(Stage::Render, || self.render(request, &ready, photons_key, sink, meanwhile))?;
-        self.unfinished = None;
-        // Links and files may have changed during the render.
-        self.look_for_conflicts(request, &ready.plan, findings, sink)?;
-        let is_written = table
-            .run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing))?;
-        let pool = self.pool(ready.plan.threads)?;
-        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let finished = Finished {
-            scene: &ready.parsed.loaded.path,
-            plan: &ready.plan,
-            world: &ready.world.1,
-            canvas,
-            films: &self.films,
-            rays,
-            texels_loaded: ready.texels_loaded,
-            texture_memory_bytes: ready.texture_memory_bytes,
-            photons: photons_key.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
-            is_written,
-        };
-        Ok(pool.install(|| report(&finished, table.stages, watch.seconds())))
+        Ok(photons_key)
     }
 
     /// All stages before photons and light.
@@ -286,11 +297,15 @@ impl Engine {
         let parsed = table.run(Stage::Parse, || {
             parse(&request.scene, &request.overrides.sets, contents, &mut self.parsed, findings, token)
         })?;
+        let before = self.good.as_ref().map(|good| good.parsed.loaded.source.text());
+        let edit = before.and_then(|before| changes(before, parsed.loaded.source.text()));
+        if let Some(what) = edit {
+            table.sink.send(Event::Edited { generation: request.generation, what });
+        }
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
-        let eye = Eye::new(&plan.scene, parsed.orbiter, &request.overrides.camera);
         let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
         table.sink.send(Event::Settings {
             generation: request.generation,
@@ -308,38 +323,66 @@ impl Engine {
         }
         let pool = self.pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool };
-        let (meshes, textures) = self.load(&parsed, findings, table, &reading)?;
+        let view = plan.settings.view;
+        let (meshes, textures, needed) = self.load(&parsed, view, findings, table, &reading)?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
+        let generation = request.generation;
+        let good = Good { generation, parsed, meshes, textures: Arc::new(textures), needed };
+        let ready = self.build(request, &good, plan, table, &reading)?;
+        self.good = Some(good);
+        Ok(ready)
+    }
+
+    /// Trees, lights and world of a scene whose files are loaded.
+    fn build(
+        &mut self,
+        request: &Request,
+        good: &Good,
+        plan: Plan,
+        table: &mut StageTable<'_>,
+        reading: &Reading<'_>,
+    ) -> Result<Ready, Stop> {
+        let Good { parsed, meshes, textures, .. } = good;
         let scene = &plan.scene;
+        let eye = Eye::new(scene, parsed.orbiter, &request.overrides.camera);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter's numbers are few: their text stands for them.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
         let origin = eye.origin();
-        let build = || accel(scene, (&of, origin), &meshes, &mut self.accel, &reading);
+        let build = || accel(scene, (&of, origin), meshes, &mut self.accel, reading);
         let built = table.run(Stage::Accel, build)?;
         let memos = (&mut self.lights, &mut self.sky);
-        let gather = || Ok(lights(scene, &of, &built.geometry, &textures, memos, token)?);
+        let gather = || Ok(lights(scene, &of, &built.geometry, textures, memos, reading.token)?);
         let lights = table.run(Stage::Lights, gather)?;
         let surfaces = keys::surfaces(scene, &of, &textures.keys);
-        let world = world(scene, (&surfaces, &of), (built, lights), &textures, &eye, &mut self.world);
-        let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = textures;
-        Ok(Ready { parsed, plan, world, surfaces, origin, texels_loaded, texture_memory_bytes })
+        let world = world(scene, (&surfaces, &of), (built, lights), textures, &eye, &mut self.world);
+        let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = **textures;
+        Ok(Ready {
+            parsed: parsed.clone(),
+            plan,
+            world,
+            surfaces,
+            origin,
+            texels_loaded,
+            texture_memory_bytes,
+        })
     }
 
     /// All files that the scene names; every one is tried before the first error ends it.
     fn load(
         &mut self,
         parsed: &Parsed,
+        view: View,
         findings: &mut Findings,
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
-    ) -> Result<(Meshes, Textures), Stop> {
+    ) -> Result<(Meshes, Textures, Needed), Stop> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, reading))?;
-        let needed = needed(loaded, &found);
+        let needed = needed(loaded, &found, view, cache);
         let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
         if findings.errors.is_empty() {
@@ -347,7 +390,7 @@ impl Engine {
             let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
             let generation = table.sink.generation;
             table.sink.send(Event::Warnings { generation, warnings });
-            Ok((found, texels))
+            Ok((found, texels, needed))
         } else {
             Err(Stop::Failed(findings.take_failure()))
         }
@@ -451,8 +494,8 @@ impl Engine {
             let reading = Reading { sink, token: &token, contents, pool: &pool };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
-            let mut wanted = needed(loaded, &found);
-            add_declared(loaded, &mut wanted);
+            let mut wanted = needed(loaded, &found, View::Beauty, &self.textures);
+            add_declared(loaded, &mut wanted.textures);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)

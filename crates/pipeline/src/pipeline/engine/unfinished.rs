@@ -1,38 +1,82 @@
-//! The render of a scene that was good, while the file is broken.
+//! The last scene that could be read: it is rendered while the file is broken.
 
-use super::{Engine, Meanwhile, Ready};
+use std::sync::Arc;
+
+use super::{Engine, Meanwhile};
+use crate::pipeline::plan::plan;
 use crate::pipeline::protocol::Request;
+use crate::pipeline::settings::View;
 use crate::pipeline::sink::Sink;
-use crate::pipeline::stages::Findings;
-use crate::scene::fingerprint::Key;
+use crate::pipeline::stages::meshes::Meshes;
+use crate::pipeline::stages::parse::Parsed;
+use crate::pipeline::stages::textures::{Needed, Textures, needed, textures};
+use crate::pipeline::stages::{Findings, Reading, Stop};
+use crate::pipeline::table::StageTable;
+use crate::pipeline::watch::content::Snapshot;
 
-/// A picture whose render was stopped.
-pub(super) struct Unfinished {
-    pub(super) request: Request,
-    pub(super) ready: Ready,
-    pub(super) photons: Option<Key>,
+/// A scene with all files that its picture needs.
+#[derive(Clone)]
+pub(super) struct Good {
+    /// The request that read it.
+    pub(super) generation: u64,
+    pub(super) parsed: Arc<Parsed>,
+    pub(super) meshes: Meshes,
+    pub(super) textures: Arc<Textures>,
+    /// What the textures were loaded for.
+    pub(super) needed: Needed,
 }
 
 impl Engine {
-    /// The request that stopped it is of a scene that cannot be read: the picture at hand gets the samples that it lacks, and is
-    /// written where it would have been, unless the scene might name that file now.
+    /// Shows and writes the last good scene with what the newest request changes of it, as that request is of a scene that
+    /// cannot be read. Files that the scene might name by now are not written.
     pub(super) fn go_on(&mut self, newest: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
-        let Some(unfinished) = self.unfinished.take() else { return };
-        let request = Request {
-            preview: newest.preview,
-            first: newest.first,
-            force: false,
-            ..unfinished.request.clone()
-        };
-        let ready = &unfinished.ready;
-        if self.render(&request, ready, unfinished.photons, sink, meanwhile).is_err() {
-            self.unfinished = Some(unfinished);
-            return;
-        }
-        let outputs = &ready.plan.outputs;
-        if self.written.not_ours(outputs, &self.contents).is_none() {
+        // A newer request asks for it again; what cannot be rendered was said by the request that failed.
+        let _ = self.render_last_good(newest, sink, meanwhile);
+    }
+
+    fn render_last_good(
+        &mut self,
+        newest: &Request,
+        sink: &Sink,
+        meanwhile: &Meanwhile<'_>,
+    ) -> Result<(), Stop> {
+        let is_it = |good: &&Good| good.parsed.loaded.path == newest.scene;
+        let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(()) };
+        let request = Request { force: false, ..newest.clone() };
+        // Put the scene and the request together.
+        let (loaded, path) = (&good.parsed.loaded, &request.scene);
+        let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(()) };
+        // Load what another view needs, if the files still hold it.
+        let pool = self.pool(plan.threads)?;
+        let snapshot = Snapshot::of(Arc::clone(&self.contents));
+        let reading = Reading { sink, token: meanwhile.token, contents: &snapshot, pool: &pool };
+        let good = self.with_textures(good, plan.settings.view, &reading)?;
+        // Make it ready: all that did not change is kept from before.
+        let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: true };
+        let ready = self.build(&request, &good, plan, &mut table, &reading)?;
+        let photons = self.light(&request, &ready, &mut table, sink, meanwhile)?;
+        // Render and write.
+        self.render(&request, &ready, photons, sink, meanwhile)?;
+        if self.written.not_ours(&ready.plan.outputs, &self.contents).is_none() {
             // What cannot be written is said by the stage.
             let _ = self.write(&request, &ready.plan, &Findings::default(), sink, meanwhile.writing);
         }
+        Ok(())
+    }
+
+    /// Loads what this view looks up, where the scene was read for another one.
+    fn with_textures(&mut self, good: Good, view: View, reading: &Reading<'_>) -> Result<Good, Stop> {
+        let loaded = &good.parsed.loaded;
+        let needed = needed(loaded, &good.meshes, view, &self.textures);
+        let is_there = |one| good.needed.textures.contains(one);
+        if needed.textures.iter().all(is_there) {
+            return Ok(good);
+        }
+        let mut findings = Findings::default();
+        let found = textures(loaded, &needed, &mut self.textures, &mut findings, reading)?;
+        // A file that is broken by now leaves its texture out.
+        let good = Good { textures: Arc::new(found.value), needed, ..good };
+        self.good = Some(good.clone());
+        Ok(good)
     }
 }

@@ -7,7 +7,6 @@ use super::super::cache::{Pool, Spare};
 use super::meshes::Meshes;
 use super::{Reading, Staged, Stop, keys};
 use crate::math::DVec3;
-use crate::scene::Loaded;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{Geometry, MeshTree};
@@ -115,10 +114,4 @@ fn trees(
         trees.push(tree);
     }
     Ok((trees, kept))
-}
-
-/// The textures that visible materials of this scene look up.
-pub(in crate::pipeline) fn needed(loaded: &Loaded, meshes: &Meshes) -> Vec<crate::world::NeededTexture> {
-    let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
-    crate::world::textures_needed(&loaded.scene, &meshes)
 }

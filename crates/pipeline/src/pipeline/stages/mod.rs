@@ -178,11 +178,11 @@ pub(super) struct Asset<T> {
 
 /// The words for how many of some assets were loaded and how many kept.
 pub(super) fn loaded_and_kept<T>(value: T, counts: Counts) -> Staged<T> {
-    let Counts { loaded, kept, failed } = counts;
+    let Counts { loaded, kept, failed, left_out } = counts;
     if loaded + failed == 0 {
         return Staged::reused(value, "the files did not change");
     }
-    let parts = [(loaded, "loaded"), (kept, "kept"), (failed, "failed")].into_iter();
+    let parts = [(loaded, "loaded"), (kept, "kept"), (failed, "failed"), (left_out, "not shown")].into_iter();
     let parts: Vec<String> =
         parts.filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
     Staged::done(value, parts.join(", "))
@@ -194,4 +194,6 @@ pub(super) struct Counts {
     pub(super) loaded: usize,
     pub(super) kept: usize,
     pub(super) failed: usize,
+    /// Not asked for, as the view does not show them.
+    pub(super) left_out: usize,
 }

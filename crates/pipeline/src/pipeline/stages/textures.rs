@@ -9,17 +9,20 @@ use rayon::prelude::*;
 
 use super::super::cache::{Pool, Spare};
 use super::super::watch::content::{Content, FileRead};
-use super::meshes::canonical;
+use super::meshes::{Meshes, canonical};
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
 use crate::assets::image::{ImageEncoding, ImageLimits, load, mipmaps, size};
 use crate::control::{Cancelled, Progress};
+use crate::integrators::View;
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
 use crate::scene::description::{Encoding, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
-use crate::world::{Image, Images, NeededTexture, TextureSource, environment_source};
+use crate::world::{
+    Image, Images, Lookups, NeededTexture, TextureSource, environment_source, textures_needed,
+};
 
 /// Most bytes that the texels of a scene's images may take together.
 const MOST_BYTES: u64 = 2 << 30;
@@ -35,6 +38,12 @@ pub(in crate::pipeline) struct TextureCache {
 }
 
 impl TextureCache {
+    /// Whether all of these were loaded before, whatever their files hold now.
+    fn has_all(&self, needed: &[NeededTexture]) -> bool {
+        let name = |one: &NeededTexture| (canonical(&one.source.path), one.source.encoding);
+        needed.iter().all(|one| self.texels.latest(&name(one)).is_some())
+    }
+
     pub(in crate::pipeline) fn end(&mut self, success: bool, request: u64) {
         self.texels.end(success, request);
         self.mipmaps.end(success, request);
@@ -74,6 +83,32 @@ pub(in crate::pipeline) struct Textures {
     pub(in crate::pipeline) memory_bytes: u64,
 }
 
+/// The textures that a picture needs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::pipeline) struct Needed {
+    pub(in crate::pipeline) textures: Vec<NeededTexture>,
+    /// How many more the scene shows that this view does not look up.
+    pub(in crate::pipeline) left_out: usize,
+}
+
+/// The textures that visible materials of this scene look up in a view. Those of the other views stay where all of them
+/// were loaded before: lights and trees over them then stay too.
+pub(in crate::pipeline) fn needed(
+    loaded: &Loaded,
+    meshes: &Meshes,
+    view: View,
+    cache: &TextureCache,
+) -> Needed {
+    let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
+    let all = textures_needed(&loaded.scene, &meshes, Lookups::ALL);
+    let of_view = textures_needed(&loaded.scene, &meshes, view.lookups());
+    let left_out = all.len() - of_view.len();
+    if left_out == 0 || cache.has_all(&all) {
+        return Needed { textures: all, left_out: 0 };
+    }
+    Needed { textures: of_view, left_out }
+}
+
 /// One image with all who ask for it.
 struct Wanted<'a> {
     name: Name,
@@ -95,14 +130,19 @@ struct Kept {
 /// Cancelled.
 pub(in crate::pipeline) fn textures(
     loaded: &Loaded,
-    needed: &[NeededTexture],
+    needed: &Needed,
     cache: &mut TextureCache,
     findings: &mut Findings,
     reading: &Reading<'_>,
 ) -> Result<Staged<Textures>, Stop> {
     let mut textures = Textures::default();
+    let Needed { textures: needed, left_out } = needed;
     if needed.is_empty() {
-        return Ok(Staged::skipped(textures, "nothing that is seen names a texture"));
+        let why = match left_out {
+            0 => "nothing that is seen names a texture",
+            _ => "the view shows no texture",
+        };
+        return Ok(Staged::skipped(textures, why));
     }
     let environment = environment_source(&loaded.scene);
     let images = images(needed, cache, reading)?;
@@ -153,7 +193,7 @@ pub(in crate::pipeline) fn textures(
         let message = format!("the map of the environment is black: none of its {size} pixels gives light");
         findings.warn(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
     }
-    Ok(loaded_and_kept(textures, counts))
+    Ok(loaded_and_kept(textures, Counts { left_out: *left_out, ..counts }))
 }
 
 /// Says how much of an image cannot be shown.

@@ -116,7 +116,7 @@ pub(in crate::pipeline) fn write_if_wanted(
 /// Write the film as it is to every output that does not hold it already. All outputs are tried.
 ///
 /// # Errors
-/// What went wrong, a line each; cancelled.
+/// What went wrong with the last of those that could not be written; the others are said. Cancelled.
 pub(in crate::pipeline) fn write(
     canvas: &Canvas,
     to: Destination<'_>,
@@ -151,7 +151,12 @@ pub(in crate::pipeline) fn write(
     }
     written.0.retain(|path, _| plan.outputs.contains(path));
     match (errors.is_empty(), count) {
-        (false, _) => Err(Stop::work(errors.join("\n"))),
+        (false, _) => {
+            // Each is said by itself; the last one is the reason why the request fails.
+            let last = errors.pop().unwrap_or_default();
+            errors.into_iter().for_each(|error| sink.write_failed(error));
+            Err(Stop::work(last))
+        }
         (true, 0) => Ok(Staged::reused((), "the picture is on disk")),
         (true, 1) => Ok(Staged::done((), "")),
         (true, _) => Ok(Staged::done((), format!("{count} files"))),

@@ -161,6 +161,20 @@ fn a_kept_camera_follows_links_and_keeps_permissions() {
 }
 
 #[test]
+fn a_kept_camera_keeps_the_attributes_of_the_file() {
+    let mut bench = Bench::new(SCENE);
+    let path = bench.path("scene.toml");
+    // A file system without them has nothing to lose.
+    if xattr::set(&path, "user.note", b"mine").is_err() {
+        return;
+    }
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    assert!(keep(&mut bench, camera).expect("written").is_new);
+    assert_eq!(xattr::get(&path, "user.note").expect("attributes").as_deref(), Some(b"mine".as_slice()));
+}
+
+#[test]
 fn a_file_that_would_lose_something_keeps_its_camera() {
     for (why, is_linked) in [("has other names", true), ("is read-only", false)] {
         let mut bench = Bench::new(SCENE);

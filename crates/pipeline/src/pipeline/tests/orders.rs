@@ -166,6 +166,65 @@ fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is
     assert_statuses(&report, "rrrrrsrr");
 }
 
+/// What is written of this scene by these changes, without any fault.
+fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
+    let mut bench = Bench::new(scene);
+    change(&mut bench);
+    bench.done();
+    bench.picture()
+}
+
+#[test]
+fn while_the_scene_is_broken_keys_change_the_picture_of_the_last_good_one() {
+    use crate::math::DVec3;
+    use crate::scene::description::{CameraChange, Pose, Shadows};
+    let moved = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
+    let changes: [fn(&mut Bench, Pose); 4] = [
+        |bench, pose| bench.overrides.camera = CameraChange { pose: Some(pose), ..CameraChange::default() },
+        |bench, _| bench.overrides.view = Some(View::Normal),
+        |bench, _| bench.overrides.shadows = Some(Shadows::Off),
+        |bench, _| bench.overrides.exposure = Some(-2.0),
+    ];
+    // The scene itself, and a file that it names.
+    type Fault = fn(&Bench);
+    let faults: [(Fault, Fault); 2] = [
+        (|bench| bench.edit("width = 40", "width = = 40"), |bench| bench.edit("width = = 40", "width = 40")),
+        (|bench| bench.write("one.obj", "v 0 0 zero\n"), |bench| bench.write("one.obj", OBJ)),
+    ];
+    for (fault, mend) in faults {
+        for change in changes {
+            let mut bench = Bench::new(SCENE);
+            bench.writing = Writing::Try;
+            bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
+            bench.done();
+            fault(&bench);
+            assert!(matches!(bench.failed(), Failure::Scene(_)));
+            change(&mut bench, moved);
+            let of = bench.send();
+            let failed = bench.until_end(of);
+            assert!(matches!(failed.last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
+            // It is shown and written under the number of the key.
+            let mut is_seen = false;
+            loop {
+                match bench.next() {
+                    Event::Written { generation, .. } => {
+                        assert_eq!(generation, of);
+                        break;
+                    }
+                    Event::Preview { generation } => is_seen |= generation == of,
+                    Event::Progress { .. } => {}
+                    other => panic!("{other:?}"),
+                }
+            }
+            assert!(is_seen);
+            assert_eq!(bench.picture(), picture_by(SCENE, |bench| change(bench, moved)));
+            // The mended scene has that picture.
+            mend(&bench);
+            assert_eq!(bench.done().0.stages[Stage::Render as usize].status, Status::Reused);
+        }
+    }
+}
+
 /// Many tiles, so that orders come during the first pass.
 fn wide() -> String {
     SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")

@@ -1,6 +1,7 @@
 //! A scene that is switched away and back, and one picture of several that is saved.
 
 use super::*;
+use crate::pipeline::settings::View;
 
 #[test]
 fn a_scene_that_is_switched_back_to_finds_its_trees_and_pictures() {
@@ -56,5 +57,55 @@ fn of_several_pictures_only_the_one_that_was_saved_is_read() {
         let report = bench.done().0;
         assert_statuses(&report, "rrdrrsdd");
         assert_eq!((report.counters.texels_loaded, &*report.stages[2].why), (texels, "1 loaded, 1 kept"));
+    }
+}
+
+/// The textures stage, and the texels that were loaded, of a view of a scene that was not seen before.
+fn textures_of(scene: &str, view: View) -> (char, String, u64) {
+    let mut bench = Bench::new(scene);
+    bench.write("bumps.ppm", "P6\n2 1\n255\n\x7f\x7f\x7f\x7f\x7f\x7f");
+    bench.write("glow.ppm", "P6\n3 1\n255\nabcabcabc");
+    bench.overrides.view = Some(view);
+    let report = bench.done().0;
+    let stage = &report.stages[Stage::Textures as usize];
+    let status = statuses(&report).chars().nth(Stage::Textures as usize).expect("a stage");
+    (status, stage.why.clone(), report.counters.texels_loaded)
+}
+
+#[test]
+fn a_view_loads_the_textures_that_it_shows() {
+    let other = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
+                 [materials.lamp]\nemission = { texture = \"glow\" }\nnormal_map = \"bumps\"\n\
+                 [[quad]]\nmaterial = \"lamp\"\n";
+    let bumpy = format!("{SCENE}{other}");
+    let said = |status, why: &str, texels| (status, why.to_owned(), texels);
+    for view in [View::Depth, View::Uv, View::Barycentric] {
+        assert_eq!(textures_of(&bumpy, view), said('s', "the view shows no texture", 0), "{view:?}");
+    }
+    assert_eq!(textures_of(SCENE, View::Normal), said('s', "the view shows no texture", 0));
+    assert_eq!(textures_of(&bumpy, View::Normal), said('d', "1 loaded, 2 not shown", 2));
+    // What lamps send is a part of what arrives, what surfaces reflect is not.
+    assert_eq!(textures_of(SCENE, View::Shadow), said('s', "the view shows no texture", 0));
+    assert_eq!(textures_of(&bumpy, View::Shadow), said('d', "2 loaded, 1 not shown", 5));
+    // The boxes are drawn over the picture.
+    for view in [View::Beauty, View::Albedo, View::Bounds, View::Cost] {
+        assert_eq!(textures_of(&bumpy, view), said('d', "3 loaded", 6), "{view:?}");
+    }
+}
+
+#[test]
+fn a_view_without_textures_shows_what_it_would_with_them() {
+    for view in [View::Normal, View::Depth, View::Uv, View::Shadow] {
+        let mut bench = Bench::new(SCENE);
+        bench.overrides.view = Some(view);
+        bench.done();
+        let without = bench.picture();
+        // All that the picture showed stays loaded, so that lights and trees over them do too.
+        let mut bench = Bench::new(SCENE);
+        bench.done();
+        bench.overrides.view = Some(view);
+        let report = bench.done().0;
+        assert_eq!(statuses(&report).chars().nth(Stage::Textures as usize), Some('r'), "{view:?}");
+        assert_eq!(bench.picture(), without, "{view:?}");
     }
 }

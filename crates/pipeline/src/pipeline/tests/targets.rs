@@ -57,6 +57,8 @@ fn a_material_file_is_known_before_the_render() {
     let mut bench = Bench::new(SCENE);
     bench.write("mtl.json", "newmtl a\nmap_d alpha.ppm\n");
     bench.write("one.obj", &format!("mtllib mtl.json\n{OBJ}"));
+    // Whatever the call lets it replace.
+    bench.overrides.replaces_foreign = true;
     for (name, role) in [("mtl.json", "a material file"), ("alpha.ppm", "a picture")] {
         bench.overrides.report = Some(bench.path(name));
         let of = bench.send();

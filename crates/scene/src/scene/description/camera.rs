@@ -112,7 +112,23 @@ impl From<Viewpoint> for Camera {
     }
 }
 
+/// Whether two distances differ by no more than the rounding of a camera's steps; a step nearer is fifty times as long.
+pub fn is_same_distance(a: f64, b: f64) -> bool {
+    const ROUNDING: f64 = 1e-3;
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
 impl Camera {
+    /// Whether it is this view, but for what rounding makes of the distance to what is in focus.
+    pub fn is_nearly(&self, view: &Viewpoint) -> bool {
+        match self {
+            Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {
+                *self == Viewpoint { focus: *focus, ..*view }.into()
+            }
+            Self::LookAt { .. } | Self::Orbiter { .. } => false,
+        }
+    }
+
     /// Lens radius, ≥ 0.
     pub fn aperture(&self) -> f64 {
         match self {

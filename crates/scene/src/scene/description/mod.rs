@@ -12,7 +12,7 @@ mod shape;
 use std::ops::Range;
 use std::path::PathBuf;
 
-pub use camera::{Camera, CameraChange, Pose, Viewpoint};
+pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
 pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
     ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,

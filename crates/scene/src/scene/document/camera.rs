@@ -14,6 +14,10 @@ const PARALLEL: f64 = 1e-6;
 
 pub(super) fn read(root: &Table<'_>) -> Option<Camera> {
     if !root.optional("camera").is_given() {
+        // The misspelled table is reported; what it is for is then known.
+        if root.has_misspelled("camera") {
+            return None;
+        }
         let issue = Issue::error(0..0, "the scene has no [camera]")
             .help("add a table [camera] with `position = [0, 1, 4]` and `look_at = [0, 1, 0]`, or with `orbiter = \"FILE\"`");
         root.context.report(issue.absence());

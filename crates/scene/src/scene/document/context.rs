@@ -116,6 +116,11 @@ impl<'a> Context<'a> {
         self.issues.borrow().iter().any(|issue| issue.severity == Severity::Error)
     }
 
+    /// The text of the file.
+    pub(super) fn file(&self) -> &str {
+        self.source.text()
+    }
+
     /// The text at a place; empty where the place is not in the text.
     pub(super) fn text(&self, span: &Range<usize>) -> &str {
         self.source.all().get(span.clone()).unwrap_or_default()

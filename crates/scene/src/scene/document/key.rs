@@ -6,7 +6,9 @@ mod file;
 
 use std::ops::{Range, RangeInclusive};
 
-use super::super::nearest::nearest;
+pub(super) use self::color::bytes_for_parts;
+
+use super::super::nearest::meant;
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
 use super::limits::Limits;
@@ -140,7 +142,8 @@ impl<'a> Key<'a> {
         } else {
             Issue::error(span, format!("`{name}` cannot be \"{shown}\"")).help(format!("expected {list}"))
         };
-        if let Some(near) = nearest(text, C::ALL.iter().map(|one| one.name())) {
+        let names: Vec<&str> = C::ALL.iter().map(|one| one.name()).collect();
+        if let Some(near) = meant(text, &names) {
             issue = issue.label(format!("did you mean \"{near}\"?"));
         }
         self.context.report(issue);

@@ -2,7 +2,7 @@
 
 use super::super::description::{ColorSource, EmissionSource, Material, MaterialKind, NormalMap};
 use super::context::Issue;
-use super::key::Key;
+use super::key::{Key, bytes_for_parts};
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
@@ -88,7 +88,14 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
     let untold = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
     let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
     let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
-    if !untold {
+    let bytes =
+        [&diffuse_key, &specular_key].into_iter().filter_map(|key| Some((key.span()?, key.of_bytes()?)));
+    let bytes: Vec<_> = bytes.collect();
+    for (span, color) in &bytes {
+        let issue = Issue::warning(span.clone(), "this material reflects more light than falls on it");
+        table.context.report(bytes_for_parts(issue, color));
+    }
+    if !untold && bytes.is_empty() {
         warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
     }
     MaterialKind::Phong {

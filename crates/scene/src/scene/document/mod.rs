@@ -4,6 +4,7 @@
 mod camera;
 mod context;
 mod environment;
+mod facing;
 mod key;
 mod lights;
 mod limits;
@@ -20,7 +21,7 @@ mod value;
 
 use std::path::{Path, PathBuf};
 
-use super::description::{Camera, Environment, Light, Scene};
+use super::description::{Camera, Environment, Integrator, Light, Scene};
 use super::source::Source;
 use super::{MAX_FILE_BYTES, Outcome, Setting, toml};
 use crate::math::Vec3;
@@ -137,6 +138,7 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
         warn_about_darkness(root.context, &scene);
+        facing::warn_about_lights(root.context, &scene);
         environment::warn_about_background(root, &scene);
     }
     Some(scene)
@@ -153,7 +155,12 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
     let emits = |index: usize| scene.materials[index].emits();
     let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
     let lights = scene.lights.iter().any(Light::sends) || scene.environment.iter().any(Environment::sends);
-    if !lights && !own_materials && !lamps && scene.render.ambient == Vec3::ZERO {
+    // `path` and photons have light of their own in its place.
+    let is_ambient = match scene.render.integrator {
+        Integrator::Whitted => scene.render.ambient != Vec3::ZERO && !scene.photons.enabled,
+        Integrator::Path => false,
+    };
+    if !lights && !own_materials && !lamps && !is_ambient {
         let help = "add a [[light]] or an [environment], give a material in use `emission`, or set `ambient` in [render]";
         context.report(Issue::warning(0..0, "nothing lights this scene").help(help));
     }

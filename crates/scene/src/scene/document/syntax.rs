@@ -13,18 +13,93 @@ use super::context::{Context, Issue};
 pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec<Range<usize>> {
     let mut lines = BTreeSet::new();
     errors.sort_by_key(|error| error.span.start);
-    let mut in_open_array = false;
+    let (mut in_open_array, mut opened) = (false, BTreeSet::new());
     for error in errors {
         let lacks_comma = error.what == MISSING_COMMA;
-        if lines.insert(context.line(error.span.start)) && !(lacks_comma && in_open_array) {
-            context.report(issue(context, error).syntax());
-        }
+        let is_new = lines.insert(context.line(error.span.start)) && !(lacks_comma && in_open_array);
         in_open_array = lacks_comma;
+        if !is_new {
+            continue;
+        }
+        match unclosed(context, &error) {
+            // All that follows up to here was taken for a part of the list.
+            Some(open) => {
+                lines.extend(context.line(open)..context.line(error.span.start));
+                opened.insert(open);
+            }
+            None => context.report(issue(context, error).syntax()),
+        }
+    }
+    // The parser takes the end of the file for the end of a list.
+    if let Some(open) = open_at_end(context.file()) {
+        lines.insert(context.line(open));
+        opened.insert(open);
+    }
+    for open in opened {
+        let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
+        context.report(issue.help("expected `]`").syntax());
     }
     lines.into_iter().map(|line| line..end_of_damage(context, line)).collect()
 }
 
 const MISSING_COMMA: &str = "missing comma between array elements";
+
+/// The place of the bracket that an error follows from, as its list is not closed: what stands in a later line is a key or
+/// a header.
+fn unclosed(context: &Context<'_>, SyntaxError { span, what, .. }: &SyntaxError) -> Option<usize> {
+    let text = context.text(&(0..span.end));
+    if what == "unclosed array" {
+        return if text[span.start..].starts_with('[') { Some(span.start) } else { bracket_before(text) };
+    }
+    let open = bracket_before(&text[..span.start])?;
+    let line = context.line_text(context.line(span.start))?.trim();
+    let is_key = line.split_once('=').is_some_and(|(key, _)| !key.contains(['[', ',', '\"', '#']));
+    let is_header = line.starts_with('[') && line.ends_with(']') && !line.contains([',', ' ']);
+    let is_later = context.line(open) < context.line(span.start);
+    (what == MISSING_COMMA && is_later && (is_key || is_header)).then_some(open)
+}
+
+/// The place of a list that the file ends in, if its last bracket is open and stands in no comment and no text.
+fn open_at_end(text: &str) -> Option<usize> {
+    let open = text.rfind('[').filter(|open| !text[*open..].contains(']'))?;
+    let line = text[..open].rsplit('\n').next().unwrap_or_default();
+    let is_value = line.contains('=') && !line.contains(['#', '"', '\'']);
+    is_value.then_some(open)
+}
+
+/// The last bracket that is open at the end of a text.
+fn bracket_before(text: &str) -> Option<usize> {
+    let mut closed = 0_usize;
+    for (at, bracket) in text.char_indices().rev().filter(|(_, c)| matches!(c, '[' | ']')) {
+        match (bracket, closed) {
+            ('[', 0) => return Some(at),
+            ('[', _) => closed -= 1,
+            (_, _) => closed += 1,
+        }
+    }
+    None
+}
+
+/// What is said of a list in one line between whose values commas are missing; `at` is where the first one is missing.
+fn with_commas(context: &Context<'_>, at: usize) -> Option<String> {
+    const LONGEST: usize = 60;
+    let before = context.text(&(0..at));
+    let open = bracket_before(before)?;
+    let line_start = before.rfind('\n').map_or(0, |end| end + 1);
+    let line = context.line_text(context.line(at))?;
+    let inner = line.get(open.checked_sub(line_start)? + 1..)?;
+    let inner = &inner[..inner.find(']')?];
+    let values: Vec<&str> =
+        inner.split([',', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect();
+    let is_plain = |value: &&str| !value.contains(['[', '{', '"', '\'', '#', '=']);
+    let list = format!("[{}]", values.join(", "));
+    if values.len() < 2 || !values.iter().all(|value| is_plain(value)) || list.len() > LONGEST {
+        return None;
+    }
+    let missing = (values.len() - 1).saturating_sub(inner.matches(',').count());
+    let words = if missing > 1 { "commas are missing" } else { "a comma is missing" };
+    Some(format!("{words}: write {list}"))
+}
 
 /// The line after the last one that suffers from an error in a line.
 fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
@@ -43,7 +118,10 @@ fn issue(context: &Context<'_>, SyntaxError { span, what, expected }: SyntaxErro
         "duplicate key" => Issue::error(span, format!("`{written}` is given twice"))
             .label("the second time")
             .help("keep one of the two; a shape's header has double brackets, such as [[sphere]]"),
-        MISSING_COMMA => error("a comma is missing").help("expected `,`, or `]` where the list ends"),
+        MISSING_COMMA => match with_commas(context, span.start) {
+            Some(words) => error(&words),
+            None => error("a comma is missing").help("expected `,`, or `]` where the list ends"),
+        },
         "unclosed array" => error("this list is not closed").help("expected `]`"),
         "unclosed table" | "unclosed array table" => {
             error("this header is not closed").help(format!("expected {expected}"))
@@ -63,7 +141,10 @@ fn issue(context: &Context<'_>, SyntaxError { span, what, expected }: SyntaxErro
         what if what.contains("recurs") => {
             error("arrays or tables are nested too deeply").help("a scene needs three levels")
         }
-        what if what.contains("must be quoted") => not_a_value(span, &written),
+        what if what.contains("must be quoted") => match with_commas(context, span.start) {
+            Some(words) => error(&words),
+            None => not_a_value(span, &written),
+        },
         what => {
             let issue = Issue::error(span, format!("this is not TOML: {what}"));
             match expected.as_str() {

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::fmt;
 use std::ops::Range;
 
-use super::super::nearest::nearest;
+use super::super::nearest::{meant, nearest};
 use super::super::sanitize::shortened;
 use super::super::toml::{Entries, KeyValue};
 use super::context::{Context, Issue};
@@ -147,7 +147,7 @@ impl<'a> Table<'a> {
         let mut meant = Vec::new();
         for KeyValue { key, span, value } in self.entries.iter().filter(|one| !known.contains(&one.key)) {
             self.context.report_with(|| {
-                let near = nearest(key, known.iter().copied());
+                let near = self.meant(key, &known);
                 meant.extend(near);
                 self.unknown(key, span, &value.item(), near)
             });
@@ -158,6 +158,22 @@ impl<'a> Table<'a> {
                 .help(format!("add a line such as `{name} = {example}`"));
             self.context.report(issue.absence());
         }
+    }
+
+    /// The key that is meant by one that nobody asked for. One that is there already is not meant.
+    fn meant(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
+        let absent = |name: &&&'static str| self.entries.get(name).is_none();
+        let unavailable = self.unavailable.borrow();
+        let is_other = |name: &&&'static str| absent(name) && !unavailable.contains(name);
+        let others: Vec<&'static str> = known.iter().filter(is_other).copied().collect();
+        meant(key, &others).or_else(|| nearest(key, known.iter().copied()))
+    }
+
+    /// Whether a table that nobody asks for is meant to be this one.
+    pub(super) fn has_misspelled(&self, name: &'static str) -> bool {
+        let is_table = |value: Value<'_>| matches!(value.item(), Item::Table(_));
+        let mut others = self.entries.iter().filter(|one| one.key != name && is_table(one.value));
+        others.any(|one| nearest(one.key, [name]).is_some())
     }
 
     fn unknown(&self, key: &str, span: Range<usize>, value: &Item<'_>, near: Option<&str>) -> Issue {

@@ -74,7 +74,13 @@ fn a_step_that_can_have_no_picture_holds_nothing_up() {
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
     let effects = desk.worker(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_some(), "the scene broke meanwhile");
+    assert!(request(&effects).is_none(), "the scene broke meanwhile: the last good one is rendered");
+    assert!(request(&show(&mut desk)).is_some(), "which is seen");
+    desk.press('l');
+    let generation = desk.state.generation;
+    let failure = protocol::Failure::Work("no memory".to_owned());
+    desk.worker(protocol::Event::Failed { generation, failure });
+    assert!(request(&desk.press('l')).is_some(), "the work failed");
     let mut desk = Desk::with(state(80, 1));
     desk.finish(RED);
     for _ in 0..3 {

@@ -237,3 +237,21 @@ fn the_folded_line_names_no_file_of_another_picture() {
     let text = desk.text();
     assert!(text.contains("→ dof.png 64.0 kB") && !text.contains("unwritten"), "{text}");
 }
+
+#[test]
+fn hints_wrap_at_the_width_of_the_panel() {
+    for (columns, rows, width) in [(80, 24, 480), (120, 40, 480), (160, 40, 480)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.finish(RED);
+        let settings = Box::new(Effective { width, height: 480, ..settings() });
+        desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
+        let panel = Layout::of(&desk.state).panel;
+        let hint = "save cornell.toml and it is rendered again";
+        assert_eq!(
+            desk.text().contains(hint),
+            usize::from(panel.width) >= hint.len(),
+            "{panel:?}\n{}",
+            desk.text()
+        );
+    }
+}

@@ -10,6 +10,9 @@ use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 
+/// How many views there are.
+const VIEWS: u16 = <View as crate::choice::Choice>::ALL.len() as u16;
+
 const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);
 
 #[test]
@@ -151,6 +154,75 @@ fn views_are_listed_and_chosen_by_digits() {
 }
 
 #[test]
+fn keys_walk_the_list_of_views_while_it_is_open_and_the_camera_else() {
+    use crate::choice::Choice;
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60), (30, 8)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.finish(RED);
+        desk.press('v');
+        let down = KeyPress::special(KeyCode::Down);
+        for (number, view) in View::ALL.iter().enumerate().skip(2) {
+            let effects = desk.key(if number % 2 == 0 { down } else { KeyPress::plain('j') });
+            let overrides = request(&effects).expect("a request").overrides.clone();
+            assert_eq!((overrides.view, overrides.camera.is_any()), (Some(*view), false));
+            let text = desk.text();
+            let is_marked = |line: &str| line.contains('▸') && line.contains(view.name());
+            assert!(text.lines().any(is_marked), "{} at {columns}×{rows}:\n{text}", view.name());
+        }
+        assert!(desk.press('j').is_empty(), "the end is the end");
+        assert_eq!(request(&desk.press('k')).and_then(|it| it.overrides.view), Some(View::Samples));
+        for key in [KeyCode::Left, KeyCode::Right, KeyCode::Up] {
+            desk.key(KeyPress::special(key));
+            assert!(!desk.state.toggles.camera.is_any(), "{key:?} belongs to the list");
+        }
+        desk.key(KeyPress::special(KeyCode::Enter));
+        assert!(!desk.text().contains('▸'), "{}", desk.text());
+        desk.press('j');
+        assert!(desk.state.toggles.camera.is_any(), "the list is closed");
+    }
+}
+
+#[test]
+fn a_view_is_found_by_its_name() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.press('v');
+    assert!(desk.press('/').is_empty());
+    desk.press('d');
+    assert_eq!(desk.state.view(), View::Depth, "the first that begins so");
+    desk.press('i');
+    assert_eq!(desk.state.view(), View::Diffuse);
+    assert!(desk.text().contains("/ di"), "{}", desk.text());
+    desk.key(KeyPress::special(KeyCode::Backspace));
+    assert_eq!(desk.state.view(), View::Depth);
+    for letter in "qqq".chars() {
+        assert!(desk.press(letter).is_empty(), "it quits nothing");
+    }
+    assert_eq!(desk.state.view(), View::Depth, "no name has these letters");
+    desk.key(KeyPress::special(KeyCode::Enter));
+    assert!(desk.state.views.is_none());
+    assert_eq!(desk.state.view(), View::Depth);
+}
+
+#[test]
+fn nothing_of_the_panel_is_cut_off_below_the_list_of_views() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    let settings = Box::new(Effective { width: 480, height: 480, ..settings() });
+    desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
+    desk.press('v');
+    let generation = desk.state.generation;
+    desk.worker(protocol::Event::Started { generation });
+    let panel = crate::tui::view::layout::Layout::of(&desk.state).panel;
+    assert!(panel.height > VIEWS, "{panel:?}");
+    let screen = desk.screen();
+    for row in panel.y + VIEWS..panel.bottom() {
+        let line: String = (panel.x..panel.right()).map(|column| screen[(column, row)].symbol()).collect();
+        assert_eq!(line.trim(), "", "row {row}");
+    }
+}
+
+#[test]
 fn the_list_of_views_goes_by_itself() {
     let mut desk = Desk::new();
     desk.finish(RED);
@@ -211,6 +283,35 @@ fn errors_lie_beside_the_picture_where_there_is_room() {
         let after = cells_of(&mut desk, RED);
         assert_eq!(after == before, is_beside, "{after} of {before} at {columns}×{rows}\n{}", desk.text());
     }
+}
+
+#[test]
+fn keys_do_not_open_errors_again_that_were_closed() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let fault = || vec![diagnostic(Severity::Error, "unknown key `heigth`")];
+    desk.fail(fault());
+    desk.key(ESCAPE);
+    desk.press('v');
+    desk.fail(fault());
+    assert!(!desk.state.pane.open, "{}", desk.text());
+    desk.fail(vec![diagnostic(Severity::Error, "another one")]);
+    assert!(desk.state.pane.open, "what is new is shown");
+}
+
+#[test]
+fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    let first = desk.press('h');
+    assert!(request(&first).is_some());
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    assert!(request(&desk.press('h')).is_none(), "the first has no picture yet");
+    let generation = desk.state.generation;
+    let picture = plain_picture(50, 38, RED);
+    let effects = desk.event(Event::Picture { generation, picture, range: None, section: None });
+    assert!(request(&effects).is_some(), "the newest step follows");
 }
 
 #[test]

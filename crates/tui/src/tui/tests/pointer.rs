@@ -362,3 +362,60 @@ fn a_digit_without_the_list_says_where_the_list_is() {
     desk.press('3');
     assert!(desk.text().contains("v lists the views"), "{}", desk.text());
 }
+
+#[test]
+fn without_an_aperture_f_refuses_at_once() {
+    let mut desk = desk();
+    desk.state.camera.as_mut().expect("a camera").aperture = 0.0;
+    assert!(desk.press('f').is_empty());
+    assert!(desk.text().contains("no `aperture`"), "{}", desk.text());
+    assert!(!desk.state.is_focusing, "the next click is no focus");
+}
+
+#[test]
+fn an_exposure_is_no_picture_of_its_own_in_the_history() {
+    let mut desk = desk();
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.finish(BLUE);
+    for color in [[1, 2, 3], [4, 5, 6], [7, 8, 9]] {
+        desk.press(']');
+        desk.finish(color);
+    }
+    assert_eq!(desk.state.renders, 2, "nor is it a run");
+    desk.press('n');
+    assert!(desk.text().contains("picture 1 of 2"), "{}", desk.text());
+    desk.press('N');
+    // A toggle is one.
+    desk.press('s');
+    desk.finish(BLUE);
+    desk.press('n');
+    assert!(desk.text().contains("picture 2 of 3"), "{}", desk.text());
+}
+
+#[test]
+fn an_older_picture_says_what_its_edit_changed() {
+    use crate::pipeline::protocol;
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    for (color, what) in [(BLUE, "line 3: radius 1 → 2"), (RED, "line 7: fov 40 → 30")] {
+        desk.event(Event::Changed(Changed { noticed: desk.now }));
+        let generation = desk.state.generation;
+        desk.worker(protocol::Event::Edited { generation, what: what.to_owned() });
+        desk.finish(color);
+    }
+    desk.press('n');
+    assert!(desk.text().contains("picture 2 of 3, 0 s ago, after line 3: radius 1 → 2"), "{}", desk.text());
+    desk.press('n');
+    assert!(
+        desk.text().contains("picture 1 of 3, 0 s ago; n older"),
+        "the first is of no edit: {}",
+        desk.text()
+    );
+    desk.press('b');
+    desk.press('b');
+    assert!(
+        desk.text().contains("before the last edit, line 7: fov 40 → 30; b is after it"),
+        "{}",
+        desk.text()
+    );
+}

@@ -39,7 +39,8 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
     match state.history.before_edit(newest) {
         Some(shown) => {
             let effects = look_at(state, shown);
-            say(state, "before the last edit; b is after it");
+            let edit = state.history.last_edit().map_or(String::new(), |what| format!(", {what}"));
+            say(state, format!("before the last edit{edit}; b is after it"));
             effects
         }
         None => told(state, "there is no picture from before an edit"),
@@ -62,10 +63,9 @@ fn newest(state: &State) -> Option<crate::tui::state::Shown> {
 fn look_at(state: &mut State, shown: crate::tui::state::Shown) -> Vec<Effect> {
     state.picture = Some(shown);
     let place = state.history.place().map_or(String::new(), |(number, count, time)| {
-        format!(
-            "picture {number} of {count}, {}; n older, N newer",
-            ago(state.now.saturating_duration_since(time))
-        )
+        let age = ago(state.now.saturating_duration_since(time));
+        let edit = state.history.edit_of_open().map_or(String::new(), |what| format!(", after {what}"));
+        format!("picture {number} of {count}, {age}{edit}; n older, N newer")
     });
     say(state, place);
     Vec::new()

@@ -8,6 +8,7 @@ mod overlay;
 mod places;
 mod pointer;
 mod rectangle;
+mod views;
 mod worker;
 
 use std::time::{Duration, Instant};
@@ -16,7 +17,7 @@ use super::ExitStatus;
 use super::event::{Effect, Event, Signal, Source, Window};
 use super::options::Changed;
 use super::preview_kind::PreviewKind;
-use super::state::{Activity, Nudge, PendingChange, Shown, State};
+use super::state::{Activity, Nudge, PendingChange, Shown, State, Toggles};
 use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{Command, Request, Writing};
@@ -112,6 +113,13 @@ fn render(state: &mut State, force: bool) -> Vec<Effect> {
         history::record(state);
     }
     state.picture = state.history.close().or_else(|| state.picture.take());
+    let before = std::mem::replace(&mut state.requested_toggles, state.toggles);
+    let now = Toggles { exposure: before.exposure, ..state.toggles };
+    state.is_exposed = before == now && before != state.toggles;
+    if state.is_exposed {
+        // The same light, shown brighter or darker.
+        state.history.go_on(state.generation);
+    }
     state.generation += 1;
     let is_moved = state.toggles.camera.is_any();
     state.moved_since = is_moved.then_some(state.moved_since.unwrap_or(state.generation));
@@ -180,7 +188,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     let (now, bars) = (state.now, state.assets.len());
     state.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
     state.dirty |= state.assets.len() != bars;
-    state.dirty |= state.views.take_if(|end| now >= *end).is_some();
+    state.dirty |= state.views.take_if(|views| now >= views.until).is_some();
     if state.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
     }

@@ -3,6 +3,7 @@
 use crossterm::event::KeyCode;
 
 use super::keys::choose_view;
+use super::views;
 use super::{history, rectangle};
 use crate::choice::Choice;
 use crate::pipeline::settings::View;
@@ -13,11 +14,18 @@ use crate::tui::view::{diagnostics, help};
 
 /// None: nothing is open that the key means something to.
 pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
+    if let Some(effects) = views::typed(state, key) {
+        return Some(effects);
+    }
     if let Some(view) = chosen(state, key) {
         state.message = None;
         return Some(choose_view(state, view));
     }
-    act(state, keymap::overlay(key)?).then(Vec::new)
+    let action = keymap::overlay(key)?;
+    if let Some(effects) = views::update(state, action) {
+        return Some(effects);
+    }
+    act(state, action).then(Vec::new)
 }
 
 /// Whether there is anything open that this means something to.
@@ -28,13 +36,15 @@ pub(super) fn act(state: &mut State, action: Overlay) -> bool {
         Overlay::LineDown => scroll(state, |line, _| line + 1),
         Overlay::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
         Overlay::PageDown => scroll(state, |line, page| line + page),
+        // They are for the list of views alone.
+        Overlay::ColumnLeft | Overlay::ColumnRight | Overlay::Take | Overlay::Find => false,
     }
 }
 
 /// The view of a digit, while the list of them is open.
 fn chosen(state: &State, key: KeyPress) -> Option<View> {
     let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
-    state.views.filter(|_| key.modifiers.is_empty())?;
+    state.views.as_ref().filter(|_| key.modifiers.is_empty())?;
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 

@@ -15,6 +15,8 @@ use crate::tui::view::preview::spot_at;
 /// Degrees that a drag over the width of the picture's area turns by.
 const TURN_ACROSS: f64 = 180.0;
 
+const IN_FOCUS: &str = "everything is in focus: the scene's camera has no `aperture`";
+
 /// What the mouse did.
 pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     match mouse.kind {
@@ -82,6 +84,10 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 
 /// First it waits for a click; asked again it takes the crosshair.
 pub(super) fn focus(state: &mut State) -> Vec<Effect> {
+    if state.viewpoint().is_some_and(|view| view.aperture == 0.0) {
+        state.is_focusing = false;
+        return told(state, IN_FOCUS);
+    }
     if state.is_mouse_on && !state.is_focusing {
         state.is_focusing = true;
         return told(
@@ -137,8 +143,9 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     if !(distance > 0.0) {
         return told(state, "there is nothing to focus on");
     }
+    // The scene may have been edited since.
     if state.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return told(state, "everything is in focus: the scene's camera has no `aperture`");
+        return told(state, IN_FOCUS);
     }
     state.toggles.camera.focus = Some(distance);
     let effects = camera::step_of_camera(state);

@@ -60,6 +60,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             state.write_failed = Some(Unwritten { why: message, generation: state.generation });
         }
         Event::Refused { conflicts, .. } => refused(state, conflicts),
+        Event::Edited { what, .. } => state.history.describe_edit(what),
         Event::WritePostponed { .. } => {
             say(state, "the image is written as soon as every pixel has a sample");
         }
@@ -87,6 +88,7 @@ fn generation(event: &Event) -> u64 {
         | Event::WriteFailed { generation, .. }
         | Event::Refused { generation, .. }
         | Event::WritePostponed { generation }
+        | Event::Edited { generation, .. }
         | Event::Files { generation, .. }
         | Event::CameraKept { generation, .. }
         | Event::Picked { generation, .. }
@@ -196,7 +198,7 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     describe(state, state.generation, &report);
     state.report = Some(report);
     state.unchanged = unchanged;
-    state.renders += u64::from(!unchanged);
+    state.renders += u64::from(!unchanged && !state.is_exposed);
     warn(state, warnings);
     history::record(state);
     if !unchanged {
@@ -232,10 +234,13 @@ fn failed(state: &mut State, failure: Failure) {
     }
 }
 
+/// What a person has seen and closed stays closed.
 fn broken(state: &mut State, problems: Problems) {
     state.activity = Activity::Broken;
-    state.problems = Some(problems);
-    state.pane = Pane { open: true, scroll: 0 };
+    if state.problems.as_ref() != Some(&problems) {
+        state.problems = Some(problems);
+        state.pane = Pane { open: true, scroll: 0 };
+    }
     state.dirty = true;
 }
 

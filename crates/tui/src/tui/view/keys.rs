@@ -12,7 +12,7 @@ use crate::scene::description::Integrator;
 use crate::scene::report::summary;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
-use crate::tui::state::{Activity, State, Toggles};
+use crate::tui::state::{Activity, State, Toggles, ViewList};
 
 /// A key, and what is said of it in full and in short.
 struct Hint {
@@ -137,8 +137,8 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         return (lines.chain(scrolling(last, &[Overlay::PageDown])).collect(), Vec::new());
     }
     let mut urgent = Vec::new();
-    if state.views.is_some() {
-        urgent.extend([Hint::new("1-9", "choose")].into_iter().chain(closing()));
+    if let Some(views) = &state.views {
+        urgent.extend(of_views(views).into_iter().chain(closing()));
     } else if state.pane.open {
         let (_, last) = super::diagnostics::extent(state);
         urgent.extend(scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing()));
@@ -182,6 +182,16 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     let others =
         KEYMAP.iter().filter(is_other).filter(is_idle).filter(is_back).map(|it| Hint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
+}
+
+/// How a view is chosen from the list, or what was typed of its name.
+fn of_views(views: &ViewList) -> Vec<Hint> {
+    match &views.name {
+        Some(name) => vec![Hint { tone: Tone::Strong, ..Hint::new("/", format!("{name}▏")) }],
+        None => [("1-9", "choose"), ("j k", "move"), ("/", "find")]
+            .map(|(key, words)| Hint::new(key, words))
+            .into(),
+    }
 }
 
 /// These have their own places in the line.

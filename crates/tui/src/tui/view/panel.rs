@@ -24,9 +24,13 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     if area.is_empty() {
         return;
     }
-    let mut lines = lines(state, area.width, true);
-    if lines.len() > usize::from(area.height) {
-        lines = self::lines(state, area.width, false);
+    let is_one_column = |lines: &[Line]| lines.len() <= usize::from(area.height);
+    let mut lines = lines(state, (area.width, area.width), true);
+    if !is_one_column(&lines) {
+        lines = self::lines(state, (area.width, area.width), false);
+    }
+    if !is_one_column(&lines) {
+        lines = self::lines(state, (area.width, area.width.min(ENTRY_WIDTH)), false);
     }
     let wanted = lines.len().div_ceil(usize::from(area.height));
     let number = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (area.width / ENTRY_WIDTH).max(1));
@@ -43,8 +47,8 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// With the reasons of stages in full, or with what fits of them beside the stages.
-fn lines(state: &State, width: u16, is_in_full: bool) -> Vec<Line> {
+/// The lines of a panel of this width, the hint wrapped to a column. With the reasons of stages in full, or with what fits of them beside the stages.
+fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Line> {
     let is_done = matches!(state.activity, Activity::Done);
     let mut lines = inspected(state, width);
     // The stages and results are not those of an older picture.
@@ -60,7 +64,7 @@ fn lines(state: &State, width: u16, is_in_full: bool) -> Vec<Line> {
     if is_done {
         lines.extend(results(state));
     }
-    lines.extend(hint(state, width));
+    lines.extend(hint(state, column));
     lines
 }
 
@@ -142,7 +146,7 @@ fn hint(state: &State, width: u16) -> Vec<Line> {
     let mut lines: Vec<String> = Vec::new();
     for word in under::hint(state).split_whitespace() {
         match lines.last_mut() {
-            Some(line) if columns(line) + 1 + columns(word) <= width.min(ENTRY_WIDTH) => {
+            Some(line) if columns(line) + 1 + columns(word) <= width => {
                 *line += &format!(" {word}");
             }
             Some(_) | None => lines.push(word.to_owned()),

@@ -21,7 +21,9 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if area.is_empty() {
         return;
     }
-    Clear.render(area, buffer);
+    // Nothing that the list cuts off stays in sight beside or below it.
+    let is_in_panel = layout.panel.intersection(area) == area;
+    Clear.render(if is_in_panel { layout.panel } else { area }, buffer);
     let (columns, rows) = (usize::from((area.width / WIDTH).max(1)), usize::from(area.height));
     // Where they do not all fit, the current one is in the middle.
     let shown = columns * rows;
@@ -32,6 +34,11 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
             Rect { x: area.x + column * WIDTH, y: area.y + row, width: WIDTH.min(area.width), height: 1 };
         line(state, number, current, place, buffer);
     }
+}
+
+/// Views of one column below each other.
+pub(in crate::tui) fn rows(state: &State) -> usize {
+    usize::from(area(&Layout::of(state)).height).max(1)
 }
 
 fn line(state: &State, number: usize, current: usize, place: Rect, buffer: &mut Buffer) {

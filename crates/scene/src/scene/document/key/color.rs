@@ -7,12 +7,14 @@ use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::Names;
-use super::super::value::{Item, limited, wrong_type};
+use super::super::value::{Item, Value, limited, whole, wrong_type};
 use super::Key;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec3};
 
 const COLOR: &str = "a colour: [r, g, b], a number, \"#rrggbb\" or a name";
+/// Nobody means a surface by such a number that reflects as many times what falls on it.
+const LEAST_BYTE: u8 = 10;
 const COLOR_OR_TEXTURE: &str =
     "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
 const EMISSION: &str =
@@ -86,11 +88,36 @@ impl Key<'_> {
             Item::Boolean(_) | Item::Datetime | Item::Array(_) | Item::Table(_) => {}
         }
         if value.array().is_some_and(|array| array.len() == 3) {
+            if let Limits::Between(..) = limits
+                && let Some(color) = self.of_bytes()
+            {
+                self.context.report(bytes_for_parts(
+                    Issue::error(value.span(), format!("`{}` must be {COLOR}", self.name)),
+                    &color,
+                ));
+                return None;
+            }
             let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
             return Some(DVec3::from_array(rgb));
         }
         wrong_type(self.context, self.name, value, expected);
         None
+    }
+
+    /// The text `#rrggbb` for three whole numbers up to 255 of which one is too large for a part of the light.
+    pub(in super::super) fn of_bytes(&self) -> Option<String> {
+        let byte = |value: Value<'_>| match value.item() {
+            Item::Integer { digits, radix } => u8::try_from(whole(digits, radix)?).ok(),
+            Item::String(_)
+            | Item::Float(_)
+            | Item::Boolean(_)
+            | Item::Datetime
+            | Item::Array(_)
+            | Item::Table(_) => None,
+        };
+        let bytes: Vec<u8> = self.value?.array()?.iter().map(byte).collect::<Option<_>>()?;
+        let is_meant = bytes.len() == 3 && bytes.iter().any(|byte| *byte >= LEAST_BYTE);
+        is_meant.then(|| bytes.iter().fold("#".to_owned(), |text, byte| format!("{text}{byte:02x}")))
     }
 
     /// `#rrggbb`, or a name in any case, decoded from sRGB.
@@ -113,6 +140,11 @@ impl Key<'_> {
         self.context.report(issue);
         None
     }
+}
+
+/// Says which text means the numbers from 0 to 255.
+pub(in super::super) fn bytes_for_parts(issue: Issue, color: &str) -> Issue {
+    issue.label("this looks like 0–255").help(format!("write \"{color}\"; parts of the light go from 0 to 1"))
 }
 
 /// The names of colours, in small letters (CSS Color Module Level 4, 6.1).

@@ -1,0 +1,21 @@
+//! Characters that a terminal shows as they are.
+
+/// Whether a terminal shows this character as itself, in its place: no control, nothing invisible, nothing that turns
+/// the direction of writing.
+pub fn is_plain(c: char) -> bool {
+    !matches!(c,
+        '\0'..='\u{1f}'
+        | '\u{7f}'..='\u{9f}'           // DEL and C1
+        | '\u{ad}'                      // soft hyphen
+        | '\u{61c}'                     // Arabic letter mark
+        | '\u{115f}' | '\u{1160}'       // Hangul fillers
+        | '\u{180e}'                    // Mongolian vowel separator
+        | '\u{200b}'..='\u{200f}'       // zero width, direction marks
+        | '\u{2028}'..='\u{202e}'       // line and paragraph separators, embeddings, overrides
+        | '\u{2060}'..='\u{206f}'       // word joiner, isolates, deprecated marks
+        | '\u{3164}' | '\u{ffa0}'       // more fillers
+        | '\u{feff}'                    // byte order mark
+        | '\u{fff9}'..='\u{fffb}'       // interlinear annotations
+        | '\u{e0000}'..='\u{e0fff}'     // tags, variation selectors
+    )
+}

@@ -1,0 +1,88 @@
+//! Keys of the list of views, while it is open: they walk it, find a name and close it.
+
+use crossterm::event::{KeyCode, KeyModifiers};
+
+use super::keys::choose_view;
+use crate::choice::Choice;
+use crate::pipeline::settings::View;
+use crate::tui::event::{Effect, KeyPress};
+use crate::tui::keymap::Overlay;
+use crate::tui::state::State;
+use crate::tui::view::views::rows;
+
+/// What a key of the tables does to the list; `None` if it is closed, or covered by the help.
+pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> {
+    if state.views.is_none() || state.help.open {
+        return None;
+    }
+    let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
+    let last = View::ALL.len() - 1;
+    let column = rows(state);
+    let chosen = match action {
+        Overlay::LineUp => current.saturating_sub(1),
+        Overlay::LineDown => (current + 1).min(last),
+        Overlay::ColumnLeft => current.checked_sub(column).unwrap_or(current),
+        Overlay::ColumnRight if current + column <= last => current + column,
+        Overlay::ColumnRight => current,
+        Overlay::PageUp => 0,
+        Overlay::PageDown => last,
+        Overlay::Find => {
+            look_for(state, String::new());
+            return Some(Vec::new());
+        }
+        Overlay::Take => {
+            close(state);
+            return Some(Vec::new());
+        }
+        Overlay::Close => return None,
+    };
+    Some(choose(state, View::ALL[chosen]))
+}
+
+/// What a key types while a name is looked for; `None` if none is.
+pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
+    let mut name = state.views.as_ref().filter(|_| !state.help.open)?.name.clone()?;
+    let is_held = key.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT);
+    match key.code {
+        KeyCode::Char(letter) if !is_held => name.extend(letter.to_lowercase()),
+        KeyCode::Backspace => drop(name.pop()),
+        KeyCode::Enter | KeyCode::Esc => {
+            close(state);
+            return Some(Vec::new());
+        }
+        _ => return None,
+    }
+    let found = found(&name);
+    look_for(state, name);
+    Some(found.map_or_else(Vec::new, |view| choose(state, view)))
+}
+
+/// The first view whose name begins with this, else the first that has it anywhere.
+fn found(name: &str) -> Option<View> {
+    let begins = |view: &&View| view.name().starts_with(name);
+    let has = |view: &&View| view.name().contains(name);
+    let all = || View::ALL.iter().filter(|_| !name.is_empty());
+    all().find(begins).or_else(|| all().find(has)).copied()
+}
+
+fn look_for(state: &mut State, name: String) {
+    state.list_views();
+    if let Some(views) = &mut state.views {
+        views.name = Some(name);
+    }
+}
+
+fn close(state: &mut State) {
+    state.views = None;
+    state.dirty = true;
+}
+
+/// The view that stands already is not rendered again.
+fn choose(state: &mut State, view: View) -> Vec<Effect> {
+    state.list_views();
+    if view == state.view() {
+        return Vec::new();
+    }
+    state.message = None;
+    choose_view(state, view)
+}

@@ -1,0 +1,65 @@
+//! All JSON and XML that glimt writes: valid, and without a character that a terminal would act on or not show.
+
+use serde_json::Value;
+
+use super::desk::{Desk, SCENE};
+
+/// C1, DEL, a turn of the writing's direction, a joiner, a tag above the basic plane, an umlaut.
+const NAME: &str = "a\u{9b}31m\u{7f}\u{202e}b\u{200d}c\u{e0041}ä\u{1}.toml";
+
+#[track_caller]
+fn harmless(bytes: &[u8]) -> &str {
+    let text = std::str::from_utf8(bytes).expect("UTF-8");
+    let harmful =
+        |c: &char| (c.is_control() && *c != '\n') || matches!(c, '\u{200d}' | '\u{202e}' | '\u{e0041}');
+    assert_eq!(text.chars().find(harmful), None, "{text:?}");
+    text
+}
+
+#[track_caller]
+fn object(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+fn run(desk: &Desk, arguments: &[&str]) -> std::process::Output {
+    let output = desk.glimt("").args(arguments).output().expect("it runs");
+    assert!(output.status.success(), "{arguments:?}: {:?}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+#[test]
+fn every_json_is_valid_and_harmless() {
+    let desk = Desk::new();
+    desk.write(NAME, SCENE);
+    let output = run(&desk, &[NAME, "--once", "--report", "-", "--progress", "json"]);
+    let report = object(harmless(&output.stdout));
+    assert_eq!(report["scene"], NAME);
+    assert!(harmless(&output.stdout).contains('ä'), "what is harmless is written as it is");
+    let events: Vec<Value> = harmless(&output.stderr).lines().map(object).collect();
+    let written = events.iter().find(|event| event["event"] == "written").expect("a picture");
+    let picture = NAME.replace(".toml", ".png");
+    assert_eq!(written["path"], picture);
+
+    run(&desk, &[NAME, "--once", "--report", "r.json"]);
+    assert_eq!(object(harmless(&desk.bytes("r.json")))["scene"], NAME);
+
+    let output = run(&desk, &["compare", "--json", &picture, &picture]);
+    assert_eq!(object(harmless(&output.stdout))["a"], picture);
+}
+
+#[test]
+fn what_bench_writes_of_an_odd_name_is_json_and_xml() {
+    let desk = Desk::new();
+    desk.write(NAME, SCENE);
+    let line = "--samples 1 --reference-samples 8 --seeds 1 --integrator path --width 8 --no-cache \
+                --progress json --json a.json --plot a.svg";
+    let arguments: Vec<&str> = ["bench", NAME].into_iter().chain(line.split_whitespace()).collect();
+    let output = run(&desk, &arguments);
+    harmless(&output.stderr).lines().for_each(|line| drop(object(line)));
+    assert_eq!(object(harmless(&desk.bytes("a.json")))["scenes"][0]["scene"], NAME);
+    let plot = desk.bytes("a.svg");
+    let document = roxmltree::Document::parse(harmless(&plot)).expect("XML");
+    let is_named =
+        |node: roxmltree::Node<'_, '_>| node.text().is_some_and(|text| text.contains("ä␁.toml, 8×"));
+    assert!(document.descendants().any(is_named), "the name is there, with stand-ins");
+}

@@ -1,0 +1,150 @@
+//! What a write leaves as it is: files that glimt did not write, and what a file has besides its bytes.
+
+use std::fs;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::Path;
+
+use super::desk::Desk;
+
+/// A file of somebody else whose name has the ending of a report.
+const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
+/// A render that would take for ever.
+const ENDLESS: &str = "--once --samples 4000000 --width 4000";
+/// A measurement that would take for ever, but for what it says before.
+const LONG: &str = "--samples 4000000 --reference-samples 4000000 --progress none";
+/// A short one.
+const SHORT: &str =
+    "--samples 1 --reference-samples 8 --seeds 1 --integrator path --width 8 --no-cache --progress none";
+
+#[test]
+fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
+    let desk = Desk::new();
+    for foreign in [PACKAGE, "[1, 2]", "{}", "{\"glimt\": \"0.1.0\", \"scene\": \"a\"", "text"] {
+        desk.write("package.json", foreign);
+        let stderr = desk.expect(&format!("ball.toml {ENDLESS} --report package.json"), 2);
+        assert!(
+            stderr
+                .contains("cannot write package.json: there is a file of this name that glimt did not write")
+                && stderr.contains("--force replaces it"),
+            "{stderr}"
+        );
+        assert_eq!(desk.bytes("package.json"), foreign.as_bytes());
+    }
+    desk.expect("ball.toml --once --report package.json --force", 0);
+    let report: serde_json::Value = serde_json::from_slice(&desk.bytes("package.json")).expect("JSON");
+    // Its own, as it is, with other keys, sorted and in one line, and an empty file are replaced without asking.
+    let older = serde_json::json!({ "glimt": "0.0.1", "scene": "a.toml", "seconds": 1.5, "stages": [] });
+    let all = [report.to_string(), older.to_string(), String::new()];
+    for own in all {
+        desk.write("package.json", own);
+        desk.expect("ball.toml --once --report package.json", 0);
+    }
+    desk.expect("ball.toml --once --report /dev/null", 0);
+    let output = desk.run("ball.toml --once --report -");
+    serde_json::from_slice::<serde_json::Value>(&output.stdout).expect("a report on stdout");
+}
+
+#[test]
+fn force_replaces_no_input() {
+    let desk = Desk::new();
+    let stderr = desk.expect(&format!("ball.toml {ENDLESS} --report ball.toml --force"), 2);
+    assert!(stderr.contains("it is the scene file"), "{stderr}");
+    desk.write("ball.png", "a photograph");
+    let stderr = desk.expect(&format!("ball.toml {ENDLESS}"), 2);
+    assert!(stderr.contains("--force replaces it"), "{stderr}");
+    desk.expect("ball.toml --once --force", 0);
+    assert!(desk.bytes("ball.png").starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
+    let desk = Desk::new();
+    let bench = |line: &str, code: i32| {
+        let output = desk.run(&format!("bench ball.toml {line}"));
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
+        stderr
+    };
+    let files = [
+        ("--json", "a.json", PACKAGE),
+        ("--csv", "a.csv", "name,age\nsomebody,3\n"),
+        ("--plot", "a.svg", "<svg width=\"8\" height=\"8\" xmlns=\"http://www.w3.org/2000/svg\"/>\n"),
+    ];
+    for (option, name, foreign) in files {
+        desk.write(name, foreign);
+        let stderr = bench(&format!("{LONG} {option} {name}"), 2);
+        let expected = format!(
+            "error: cannot write {name}: there is a file of this name that glimt did not write; \
+             name another file with {option} FILE, or --force replaces it\n"
+        );
+        assert_eq!(stderr, expected);
+        assert_eq!(desk.bytes(name), foreign.as_bytes());
+    }
+    let all = "--json a.json --csv a.csv --plot a.svg";
+    bench(&format!("{SHORT} {all} --force"), 0);
+    bench(&format!("{SHORT} {all}"), 0);
+    // A plot of a version that did not sign it.
+    let plot = String::from_utf8(desk.bytes("a.svg")).expect("UTF-8");
+    let (start, rest) = plot.split_once("<desc>").expect("a signature");
+    let (_, end) = rest.split_once("</desc>").expect("its end");
+    desk.write("a.svg", format!("{start}{end}"));
+    desk.write("a.csv", "");
+    bench(&format!("{SHORT} {all}"), 0);
+}
+
+/// A list as the kernel keeps it (posix_acl_xattr.h): rights of the owner, of user 4321, of the group, of all whom
+/// the mask limits, of others.
+fn access_list(named: u8, group: u8, mask: u8) -> Vec<u8> {
+    const NOBODY: u32 = u32::MAX;
+    let entries =
+        [(1_u16, 6, NOBODY), (2, named, 4321), (4, group, NOBODY), (16, mask, NOBODY), (32, 0, NOBODY)];
+    let entries = entries.into_iter().flat_map(|(tag, rights, id)| {
+        [tag.to_le_bytes().to_vec(), u16::from(rights).to_le_bytes().to_vec(), id.to_le_bytes().to_vec()]
+            .concat()
+    });
+    2_u32.to_le_bytes().into_iter().chain(entries).collect()
+}
+
+const ACCESS: &str = "system.posix_acl_access";
+
+fn attribute(path: &Path, name: &str) -> Option<Vec<u8>> {
+    xattr::get(path, name).expect("attributes")
+}
+
+#[test]
+fn a_picture_keeps_the_access_list_and_the_attributes_of_the_file_that_it_replaces() {
+    let desk = Desk::new();
+    desk.expect("ball.toml --once -o a.png --report a.json", 0);
+    for name in ["a.png", "a.json"] {
+        let path = desk.path(name);
+        // A file system without them has nothing to lose.
+        if xattr::set(&path, "user.note", b"mine").is_err() {
+            return;
+        }
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("permitted");
+        xattr::set(&path, ACCESS, &access_list(6, 0, 6)).expect("a list");
+    }
+    desk.expect("ball.toml --once -o a.png --report a.json --seed 3", 0);
+    for name in ["a.png", "a.json"] {
+        let path = desk.path(name);
+        assert_eq!(attribute(&path, "user.note").as_deref(), Some(b"mine".as_slice()), "{name}");
+        assert_eq!(attribute(&path, ACCESS), Some(access_list(6, 0, 6)), "{name}");
+        // With a list, these are the mask: without it, they would be rights of the group.
+        assert_eq!(fs::metadata(&path).expect("a file").mode() & 0o777, 0o660, "{name}");
+    }
+}
+
+#[test]
+fn a_folder_s_default_list_gives_a_replaced_file_no_more_rights_than_it_had() {
+    let desk = Desk::new();
+    desk.expect("ball.toml --once -o a.png", 0);
+    fs::set_permissions(desk.path("a.png"), fs::Permissions::from_mode(0o640)).expect("permitted");
+    if xattr::set(desk.0.path(), "system.posix_acl_default", &access_list(6, 4, 6)).is_err() {
+        return;
+    }
+    desk.expect("ball.toml --once -o a.png --seed 3", 0);
+    assert_eq!(attribute(&desk.path("a.png"), ACCESS), None);
+    assert_eq!(fs::metadata(desk.path("a.png")).expect("a file").mode() & 0o777, 0o640);
+    desk.expect("ball.toml --once -o new.png", 0);
+    assert!(attribute(&desk.path("new.png"), ACCESS).is_some(), "a new file has the folder's");
+}
