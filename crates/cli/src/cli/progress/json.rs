@@ -6,7 +6,7 @@
 //! | `asset` | `name`, `fraction` |
 //! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
 //! | `written` | `path`, `bytes` |
-//! | `write_failed` | `message`: the report could not be written |
+//! | `write_failed` | `message`: the report, or one of several pictures, could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
 //! | `cancelled` | |

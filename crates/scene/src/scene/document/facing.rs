@@ -46,7 +46,7 @@ fn furthest(shape: &Shape, direction: DVec3) -> f64 {
     let most = |places: &[DVec3]| places.iter().copied().map(along).fold(f64::NEG_INFINITY, f64::max);
     // The part of a circle's radius around an axis that lies along the direction.
     let round = |axis: DVec3, radius: f64| {
-        let cosine = axis.try_normalize().map_or(0.0, |axis| along(axis));
+        let cosine = axis.try_normalize().map_or(0.0, along);
         radius * (1.0 - cosine * cosine).max(0.0).sqrt()
     };
     match *shape {

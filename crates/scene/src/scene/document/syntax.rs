@@ -93,7 +93,7 @@ fn with_commas(context: &Context<'_>, at: usize) -> Option<String> {
         inner.split([',', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect();
     let is_plain = |value: &&str| !value.contains(['[', '{', '"', '\'', '#', '=']);
     let list = format!("[{}]", values.join(", "));
-    if values.len() < 2 || !values.iter().all(|value| is_plain(value)) || list.len() > LONGEST {
+    if values.len() < 2 || !values.iter().all(is_plain) || list.len() > LONGEST {
         return None;
     }
     let missing = (values.len() - 1).saturating_sub(inner.matches(',').count());
