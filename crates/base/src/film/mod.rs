@@ -18,7 +18,7 @@ pub mod stretch;
 mod sums;
 pub mod tone;
 
-pub use noise::{Convergence, HalfNoise, samples_by};
+pub use noise::{Convergence, HalfNoise, PictureNoise, samples_by};
 pub use part::{Part, Pixels};
 pub use preview::Previewer;
 pub use quantity::Quantity;

@@ -1,6 +1,6 @@
 //! What a picture is made of: the samples' mean, or numbers about the samples.
 
-use super::noise::Convergence;
+use super::noise::{Convergence, pixel_variance};
 use super::sums::Tile;
 use crate::math::DVec3;
 
@@ -50,7 +50,8 @@ impl Tile {
             }
         }
         let variance = if count > 1 && pixels > 0 {
-            convergence.pixel_variance(sum / f64::from(pixels), count)
+            let rate = convergence.rate(&self.steps, count.ilog2() as usize, &[0, 1]);
+            pixel_variance(sum / f64::from(pixels), count, rate)
         } else {
             0.0
         };
@@ -81,8 +82,7 @@ mod tests {
             let errors = film(count, |_| next()).image(Quantity::Error).pixels;
             let exact = (1.0 / 12.0 / f64::from(count)).sqrt();
             let mean = (errors.iter().map(|error| f64::from(error.x).powi(2)).sum::<f64>() / 400.0).sqrt();
-            // By the last step alone: 0.77 times the truth of independent samples, by the rate that is taken.
-            assert!((0.67..0.87).contains(&(mean / exact)), "{count}: {mean} {exact}");
+            assert!((0.9..1.15).contains(&(mean / exact)), "{count}: {mean} {exact}");
             let spread = errors.iter().filter(|error| f64::from(error.x) < 0.25 * exact).count();
             assert!(spread < 20, "{count}: {spread} pixels are told to be far better than they are");
         }

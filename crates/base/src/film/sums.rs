@@ -144,9 +144,8 @@ impl Tile {
         let mut non_finite = 0;
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
-            // Up to where the count is a power of two, where the step from the last one is noted.
-            let count = self.counts[index];
-            let left = ((u64::from(count) + 1).next_power_of_two() - u64::from(count)) as usize;
+            // Up to the next count at which the mean is noted.
+            let left = Steps::samples_to_next(self.counts[index]);
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
                 None => add_up(&mut self.sums[index], &radiances[part.clone()]),
@@ -432,8 +431,8 @@ fn rings(crop: Rect) -> Vec<usize> {
     places.into_iter().map(|(_, _, tile)| tile).collect()
 }
 
-/// Of one pixel's sum, last mean and count.
-const SUM_BYTES: usize = size_of::<DVec3>() + size_of::<f64>() + size_of::<f32>() + size_of::<u32>();
+/// Of one pixel's sum, count, last two noted means and last step.
+const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
 /// For the sums of the crop, and for the whole picture as radiance and as sRGB.
 fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {

@@ -239,6 +239,9 @@ fn broken(text: &str, columns: Option<usize>) -> Vec<String> {
     columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
 }
 
+/// A bias over its standard error from which on noise is no explanation: chance gives it once in a million times.
+const FAR_BEYOND_NOISE: f64 = 5.0;
+
 /// Name, value, unit, and what it is of.
 fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
     let pixels = u64::from(summary.width) * u64::from(summary.height);
@@ -262,8 +265,8 @@ fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, Strin
         rows.push(("bias", signed(bias), "", format!("linear: mean(a - b)/mean(b); {noise}")));
     }
     if let Some(z) = summary.bias_z {
-        let note = "bias over its standard error: far beyond 3, it is no noise";
-        rows.push(("bias, z", format!("{z:.2}"), "", note.to_owned()));
+        let verdict = if z.abs() > FAR_BEYOND_NOISE { ": far beyond 3, it is no noise" } else { "" };
+        rows.push(("bias, z", format!("{z:.2}"), "", format!("bias over its standard error{verdict}")));
     }
     rows
 }
@@ -292,9 +295,8 @@ fn decibels(value: f64) -> String {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_table_is_as_wide_as_the_terminal_and_breaks_between_words() {
-        let summary = Summary {
+    fn summary() -> Summary<'static> {
+        Summary {
             a: "a/long/name/of/a/folder/picture.png".to_owned(),
             b: "a/long/name/of/a/folder/reference.png".to_owned(),
             width: 256,
@@ -313,7 +315,12 @@ mod tests {
             bias_z: Some(0.5),
             max_relmse: None,
             is_within: true,
-        };
+        }
+    }
+
+    #[test]
+    fn a_table_is_as_wide_as_the_terminal_and_breaks_between_words() {
+        let summary = summary();
         let words =
             |lines: &[String]| lines.join(" ").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
         let whole = table(&summary, None);
@@ -323,6 +330,15 @@ mod tests {
             let widest = lines.iter().map(|line| line.chars().count()).max();
             assert!(widest.is_some_and(|widest| widest <= columns), "{columns}: {lines:#?}");
             assert_eq!(words(&lines), words(&whole), "{columns}");
+        }
+    }
+
+    #[test]
+    fn a_bias_that_chance_explains_is_not_said_to_be_none() {
+        for (z, is_far) in [(0.5, false), (-3.5, false), (5.5, true), (-40.0, true)] {
+            let lines = table(&Summary { bias_z: Some(z), ..summary() }, None);
+            let line = lines.iter().find(|line| line.contains("bias, z")).expect("a line");
+            assert_eq!(line.contains("far beyond 3"), is_far, "{line}");
         }
     }
 

@@ -1,4 +1,5 @@
-//! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP.
+//! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP. Negative values stay, which a filter with negative lobes makes:
+//! without them dark noise would be too bright on average.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -14,7 +15,7 @@ use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, 
 use rayon::prelude::*;
 
 use super::stoppable::Stoppable;
-use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_light, one_line};
+use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_finite, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
@@ -40,7 +41,7 @@ pub(super) fn encode(
     let size = (image.width as usize, image.height as usize);
     let pixel = |position: Vec2<usize>| {
         let color = image.pixels[position.y() * size.0 + position.x()];
-        (as_light(color.x), as_light(color.y), as_light(color.z))
+        (as_finite(color.x), as_finite(color.y), as_finite(color.z))
     };
     let channels = SpecificChannels::rgb(pixel);
     let layer = Layer::new(size, attributes(options), Encoding::SMALL_LOSSLESS, channels);

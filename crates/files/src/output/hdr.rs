@@ -1,7 +1,7 @@
 //! Radiance HDR: G. Ward, "Real Pixels" (Graphics Gems II, 1991): three mantissas and a shared exponent, lines
-//! compressed by runs.
+//! compressed by runs. There are no negative values in it.
 
-use super::{EncodeOptions, OutputError, SOFTWARE, as_light, one_line};
+use super::{EncodeOptions, OutputError, SOFTWARE, as_finite, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
@@ -46,7 +46,7 @@ fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
 
 /// Mantissas rounded to the nearest, so that what is read is as often brighter as darker.
 fn rgbe(color: Vec3) -> [u8; 4] {
-    let color = color.to_array().map(|component| f64::from(as_light(component)));
+    let color = color.to_array().map(|component| f64::from(as_finite(component).max(0.0)));
     let brightest = color[0].max(color[1]).max(color[2]);
     // 2^(exponent − 1) ≤ brightest < 2^exponent, one more where the mantissa would be rounded up to 256.
     let mut exponent = libm::log2(brightest).floor() + 1.0;

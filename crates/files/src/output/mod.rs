@@ -115,9 +115,9 @@ pub fn check_place(path: &Path) -> Result<(), OutputError> {
     place::check(path)
 }
 
-/// A component as float files hold it: the light of a picture is neither negative nor infinite.
-fn as_light(component: f32) -> f32 {
-    if component.is_nan() || component < 0.0 { 0.0 } else { component.min(f32::MAX) }
+/// A component as files hold it that know no infinity.
+fn as_finite(component: f32) -> f32 {
+    if component.is_nan() { 0.0 } else { component.clamp(-f32::MAX, f32::MAX) }
 }
 
 /// A name or value as a line of a text header can hold it.

@@ -144,15 +144,19 @@ fn exr_keeps_the_error_of_its_mean_luminance() {
 }
 
 #[test]
-fn what_is_no_light_never_reaches_a_float_file() {
+fn exr_keeps_what_is_negative_and_no_other_format_does() {
     let pixels = vec![Vec3::new(f32::NAN, -1.0, f32::NEG_INFINITY), Vec3::new(f32::INFINITY, 1.0, -1e-45)];
     let image = RadianceImage { width: 2, height: 1, pixels };
     let bytes = encode(&image, &EncodeOptions::default(), Format::Exr).expect("an EXR");
-    assert_eq!(read_exr(&bytes).1, [Vec3::ZERO, Vec3::new(f32::MAX, 1.0, 0.0)]);
+    assert_eq!(read_exr(&bytes).1, [Vec3::new(0.0, -1.0, -f32::MAX), Vec3::new(f32::MAX, 1.0, -1e-45)]);
     let bytes = encode(&image, &EncodeOptions::default(), Format::Hdr).expect("an HDR");
     let decoded = decode(&bytes, image::ImageFormat::Hdr).into_rgb32f().into_raw();
     assert_eq!(decoded[..3], [0.0; 3]);
     assert!(decoded[3] > 1e38 && decoded.iter().all(|v| v.is_finite() && *v >= 0.0), "{decoded:?}");
+    for depth in [BitDepth::Eight, BitDepth::Sixteen] {
+        let bytes = encode(&image, &options(depth), Format::Png).expect("a PNG");
+        assert_eq!(decode(&bytes, image::ImageFormat::Png).into_rgb16().into_raw()[..3], [0; 3], "{depth:?}");
+    }
 }
 
 #[test]

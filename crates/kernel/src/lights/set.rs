@@ -178,6 +178,14 @@ impl Lights {
         self.environment.as_ref().map(|(_, environment)| environment)
     }
 
+    /// Solid angle in sr of the widest light from beyond the scene; 0 where there is none that has an extent.
+    pub fn extent_beyond(&self) -> f32 {
+        match self.environment {
+            Some(_) => 4.0 * std::f32::consts::PI,
+            None => self.suns.iter().map(|(_, sun)| sun.inverse_density()).fold(0.0, f32::max),
+        }
+    }
+
     /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by its number and
     /// the density in sr⁻¹ of its samples from there.
     pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {

@@ -32,6 +32,14 @@ impl Others {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
 
+    /// Whether these are rays in glossy lobes.
+    pub(super) fn are_lobes(self) -> bool {
+        match self {
+            Self::Nothing | Self::Paths => false,
+            Self::Lobes(_) => true,
+        }
+    }
+
     /// Rays by the BSDF for each of so many samples of a light.
     #[inline(always)]
     pub(super) fn to_each(self, count: u32) -> f32 {

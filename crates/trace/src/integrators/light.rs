@@ -128,7 +128,13 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                         sums.rays.lookups += u64::from(active.count_ones());
                     }
                     if WEIGHED {
-                        let of_light = light.inverse_densities(&samples);
+                        let leaves_gloss = self.shot.lobes_find_sky && light.is_from_all_around();
+                        let of_light = if leaves_gloss && self.others.are_lobes() {
+                            // As if light samples hardly ever came: lobes bring all.
+                            [f32::MAX; LANES]
+                        } else {
+                            light.inverse_densities(&samples)
+                        };
                         let others = self.others.to_each(count);
                         values = self.others.left(self.row, &samples, values, (&of_light, others));
                     }

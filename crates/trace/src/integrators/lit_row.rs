@@ -75,8 +75,11 @@ pub struct LitRow {
 pub(super) const UNBENT: f32 = -2.0;
 
 impl LitRow {
-    /// The least α of lobes that are worth rays of their own.
+    /// The least α of lobes that are worth rays of their own whatever lights them.
     const SHARP: f32 = 100.0;
+
+    /// Lobes are worth them too in which light from beyond the scene is so many times as wide as the lobe.
+    const FILLED: f32 = 1.5;
 
     /// A bit for each vertex whose highlights of lamps samples of the lamps alone would find too seldom.
     pub(super) fn sharp(&self, shot: &Shot<'_>, measure: Measure) -> u32 {
@@ -89,7 +92,10 @@ impl LitRow {
         if !(self.is_glossy && shows && is_soft && shot.world.lights.can_be_found()) {
             return 0;
         }
-        let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= Self::SHARP;
+        // A lobe is about as wide as 2π/(α + 1) sr.
+        let filled = Self::FILLED * std::f32::consts::TAU / shot.world.lights.extent_beyond() - 1.0;
+        let least = filled.min(Self::SHARP);
+        let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= least;
         lanes(self.used).filter(is_sharp).fold(0, |sharp, i| sharp | 1 << i)
     }
 

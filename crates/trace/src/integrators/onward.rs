@@ -203,9 +203,11 @@ impl Shot<'_> {
         self.shared_beyond(sky, &path.ray, path.history.normal, share)
     }
 
-    /// [`Shot::lamp_radiance`] of a ray that leaves the scene.
+    /// [`Shot::lamp_radiance`] of a ray in a glossy lobe that leaves the scene.
     pub fn radiance_beyond(&self, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
         let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
+        // No light sample brings what lobes reflect of it.
+        let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
         self.shared_beyond(sky, ray, normal, |of_light| weight(of_light / density))
     }
 

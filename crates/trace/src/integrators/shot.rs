@@ -30,6 +30,8 @@ pub struct Shot<'a> {
     /// Whether paths find light that is the same from all around without samples of it: the ray that goes on anyway is as good as
     /// one of those, or better, as nothing but what is in its way tells one direction from the other.
     pub leaves_sky: bool,
+    /// The same of rays in glossy lobes and the light that these reflect.
+    pub lobes_find_sky: bool,
 }
 
 impl<'a> Shot<'a> {
@@ -54,7 +56,8 @@ impl<'a> Shot<'a> {
             && render.shadow_samples == 1
             && render.clamp == 0.0
             && world.lights.tree().is_none();
-        Self { world, settings, block, token, pixel_spread, photons: None, leaves_sky }
+        let lobes_find_sky = is_even && world.lights.tree().is_none();
+        Self { world, settings, block, token, pixel_spread, photons: None, leaves_sky, lobes_find_sky }
     }
 
     /// The random numbers of a slot.

@@ -173,7 +173,7 @@ impl Aim {
         if !(relative > 0.0) {
             return noise.samples;
         }
-        self.convergence.samples_to(AIM * self.error / relative, noise.samples).min(MOST)
+        samples_by(noise.power, AIM * self.error / relative, noise.samples).min(MOST)
     }
 
     /// Noise over the brightness that it is held against.
@@ -204,17 +204,17 @@ impl Way {
             return Self {
                 samples,
                 doublings,
-                fall: Some(libm::exp2(convergence.power())),
-                power: convergence.power(),
+                fall: Some(libm::exp2(convergence.usual_power())),
+                power: convergence.usual_power(),
             };
         }
         if samples < LEAST {
-            return Self { samples, doublings, fall: None, power: convergence.power() };
+            return Self { samples, doublings, fall: None, power: convergence.usual_power() };
         }
         falls.sort_by(f64::total_cmp);
-        let usual = libm::exp2(convergence.power());
+        let usual = libm::exp2(convergence.usual_power());
         let fall = falls.get(falls.len() / 2).map_or(usual, |fall| fall.clamp(FALLS[0], FALLS[1]));
-        Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.power()) }
+        Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.usual_power()) }
     }
 
     /// Samples that bring the noise of a tile to a bound, where its variance fell so by its last doubling.
@@ -278,8 +278,8 @@ mod tests {
 
     #[test]
     fn what_is_within_twice_the_samples_is_decided_and_more_is_asked_for_again() {
-        // A standard error of sqrt(1/12/16) = 0.072, by the estimate some 0.72 of it.
-        let goals = judged([(1.0, 1.0); 2], 16, 0.05);
+        // A standard error of sqrt(1/12/16) = 0.072, which 25 samples bring to the aim.
+        let goals = judged([(1.0, 1.0); 2], 16, 0.07);
         assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
         assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
     }
@@ -298,7 +298,7 @@ mod tests {
 
     #[test]
     fn how_noise_fell_of_late_tells_how_it_will_fall() {
-        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.power());
+        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.usual_power());
         let of = |falls: &[f64]| Way::of(stratified, falls.to_vec(), 64);
         for (falls, fall, power) in [
             (vec![], libm::exp2(usual), usual),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::super::pace::Work;
 use super::super::protocol::NoiseProgress;
 use super::adaptive::LEAST;
-use crate::film::Film;
+use crate::film::{Film, PictureNoise};
 
 /// Before that nobody reads it, and afterwards it is told as seldom: it is the sum of all pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
@@ -17,7 +17,7 @@ const STEP: f64 = 1.5;
 pub(super) struct Outlook {
     due: Instant,
     /// And the work that was done.
-    told: Option<(f64, f64)>,
+    told: Option<(PictureNoise, f64)>,
 }
 
 impl Outlook {
@@ -30,20 +30,17 @@ impl Outlook {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
-        self.told = film.relative_error().map(|noise| (noise, done));
+        self.told = film.noise().map(|noise| (noise, done));
         self.due = Instant::now() + INTERVAL;
     }
 
     /// What is to be expected, where something was told.
-    pub(super) fn at(&self, film: &Film, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
-        let (noise, done) = self.told.filter(|(_, done)| *done > 0.0)?;
-        Some(expected(noise * fall(film, work.done / done), work, rate, |part| fall(film, part)))
+    pub(super) fn at(&self, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
+        let (PictureNoise { relative_error, power }, done) = self.told.filter(|(_, done)| *done > 0.0)?;
+        // The part of the noise that so many times the samples leave.
+        let fall = |times: f64| libm::pow(times, -0.5 * power);
+        Some(expected(relative_error * fall(work.done / done), work, rate, fall))
     }
-}
-
-/// The part of the noise that so many times the samples leave.
-fn fall(film: &Film, times: f64) -> f64 {
-    libm::pow(times, -0.5 * film.convergence().power())
 }
 
 /// The noise now, the next round level below it, or what it will be in the end where that comes first, and when, by work a second.

@@ -364,7 +364,7 @@ impl<'a> Painter<'a> {
             eta_seconds: if is_last { Some(0.0) } else { eta_seconds },
             samples: (self.units / pixels) as u32,
             total_samples: self.total_units.div_ceil(pixels) as u32,
-            noise: self.outlook.at(&self.canvas.film, work, self.pace.rate()),
+            noise: self.outlook.at(work, self.pace.rate()),
         });
     }
 

@@ -31,8 +31,7 @@ pub(super) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
     let mean = halves.iter().map(|half| half.pixels * f64::from(half.samples)).sum::<f64>() / pixels;
     let work: f64 = halves.iter().map(|half| half.work(half.samples)).sum();
-    let mut order: Vec<(f64, &Half)> =
-        halves.iter().map(|half| (half.urgency(mean, film.convergence().power()), half)).collect();
+    let mut order: Vec<(f64, &Half)> = halves.iter().map(|half| (half.urgency(mean), half)).collect();
     order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let (mut goals, mut to_do) = (done.to_vec(), 0.0);
     for (_, half) in order.into_iter().filter(|(_, half)| half.goal > half.samples) {
@@ -55,6 +54,8 @@ struct Half {
     goal: u32,
     /// Squared error of its pixels that one sample would leave.
     error: f64,
+    /// The power of the samples with which that falls.
+    power: f64,
     /// What a sample costs, in rays.
     cost: f64,
 }
@@ -64,13 +65,12 @@ impl Half {
         self.pixels * f64::from(samples) * self.cost
     }
 
-    /// How much all that a sample costs lowers the sum of squared errors, where pixels have so many samples on average and it falls
-    /// with a power of them.
-    fn urgency(&self, mean: f64, power: f64) -> f64 {
+    /// How much all that a sample costs lowers the sum of squared errors, where pixels have so many samples on average.
+    fn urgency(&self, mean: f64) -> f64 {
         if f64::from(self.samples) < SHARE * mean {
             return f64::INFINITY;
         }
-        let left = |samples: u32| libm::pow(f64::from(samples), -power);
+        let left = |samples: u32| libm::pow(f64::from(samples), -self.power);
         self.error * (left(self.samples) - left(self.goal))
             / (f64::from((self.goal - self.samples).max(1)) * self.cost)
     }
@@ -79,18 +79,18 @@ impl Half {
 fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32)) -> Option<Vec<Half>> {
     let mut halves = Vec::with_capacity(2 * done.len());
     for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.cell_rect(*cell).is_some()) {
-        let constant = libm::pow(f64::from(known), film.convergence().power());
-        let errors = [0, 1].map(|half| Some(film.half_error(cell, half, known)? * constant));
+        let errors = [0, 1].map(|half| film.half_error(cell, half, known));
         let units: f64 =
             [0, 1].map(|half| film.half_pixel_count(cell, half) as f64 * f64::from(done[half])).iter().sum();
         let cost = BESIDE + rays[cell] as f64 / units;
         for half in 0..2 {
             // A cell of one pixel has no other half.
-            let error = errors[1 - half].or(errors[half])?;
+            let (error, power) = errors[1 - half].or(errors[half])?;
+            let error = error * libm::pow(f64::from(known), power);
             let samples = done[half];
             let goal = samples.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX).min(most);
             let pixels = film.half_pixel_count(cell, half) as f64;
-            halves.push(Half { cell, half, pixels, samples, goal: goal.max(samples), error, cost });
+            halves.push(Half { cell, half, pixels, samples, goal: goal.max(samples), error, power, cost });
         }
     }
     Some(halves)
