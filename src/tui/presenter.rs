@@ -44,6 +44,8 @@ struct Drawn {
     is_first: bool,
     /// Whether anything of it may have been sent.
     is_shown: bool,
+    /// Whether what the line had left is used to draw it exactly.
+    is_refined: bool,
 }
 
 impl Presenter {
@@ -124,9 +126,12 @@ impl Presenter {
 
     /// Aims the screen at the state as it is now.
     pub(super) fn draw_if_due(&mut self, state: &mut State, now: Instant) {
-        if !state.dirty || (!state.urgent && now < self.next_frame) {
+        let is_due = state.dirty && (state.urgent || now >= self.next_frame);
+        let is_refined = self.has_room_to_refine(state);
+        if !is_due && !is_refined {
             return;
         }
+        self.drawn.is_refined |= is_refined;
         self.postpone(state, now);
         state.dirty = false;
         let window = state.window;
@@ -138,6 +143,13 @@ impl Presenter {
         let area = Layout::of(state).preview;
         self.display.place(view::preview::placement(state, area), is_still(state));
         self.display.aim(&buffer, area, self.fidelity(state), is_new);
+    }
+
+    /// Whether the line stands idle while a key is held that moves the camera: the last picture is there as far as a moving one
+    /// has to be, and the next one is not yet.
+    fn has_room_to_refine(&self, state: &State) -> bool {
+        let is_step = state.nudge.request == Some(self.drawn.generation);
+        is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
     }
 
     /// Keeps which picture is drawn; whether it is another one than before.
@@ -156,6 +168,7 @@ impl Presenter {
     fn fidelity(&self, state: &State) -> Fidelity {
         match () {
             () if is_still(state) => Fidelity::Still,
+            () if self.drawn.is_refined => Fidelity::Following,
             () if self.drawn.is_first => Fidelity::First,
             () if self.display.is_quick() => Fidelity::Following,
             () => Fidelity::Moving,
@@ -179,6 +192,8 @@ impl Presenter {
     /// When to look again if nothing happens; `None`: not before something does.
     pub(super) fn wake(&mut self, state: &State, now: Instant) -> Option<Instant> {
         let due = self.drawn.at.filter(|_| self.drawn.is_old).and_then(|at| self.moment(state, now).due(at));
+        let refine = self.has_room_to_refine(state).then_some(now);
+        let due = due.into_iter().chain(refine);
         next_wake(state, self.next_frame).into_iter().chain(self.display.wake(now)).chain(due).min()
     }
 }

@@ -83,7 +83,7 @@ pub(super) struct Line {
     /// When the window last shrank: slices from before say nothing new.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
-    /// Of the last slices that were large enough to tell how fast the line is.
+    /// Of the last slices, small ones too: else one that was slow for a moment would get no more that could tell otherwise.
     recent: VecDeque<Duration>,
     /// When an answer last came, or one began to be owed.
     heard: Instant,
@@ -165,7 +165,7 @@ impl Line {
             if slice.question == question && slice.bytes <= MOST {
                 let round_trip = now.saturating_duration_since(slice.sent);
                 self.round_trips.add(round_trip, now);
-                self.note_recent(slice.bytes, round_trip);
+                self.note_recent(round_trip);
                 self.fit(&slice, round_trip, now);
             }
         }
@@ -219,10 +219,7 @@ impl Line {
         self.pace == Pace::Answers && !self.is_multiplexed && 2 * quick > self.recent.len()
     }
 
-    fn note_recent(&mut self, bytes: usize, round_trip: Duration) {
-        if bytes < LEAST_SLICE {
-            return;
-        }
+    fn note_recent(&mut self, round_trip: Duration) {
         if self.recent.len() == USUAL_OF {
             self.recent.pop_front();
         }

@@ -297,12 +297,8 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
         let hash = (u64::from(i) << 20 ^ samples.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         let channel = |c: usize| {
             let unit = f64::from((hash >> (16 * c) & 0xFFFF) as u16) / 65536.0 - 0.5;
-            // Things that pass by.
-            let block =
-                (u64::from(column / 5) << 32 ^ u64::from(i / width / 5)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            let thing = if turn > 0 { f64::from((block >> (40 + 8 * c)) as u8) / 4.0 } else { 0.0 };
             // Of a mean distance of a quarter of the width.
-            wall[c] * (0.4 + 0.6 * y) + thing + NOISE * 4.0 * unit / samples.sqrt()
+            wall[c] * (0.4 + 0.6 * y) + NOISE * 4.0 * unit / samples.sqrt()
         };
         std::array::from_fn(|c| channel(c).round() as u8)
     };
