@@ -77,7 +77,7 @@ fn bins(picture: &Picture) -> Vec<Bin> {
 }
 
 /// Some bins that become one colour.
-struct Box {
+struct ColorBox {
     bins: Range<usize>,
     mean: [f64; 3],
     /// The axis along which the squared error is largest, and that error.
@@ -85,7 +85,7 @@ struct Box {
     error: f64,
 }
 
-impl Box {
+impl ColorBox {
     fn of(all: &[Bin], bins: Range<usize>) -> Self {
         let own = &all[bins.clone()];
         let count: f64 = own.iter().map(|bin| f64::from(bin.count)).sum();
@@ -104,18 +104,18 @@ impl Box {
 
 /// The means of boxes, of which the worst is split until there are enough or all are exact.
 fn split(bins: &mut [Bin]) -> Vec<[u8; 3]> {
-    let mut boxes = vec![Box::of(bins, 0..bins.len())];
+    let mut boxes = vec![ColorBox::of(bins, 0..bins.len())];
     while boxes.len() < MOST {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));
         let Some(worst) = worst.filter(|worst| boxes[*worst].error > 0.0) else { break };
-        let Box { bins: range, mean, axis, .. } = boxes.swap_remove(worst);
+        let ColorBox { bins: range, mean, axis, .. } = boxes.swap_remove(worst);
         let own = &mut bins[range.clone()];
         own.sort_by(|a, b| a.mean()[axis].total_cmp(&b.mean()[axis]));
         let middle = range.start + own.partition_point(|bin| bin.mean()[axis] < mean[axis]);
         // Rounding may put all of them on one side.
         let middle = middle.clamp(range.start + 1, range.end - 1);
-        boxes.push(Box::of(bins, range.start..middle));
-        boxes.push(Box::of(bins, middle..range.end));
+        boxes.push(ColorBox::of(bins, range.start..middle));
+        boxes.push(ColorBox::of(bins, middle..range.end));
     }
     boxes.iter().map(|own| own.mean.map(|channel| channel.round() as u8)).collect()
 }
