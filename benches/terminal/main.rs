@@ -3,13 +3,17 @@
 //! `cargo bench --bench terminal` renders bundled scenes and edits of them, replays their previews as the front end gets
 //! them and prints the bytes: of the painter, of plain ratatui on crossterm, which draws every preview, and of chafa
 //! where there is one, which draws the last one. `-- fidelity` prints how near what is shown comes to the picture in
-//! each number of colours and by each set of characters.
+//! each number of colours and by each set of characters, `-- follow` how near the screen of a quick terminal is to the final one
+//! while a picture is rendered, `-- orbit` how much of a thin line is used while a key moves the camera.
 
 #![allow(clippy::print_stdout)]
 
 mod fidelity;
+mod follow;
+mod orbit;
 mod others;
 mod sequence;
+mod watched;
 
 use std::error::Error;
 use std::fs;
@@ -72,8 +76,15 @@ const EDITS: [Edit; 6] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    if std::env::args().any(|argument| argument == "fidelity") {
+    let is_asked = |name: &str| std::env::args().any(|argument| argument == name);
+    if is_asked("fidelity") {
         return fidelity::print();
+    }
+    if is_asked("follow") {
+        return follow::print();
+    }
+    if is_asked("orbit") {
+        return orbit::print();
     }
     for (columns, rows) in WINDOWS {
         println!("\n{columns}×{rows}: bytes a cell, in brackets those of ratatui and chafa");
@@ -151,6 +162,8 @@ impl Window {
                 aimed_samples: Some(aimed),
                 since_aim: Duration::from_secs_f64(shot.seconds - at),
                 is_shown: true,
+                is_quick: false,
+                is_in_pixels: false,
                 is_final: shot.is_final,
                 final_in: None,
             };

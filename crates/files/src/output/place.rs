@@ -41,7 +41,7 @@ impl Target {
 /// Finds the place and whether it can be written, as far as can be told without writing.
 pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
-        return Err(is_directory(path));
+        return Err(lacks_photonsory(path));
     }
     match follow(path).map_err(|error| OutputError::file(path, error))? {
         (target, None) => new_file(path, target),
@@ -95,7 +95,7 @@ fn new_file(path: &Path, target: PathBuf) -> Result<Place, OutputError> {
 fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<Place, OutputError> {
     let kind = metadata.file_type();
     if kind.is_dir() {
-        return Err(is_directory(path));
+        return Err(lacks_photonsory(path));
     }
     if kind.is_block_device() || kind.is_socket() {
         let what = if kind.is_socket() { "a socket" } else { "a block device" };
@@ -130,7 +130,7 @@ fn may_write(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputErr
     access(what, how).map_err(|errno| OutputError::file(path, errno))
 }
 
-fn is_directory(path: &Path) -> OutputError {
+fn lacks_photonsory(path: &Path) -> OutputError {
     let why = "it is a directory".to_owned();
     OutputError::Target { path: path.to_owned(), why, way_out: "name a file in it" }
 }

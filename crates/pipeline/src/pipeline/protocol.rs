@@ -360,4 +360,6 @@ pub struct LatestPreview {
     pub range: Option<[f32; 2]>,
     /// The part of the picture that it shows, pixel by pixel; none: all of it.
     pub section: Option<Section>,
+    /// Whether it lacks the light that photons bring, since they are still being traced.
+    pub lacks_photons: bool,
 }

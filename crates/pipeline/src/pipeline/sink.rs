@@ -51,8 +51,17 @@ impl Sink {
     }
 
     pub(super) fn preview(&self, picture: Picture, range: Option<[f32; 2]>, section: Option<Section>) {
-        let latest =
-            LatestPreview { generation: self.generation, picture: Arc::new(picture), range, section };
+        let (generation, picture) = (self.generation, Arc::new(picture));
+        self.put(LatestPreview { generation, picture, range, section, lacks_photons: false });
+    }
+
+    /// A picture that lacks the light of photons, before there are any.
+    pub(super) fn preview_without_photons(&self, picture: Picture) {
+        let (generation, picture) = (self.generation, Arc::new(picture));
+        self.put(LatestPreview { generation, picture, range: None, section: None, lacks_photons: true });
+    }
+
+    fn put(&self, latest: LatestPreview) {
         *self.previews.lock().unwrap_or_else(PoisonError::into_inner) = Some(latest);
         self.send(Event::Preview { generation: self.generation });
     }

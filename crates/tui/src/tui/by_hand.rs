@@ -104,7 +104,7 @@ fn pretend(
             let height = (size.width * 3 / 4).min(size.height).max(1);
             let picture = Arc::new(pretty(height * 4 / 3, height, step + text.len() as u32 * 20));
             *slot.lock().expect("a slot") =
-                Some(LatestPreview { generation, picture, range: None, section: None });
+                Some(LatestPreview { generation, picture, range: None, section: None, lacks_photons: false });
             say(Event::Preview { generation });
         }
         let progress = RenderProgress {

@@ -12,7 +12,6 @@ use super::known::Ask;
 use super::line::{Line, Question};
 use super::paint::{Fidelity, Painter};
 use super::state::FrameReport;
-use super::writer;
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
 const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
@@ -22,8 +21,6 @@ const ATTRIBUTES: &[u8] = b"\x1b[c";
 const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
 const END: &[u8] = b"\x1b[?2026l";
-/// The longest that a slice is planned before it is sent and before keys are looked for.
-const TURN: Duration = Duration::from_millis(3);
 /// Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 
@@ -47,6 +44,9 @@ impl Way {
     }
 }
 
+/// What takes bytes for the terminal and does not wait until they are written.
+pub(super) type Out = Box<dyn FnMut(Vec<u8>)>;
+
 /// The screen as the loop sees it.
 pub(super) struct Display {
     painter: Painter,
@@ -54,6 +54,8 @@ pub(super) struct Display {
     images: Option<Images>,
     line: Line,
     way: Way,
+    /// Takes bytes for the terminal.
+    out: Out,
     /// Whether the terminal knows mode 2026.
     is_synchronized: bool,
     /// Whether all that is wanted has been sent.
@@ -68,12 +70,13 @@ pub(super) struct Display {
 
 impl Display {
     /// A screen of which nothing is known.
-    pub(super) fn new(depth: ColorDepth, way: Way, images: Option<Images>, now: Instant) -> Self {
+    pub(super) fn new(depth: ColorDepth, way: Way, images: Option<Images>, out: Out, now: Instant) -> Self {
         let mut display = Self {
             painter: Painter::new(depth).repeating(way.can_repeat),
             images,
             line: way.line(now),
             way,
+            out,
             is_synchronized: false,
             is_complete: true,
             frame: None,
@@ -122,26 +125,35 @@ impl Display {
         }
     }
 
-    /// Sends a slice of what the line has room for; whether that was anything.
-    pub(super) fn pump(&mut self, now: Instant) -> bool {
+    /// Sends a slice of what the line has room for, and what there is of it once `is_late` says so; whether that was anything.
+    pub(super) fn pump(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
         let room = if self.is_complete { 0 } else { self.line.room(now) };
         if room == 0 {
             return false;
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());
-        let late = now + TURN;
-        let mut slice = self.painter.slice_until(room, || Instant::now() >= late);
-        if slice.is_empty() {
-            let rate = self.line.bytes_per_second();
-            let images = self.images.as_mut();
-            slice = images.and_then(|images| images.slice(room, rate)).unwrap_or_default();
+        let cells = self.painter.slice_until(room, is_late);
+        if !cells.is_empty() {
+            self.send_slice(self.synchronized(cells), now);
+            return true;
         }
-        if slice.is_empty() {
-            self.complete();
-            return false;
+        // Without marks: kitty 0.26 loses chunks of a picture that come between them. It is shown by its last one.
+        let rate = self.line.bytes_per_second();
+        let pixels = self.images.as_mut().and_then(|images| images.slice(room, rate));
+        match pixels {
+            Some(pixels) => self.send_slice(pixels, now),
+            None => self.complete(),
         }
-        self.send_slice(slice, now);
-        true
+        !self.is_complete
+    }
+
+    /// The same between marks, if the terminal knows them and it is large enough to flicker.
+    fn synchronized(&self, mut cells: Vec<u8>) -> Vec<u8> {
+        if self.is_synchronized && !self.way.is_multiplexed && cells.len() >= LARGE {
+            cells.splice(0..0, BEGIN.iter().copied());
+            cells.extend_from_slice(END);
+        }
+        cells
     }
 
     fn complete(&mut self) {
@@ -153,10 +165,6 @@ impl Display {
     }
 
     fn send_slice(&mut self, mut slice: Vec<u8>, now: Instant) {
-        if self.is_synchronized && !self.way.is_multiplexed && slice.len() >= LARGE {
-            slice.splice(0..0, BEGIN.iter().copied());
-            slice.extend_from_slice(END);
-        }
         let question = self.line.question();
         if question.is_some() {
             slice.extend_from_slice(STATUS);
@@ -169,7 +177,7 @@ impl Display {
 
     fn send(&mut self, bytes: Vec<u8>, question: Option<Question>, now: Instant) {
         self.line.send(bytes.len(), question, now);
-        writer::send(bytes);
+        (self.out)(bytes);
     }
 
     /// The terminal answered.
@@ -194,6 +202,16 @@ impl Display {
     /// Whether all that is wanted has been sent.
     pub(super) fn is_complete(&self) -> bool {
         self.is_complete
+    }
+
+    /// Whether the terminal can follow the render.
+    pub(super) fn is_quick(&self) -> bool {
+        self.line.is_quick()
+    }
+
+    /// Whether the terminal has answered for all that is wanted.
+    pub(super) fn is_answered(&self) -> bool {
+        self.is_complete && !self.line.owes()
     }
 
     /// What the line takes, as far as it shows; none: more than anybody would notice.

@@ -35,8 +35,14 @@ pub(super) enum Event {
     /// The worker says something. Pictures come as [`Event::Picture`].
     Worker(protocol::Event),
     /// The newest picture of the slot, with the least and the greatest number where it is stretched to them, and the part that it is
-    /// where it is shown pixel by pixel.
-    Picture { generation: u64, picture: Arc<Picture>, range: Option<[f32; 2]>, section: Option<Section> },
+    /// where it is shown pixel by pixel; and whether it lacks the light of photons.
+    Picture {
+        generation: u64,
+        picture: Arc<Picture>,
+        range: Option<[f32; 2]>,
+        section: Option<Section>,
+        lacks_photons: bool,
+    },
     /// A file that the scene depends on was written.
     Changed(Changed),
     /// Nobody is writing the files that were said to have changed.

@@ -109,6 +109,7 @@ impl Desk {
             picture: plain_picture(50, 38, color),
             range: None,
             section: None,
+            lacks_photons: false,
         });
         self.worker(done(generation, Vec::new(), false));
     }

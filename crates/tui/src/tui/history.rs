@@ -165,7 +165,13 @@ mod tests {
     use crate::tui::fixtures::plain_picture;
 
     fn shown(generation: u64, side: u32) -> Shown {
-        Shown { generation, picture: plain_picture(side, side, [1, 2, 3]), range: None, section: None }
+        Shown {
+            generation,
+            picture: plain_picture(side, side, [1, 2, 3]),
+            range: None,
+            section: None,
+            lacks_photons: false,
+        }
     }
 
     #[test]

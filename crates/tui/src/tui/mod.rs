@@ -21,6 +21,7 @@ mod mosaic;
 mod options;
 pub mod paint;
 mod parting;
+mod presenter;
 mod preview_kind;
 mod printed;
 mod run;
@@ -39,6 +40,7 @@ mod fixtures;
 mod tests;
 
 pub use color::{ColorChoice, ColorDepth, in_xterm};
+pub use graphics::PixelScreen;
 pub use mosaic::filled;
 pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};
 pub use printed::{Named, printed};

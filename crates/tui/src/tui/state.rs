@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::color::{Ansi, ColorDepth, Shades};
 use super::editor::FilePlace;
 use super::event::{Unwritten, Window, Written};
+use super::graphics::Protocol;
 use super::history::History;
 use super::known::Ask;
 use super::mosaic::Grid;
@@ -122,6 +123,8 @@ pub(super) struct Shown {
     pub range: Option<[f32; 2]>,
     /// The part of the picture that is shown pixel by pixel; none: all of it.
     pub section: Option<Section>,
+    /// Whether it lacks the light of photons, which are still being traced.
+    pub lacks_photons: bool,
 }
 
 /// The left button went down over a cell of the picture.
@@ -433,6 +436,12 @@ impl State {
             PreviewKind::Pixels(_) => u32::from(self.window.cell_pixels.0.clamp(1, MOST)),
             kind => kind.grid().map_or(1, Grid::columns),
         }
+    }
+
+    /// Whether colours are mixed from those that the terminal has.
+    pub(super) fn mixes_colors(&self) -> bool {
+        matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
+            || self.preview == PreviewKind::Pixels(Protocol::Sixel)
     }
 
     /// Width over height of the picture, as far as it is known.

@@ -31,6 +31,7 @@ use super::settings::{Overrides, View};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::canvas::Canvas;
+use super::stages::coarse::Coarse;
 use super::stages::films::Films;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
@@ -279,7 +280,18 @@ impl Engine {
             meanwhile.postpone_write(sink);
             meanwhile.run_errand(&at_hand, None, inputs, sink);
         };
-        table.run(Stage::Photons, || Ok(photons(asked, key, store, sending, hear)?))?;
+        // A person sees the scene while the first photons are traced.
+        let of_film = keys::render(ready.world.0, &plan.settings, plan.crop);
+        let is_new = request.force || !self.films.holds(of_film);
+        let coarse = Coarse {
+            tracer: tracer(self.means.kernel, &pool, &ready, meanwhile.token),
+            plan,
+            is_moved: request.overrides.camera.is_any(),
+            rate: &self.coarse_rate,
+        };
+        let screen = Screen { bounds: request.preview, plan, sink };
+        let before = || if is_new { coarse.show_without_photons(screen, hear) } else { Ok(()) };
+        table.run(Stage::Photons, || photons(asked, key, store, sending, hear, before))?;
         let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
         self.at_hand = Some(at_hand);
@@ -419,14 +431,7 @@ impl Engine {
             }
         };
         let rendering = Rendering {
-            tracer: Tracer {
-                kernel: self.means.kernel,
-                pool: &pool,
-                world: &ready.world.1,
-                settings: &plan.settings,
-                token: meanwhile.token,
-                photons: None,
-            },
+            tracer: tracer(self.means.kernel, &pool, ready, meanwhile.token),
             plan,
             photons: photons.and_then(|key| self.photons.get(key)),
             preview: request.preview,
@@ -516,6 +521,11 @@ impl Engine {
             Err(Stop::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
     }
+}
+
+/// What renders a scene, by no photons.
+fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a CancelToken) -> Tracer<'a> {
+    Tracer { kernel, pool, world: &ready.world.1, settings: &ready.plan.settings, token, photons: None }
 }
 
 /// All files that the scene names, and what else was read.

@@ -1,10 +1,14 @@
 //! First pictures: one sample for each pixel of the preview, shown before the first pass is done.
 
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
+use super::super::plan::Plan;
 use super::super::trace::{Job, Tracer};
 use super::Stop;
+use super::preview::Screen;
 use super::render::Rendering;
+use crate::film::stretch::Stretch;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{PhotonMaps, RenderSettings};
 use crate::scene::description::Render;
@@ -12,61 +16,98 @@ use crate::scene::description::Render;
 /// What the first picture of a moved camera may take.
 const HASTE: Duration = Duration::from_millis(6);
 
-/// Columns and rows of the first pictures at about the preview's own resolution, of those that are much less work than one pass: of a
-/// moved camera a hasty one before.
-pub(super) fn sizes(rendering: &Rendering<'_>, shown: (u32, u32)) -> Vec<(u32, u32)> {
-    let usual = usual_size(rendering, shown);
-    let rate = rendering.coarse_rate.get().filter(|_| rendering.is_moved);
-    let hasty = rate.and_then(|rate| hasty_size(usual, rate));
-    hasty.into_iter().chain([usual]).filter(|size| is_less_work(rendering, *size)).collect()
+/// What first pictures are traced by.
+#[derive(Clone, Copy)]
+pub(in crate::pipeline) struct Coarse<'a> {
+    pub(in crate::pipeline) tracer: Tracer<'a>,
+    pub(in crate::pipeline) plan: &'a Plan,
+    /// Whether somebody is moving the camera.
+    pub(in crate::pipeline) is_moved: bool,
+    /// Pixels of first pictures that are traced in a second, as the last one was.
+    pub(in crate::pipeline) rate: &'a Cell<Option<f64>>,
 }
 
-/// Where rays are slow, since no cache holds the trees, it has half as many pixels as the preview.
-fn usual_size(rendering: &Rendering<'_>, (width, height): (u32, u32)) -> (u32, u32) {
-    /// Triangles whose trees take some tens of megabytes.
-    const LARGE: u64 = 250_000;
-    let side = |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
-    if rendering.tracer.world.triangle_count() < LARGE {
-        (width, height)
-    } else {
-        (side(width), side(height))
+impl<'a> Coarse<'a> {
+    pub(super) fn of(rendering: &Rendering<'a>) -> Self {
+        let Rendering { tracer, plan, is_moved, coarse_rate: rate, .. } = *rendering;
+        Self { tracer, plan, is_moved, rate }
     }
-}
 
-fn is_less_work(rendering: &Rendering<'_>, (width, height): (u32, u32)) -> bool {
-    let Render { width: full_width, height: full_height, .. } = rendering.plan.settings.render;
-    let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
-    pixels(width, height) * 2 <= pixels(full_width, full_height)
-}
+    /// Columns and rows of the first pictures at about the preview's own resolution, of those that are much less work than one pass: of
+    /// a moved camera a hasty one before.
+    pub(super) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
+        let usual = self.usual_size(shown);
+        let rate = self.rate.get().filter(|_| self.is_moved);
+        let hasty = rate.and_then(|rate| hasty_size(usual, rate));
+        hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
+    }
 
-/// A first picture of this size; notes how many pixels are traced in a second.
-pub(super) fn picture(
-    rendering: &Rendering<'_>,
-    photons: Option<&PhotonMaps>,
-    (width, height): (u32, u32),
-) -> Result<RadianceImage, Stop> {
-    let plan = rendering.plan;
-    let full = (plan.settings.render.width, plan.settings.render.height);
-    let render = Render { width, height, ..plan.settings.render };
-    let settings = RenderSettings { render, ..plan.settings };
-    let whole = Rect { x: 0, y: 0, width, height };
-    let rect = plan.crop.map_or(whole, |rect| scale(rect, full, (width, height)));
-    let tracer = Tracer { settings: &settings, photons, ..rendering.tracer };
-    let mut picture = RadianceImage::black(width, height);
-    let begin = Instant::now();
-    tracer.run(
-        &jobs(rect),
-        |_, piece| piece,
-        |result| {
-            if let Some((_, piece, _)) = result {
-                picture.put(piece.pixels.rect, &piece.radiance);
-            }
-            true
-        },
-    )?;
-    let rate = rect.area() as f64 / begin.elapsed().as_secs_f64().max(1e-6);
-    rendering.coarse_rate.set(Some(rate));
-    Ok(picture)
+    /// Where rays are slow, since no cache holds the trees, it has half as many pixels as the preview.
+    fn usual_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
+        /// Triangles whose trees take some tens of megabytes.
+        const LARGE: u64 = 250_000;
+        let side =
+            |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
+        if self.tracer.world.triangle_count() < LARGE { (width, height) } else { (side(width), side(height)) }
+    }
+
+    fn is_less_work(&self, (width, height): (u32, u32)) -> bool {
+        let Render { width: full_width, height: full_height, .. } = self.plan.settings.render;
+        let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
+        pixels(width, height) * 2 <= pixels(full_width, full_height)
+    }
+
+    /// Traces a first picture of this size; notes how many pixels are traced in a second. `tick` is called every now and then.
+    pub(super) fn picture(
+        &self,
+        photons: Option<&PhotonMaps>,
+        (width, height): (u32, u32),
+        tick: impl Fn(),
+    ) -> Result<RadianceImage, Stop> {
+        let plan = self.plan;
+        let full = (plan.settings.render.width, plan.settings.render.height);
+        let render = Render { width, height, ..plan.settings.render };
+        let settings = RenderSettings { render, ..plan.settings };
+        let whole = Rect { x: 0, y: 0, width, height };
+        let rect = plan.crop.map_or(whole, |rect| scale(rect, full, (width, height)));
+        let tracer = Tracer { settings: &settings, photons, ..self.tracer };
+        let mut picture = RadianceImage::black(width, height);
+        let begin = Instant::now();
+        tracer.run(
+            &jobs(rect),
+            |_, piece| piece,
+            |result| {
+                if let Some((_, piece, _)) = result {
+                    picture.put(piece.pixels.rect, &piece.radiance);
+                }
+                tick();
+                true
+            },
+        )?;
+        let rate = rect.area() as f64 / begin.elapsed().as_secs_f64().max(1e-6);
+        self.rate.set(Some(rate));
+        Ok(picture)
+    }
+
+    /// Shows a first picture without the light of photons, which are yet to be traced: where the whole picture is shown, and
+    /// tracing it once is much less work than one pass. The film gets nothing of it. `tick` is called every now and then.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub(in crate::pipeline) fn show_without_photons(
+        &self,
+        screen: Screen<'_>,
+        tick: impl Fn(),
+    ) -> Result<(), Stop> {
+        let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
+        // Views of numbers are stretched, and one of them is of the photons themselves.
+        let is_of_light = self.plan.tone.stretch == Stretch::None;
+        let Some(shown) = screen.size().filter(|_| is_whole && is_of_light) else { return Ok(()) };
+        let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
+        let picture = self.picture(None, size, tick)?;
+        screen.show_without_photons(&picture.resized(shown.0, shown.1));
+        Ok(())
+    }
 }
 
 /// The size of a first picture that takes [`HASTE`] where so many pixels are traced in a second; none: the usual one takes

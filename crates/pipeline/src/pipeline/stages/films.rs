@@ -30,6 +30,11 @@ impl Films {
         self.current.as_mut()
     }
 
+    /// Whether there is a film of this key.
+    pub(in crate::pipeline) fn holds(&self, key: Key) -> bool {
+        self.kept.iter().chain(&self.current).any(|canvas| canvas.key == key)
+    }
+
     /// The film of this key becomes the current one if it is kept and of use; else there is none. The one before is
     /// kept where there is room for it.
     pub(super) fn select(&mut self, key: Key, is_usable: impl FnOnce(&Canvas) -> bool) {

@@ -3,7 +3,7 @@
 pub(super) mod accel;
 mod adaptive;
 pub(super) mod canvas;
-mod coarse;
+pub(super) mod coarse;
 mod cost;
 pub(super) mod films;
 pub(super) mod keys;

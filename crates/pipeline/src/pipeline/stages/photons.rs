@@ -15,7 +15,7 @@ use super::super::plan::Plan;
 use super::super::protocol::PhotonsReport;
 use super::super::sink::Sink;
 use super::super::trace::TICK;
-use super::Staged;
+use super::{Staged, Stop};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons, RenderSettings};
 use crate::scene::description::Render;
@@ -185,17 +185,18 @@ fn ticking<T: Send>(
 }
 
 /// Make the first maps for a picture that gathers photons. `wanted` is what the command line says, `enabled` what the scene says;
-/// `tick` is called every now and then.
+/// `tick` is called every now and then, `before` where photons have to be traced, before they are.
 ///
 /// # Errors
-/// Cancelled.
+/// Cancelled; those of `before`.
 pub(in crate::pipeline) fn photons(
     (enabled, wanted): (bool, Option<bool>),
     key: impl FnOnce(PhotonSettings) -> Key,
     cache: &mut PhotonCache,
     sending: Sending<'_>,
     mut tick: impl FnMut(),
-) -> Result<Staged<()>, Cancelled> {
+    before: impl FnOnce() -> Result<(), Stop>,
+) -> Result<Staged<()>, Stop> {
     let settings = sending.plan.settings.heeded();
     let skipped = |why: &str| Ok(Staged::skipped((), why));
     let Some(of_photons) = settings.photons else {
@@ -220,6 +221,7 @@ pub(in crate::pipeline) fn photons(
             false => Staged::skipped((), NOTHING_THROWS_LIGHT),
         });
     }
+    before()?;
     let Sending { world, pool, token, .. } = sending;
     let watch = Stopwatch::start(token);
     let send = |progress: Progress<'_>| {

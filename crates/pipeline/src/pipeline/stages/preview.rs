@@ -82,6 +82,12 @@ impl Screen<'_> {
         true
     }
 
+    /// Shows a picture that lacks the light of photons, which are yet to come. It is of colours: no view of numbers gathers
+    /// them.
+    pub(super) fn show_without_photons(&self, image: &RadianceImage) {
+        self.sink.preview_without_photons(develop(image, &self.plan.tone.of_picture(image)));
+    }
+
     fn send(&self, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
         let range = tone.stretch.range().map(|range| range.ends());
         self.sink.preview(develop(image, tone), range, section);

@@ -16,7 +16,7 @@ use super::super::sink::Sink;
 use super::super::trace::{Job, Tracer, jobs_to_come, next_pass};
 use super::adaptive::LEAST;
 use super::canvas::Canvas;
-use super::coarse;
+use super::coarse::Coarse;
 use super::films::Films;
 use super::outlook::Outlook;
 use super::photons::{PhotonStore, Sending};
@@ -416,12 +416,13 @@ impl<'a> Painter<'a> {
     /// First pictures with one sample, where they are much less work than one pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let Some(shown) = self.screen.size() else { return Ok(()) };
-        for size in coarse::sizes(self.rendering, shown) {
+        let coarse = Coarse::of(self.rendering);
+        for size in coarse.sizes(shown) {
             let maps = match self.rendering.photons {
                 Some(photons) => Some(self.maps(photons, 0..1)?),
                 None => None,
             };
-            let picture = coarse::picture(self.rendering, maps.as_ref(), size)?;
+            let picture = coarse.picture(maps.as_ref(), size, || {})?;
             self.canvas.base = Some(picture.resized(shown.0, shown.1));
             self.show();
         }

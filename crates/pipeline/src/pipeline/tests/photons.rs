@@ -82,13 +82,48 @@ fn without(
     KERNEL(world, settings, pixels, samples, token)
 }
 
+/// Whether each preview lacked the light of photons, and whether the photons were there when it came.
+fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
+    let (of, mut previews, mut are_there) = (bench.send(), Vec::new(), false);
+    loop {
+        match bench.next() {
+            Event::Preview { .. } => {
+                let latest = bench.worker.previews.lock().expect("not poisoned").take();
+                previews.extend(latest.map(|latest| (latest.lacks_photons, are_there)));
+            }
+            Event::Stage { stage, .. } if stage.name == Stage::Photons => {
+                are_there = stage.status != Status::Running;
+            }
+            Event::Done { generation, .. } if generation == of => return previews,
+            _ => {}
+        }
+    }
+}
+
 #[test]
-fn the_first_coarse_picture_has_photons() {
-    let mut bench = Bench::with(&wrapped(1000), without);
+fn a_picture_without_photons_comes_before_them_and_one_with_them_takes_its_place() {
+    let mut bench = Bench::with(&wrapped(300_000), without);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
-    let of = bench.send();
-    assert!(bench.until_end(of).iter().any(|event| matches!(event, Event::Preview { .. })));
-    assert!(!WITHOUT.load(Ordering::SeqCst));
+    let previews = previews_of(&mut bench);
+    assert_eq!(previews.first(), Some(&(true, false)), "{previews:?}");
+    assert!(WITHOUT.load(Ordering::SeqCst));
+    assert!(previews.len() > 1 && previews[1..].iter().all(|it| *it == (false, true)), "{previews:?}");
+    // A camera that moves finds the photons that are kept.
+    bench.overrides.camera.fov = Some(50.0);
+    let previews = previews_of(&mut bench);
+    assert!(!previews.is_empty() && previews.iter().all(|(lacks, _)| !lacks), "{previews:?}");
+}
+
+#[test]
+fn the_picture_without_photons_leaves_no_trace_in_the_film() {
+    let mut pictures = [None, Some(PreviewSize { width: 12, height: 12, around: None })].map(|preview| {
+        let mut bench = Bench::new(&wrapped(1000));
+        bench.preview = preview;
+        bench.done();
+        std::fs::read(bench.path("out.ppm")).expect("a picture")
+    });
+    pictures.sort();
+    assert_eq!(pictures[0], pictures[1]);
 }
 
 #[test]

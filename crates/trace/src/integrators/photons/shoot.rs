@@ -211,25 +211,25 @@ impl Flight<'_> {
     /// What a photon does at the first thing that is no mere change between parts of one glass.
     fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
         let shot = self.shooting.shot;
-        let mut is_direct = self.depth == 0;
+        let mut lacks_photons = self.depth == 0;
         for _ in 0..MOST_HIDDEN {
             let vertex = Vertex::to_shade(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
-                return self.shade_surface(path, &vertex, hit.shape.t, is_direct);
+                return self.shade_surface(path, &vertex, hit.shape.t, lacks_photons);
             }
             let Crossing { sides, near, far, opaque } =
                 shot.crossing(&path, &vertex, hit.shape.t, &mut self.crossing);
             path.medium = near;
             if let Some(touching) = opaque {
                 let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
-                return self.shade_surface(path, &vertex, hit.shape.t, is_direct);
+                return self.shade_surface(path, &vertex, hit.shape.t, lacks_photons);
             }
             path.throughput *= absorption(shot.world, near, hit.shape.t);
             if near.glass() != far.glass() {
                 return self.shade_glass(&path, &vertex.between(sides), far);
             }
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-            is_direct = false;
+            lacks_photons = false;
             match shot.world.geometry.closest(&path.ray) {
                 Some(next) => hit = next,
                 None => return,
@@ -237,12 +237,12 @@ impl Flight<'_> {
         }
     }
 
-    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, distance: f32, is_direct: bool) {
+    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, distance: f32, lacks_photons: bool) {
         let shot = self.shooting.shot;
         path.throughput *= absorption(shot.world, path.medium, distance);
         match &vertex.material.bsdf {
             // What comes straight is found by light samples.
-            Bsdf::Phong(_) if is_direct => {}
+            Bsdf::Phong(_) if lacks_photons => {}
             Bsdf::Phong(phong) => {
                 let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
                 if bsdf.is_black() {

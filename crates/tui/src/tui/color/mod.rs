@@ -1,6 +1,7 @@
 //! How many colours the terminal has, and how others are shown by them.
 
 mod mix;
+mod mixture;
 mod oklab;
 mod palette;
 mod pattern;
@@ -8,10 +9,11 @@ mod shades;
 
 use ratatui::style::Color;
 
+pub(super) use self::mixture::Mixture;
 pub(super) use self::oklab::oklab;
 pub use self::palette::in_xterm;
 pub(super) use self::palette::{Ansi, XTERM, ansi, fixed, nearest_256};
-pub(super) use self::pattern::coarse;
+pub(super) use self::pattern::finer;
 pub(super) use self::shades::Shades;
 use crate::choice;
 

@@ -15,9 +15,9 @@ pub(super) fn threshold(x: usize, y: usize) -> f32 {
     (rank as f32 + 0.5) / (SIDE * SIDE) as f32
 }
 
-/// A colour in five bits of a channel, dithered.
-pub(in crate::tui) fn coarse(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
-    const LEVELS: u16 = 31;
+/// A colour in six bits of a channel, dithered.
+pub(in crate::tui) fn finer(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
+    const LEVELS: u16 = 63;
     let more = (threshold(x, y) * 255.0) as u16;
     rgb.map(|channel| {
         let level = (u16::from(channel) * LEVELS + more) / 255;
@@ -42,9 +42,9 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_coarse_colours_is_the_colour() {
-        assert_eq!((coarse([0; 3], 3, 4), coarse([255; 3], 3, 4)), ([0; 3], [255; 3]));
-        let sum: u32 = (0..64).map(|i| u32::from(coarse([101; 3], i % 8, i / 8)[0])).sum();
+    fn the_mean_of_finer_colours_is_the_colour() {
+        assert_eq!((finer([0; 3], 3, 4), finer([255; 3], 3, 4)), ([0; 3], [255; 3]));
+        let sum: u32 = (0..64).map(|i| u32::from(finer([101; 3], i % 8, i / 8)[0])).sum();
         assert!(sum.abs_diff(101 * 64) <= 64, "{sum}");
     }
 }

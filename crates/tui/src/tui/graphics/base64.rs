@@ -17,6 +17,20 @@ pub(super) fn encoded(bytes: &[u8]) -> Vec<u8> {
     text
 }
 
+/// The bytes that a text in base64 stands for; digits of no value are passed over.
+pub(super) fn decoded(text: &[u8]) -> Vec<u8> {
+    let values = text.iter().filter_map(|digit| DIGITS.iter().position(|known| known == digit));
+    let (mut bytes, mut bits, mut count) = (Vec::with_capacity(text.len() / 4 * 3), 0_u32, 0);
+    for value in values {
+        (bits, count) = (bits << 6 | value as u32, count + 6);
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count) as u8);
+        }
+    }
+    bytes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -32,6 +46,7 @@ mod tests {
             ("foobar", "Zm9vYmFy"),
         ] {
             assert_eq!(encoded(bytes.as_bytes()), text.as_bytes());
+            assert_eq!(decoded(text.as_bytes()), bytes.as_bytes());
         }
     }
 }

@@ -6,6 +6,8 @@
 mod base64;
 mod iterm;
 mod kitty;
+mod palette;
+mod seen;
 mod sixel;
 
 use std::collections::VecDeque;
@@ -13,9 +15,11 @@ use std::sync::Arc;
 
 use ratatui::layout::Rect;
 
+use self::palette::Palette;
 use crate::film::Picture;
 
 pub(super) use self::kitty::delete_all;
+pub use self::seen::PixelScreen;
 
 /// How a terminal takes pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +70,8 @@ pub(super) struct Images {
     pieces: VecDeque<Vec<u8>>,
     /// Of kitty's images, the one that is shown: they take turns, so that one goes when the next is there.
     turn: bool,
+    /// What the last sixels were shown in.
+    palette: Option<Palette>,
 }
 
 impl Images {
@@ -82,6 +88,7 @@ impl Images {
             is_coarse: false,
             pieces: VecDeque::new(),
             turn: false,
+            palette: None,
         }
     }
 
@@ -145,7 +152,7 @@ impl Images {
                 self.turn = !self.turn;
                 kitty::encode(&picture, wanted.cells, self.turn)
             }
-            Protocol::Sixel => vec![sixel::encode(&picture, wanted.cells, wanted.cell)],
+            Protocol::Sixel => vec![sixel::encode(&picture, wanted.cells, wanted.cell, &mut self.palette)],
             Protocol::Iterm => vec![iterm::encode(&picture, wanted.cells)],
         };
         let last = bodies.len().saturating_sub(1);

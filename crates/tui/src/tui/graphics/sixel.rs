@@ -1,67 +1,74 @@
 //! Sixels (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one colour after the other.
 
 use ratatui::layout::Rect;
-use ratatui::style::Color;
 
+use super::palette::Palette;
 use crate::film::Picture;
-use crate::tui::color::{self, ColorDepth, Shades};
 use crate::tui::view::preview::resized;
 
-/// First of the colours of xterm's palette that are used.
+/// The register of the first colour: those below are the terminal's own.
 const FIRST: u8 = 16;
+/// Registers.
+const REGISTERS: usize = 256;
 
-/// The commands that show a picture at the cursor over these cells of so many pixels. The colours are those of xterm's
-/// palette, dithered.
-pub(super) fn encode(picture: &Picture, cells: Rect, cell: (u16, u16)) -> Vec<u8> {
+/// The commands that show a picture at the cursor over these cells of so many pixels. The colours are those of a palette made
+/// from it, or from one before that it resembles.
+pub(super) fn encode(
+    picture: &Picture,
+    cells: Rect,
+    cell: (u16, u16),
+    palette: &mut Option<Palette>,
+) -> Vec<u8> {
     let side = |cells: u16, pixels: u16| (u32::from(cells) * u32::from(pixels)).max(1);
     let (width, height) = (side(cells.width, cell.0), side(cells.height, cell.1));
     let scaled = resized(picture, width, height);
-    let indices = indices(&scaled);
+    let fitting = Palette::for_picture(&scaled, palette.take());
+    let palette = palette.insert(fitting);
+    let registers: Vec<u8> =
+        palette.indices(&scaled).into_iter().map(|index| FIRST.saturating_add(index)).collect();
     let mut bytes = format!("\x1bP0;1;0q\"1;1;{width};{height}").into_bytes();
-    for index in (FIRST..=u8::MAX).filter(|index| indices.contains(index)) {
-        let [r, g, b] =
-            color::fixed(index).unwrap_or_default().map(|level| (u32::from(level) * 100 + 127) / 255);
-        bytes.extend(format!("#{index};2;{r};{g};{b}").into_bytes());
+    for (register, color) in (FIRST..=u8::MAX).zip(palette.colors()) {
+        let [r, g, b] = color.map(|level| (u32::from(level) * 100 + 127) / 255);
+        bytes.extend(format!("#{register};2;{r};{g};{b}").into_bytes());
     }
-    for band in indices.chunks(6 * width as usize) {
-        push_band(band, width as usize, &mut bytes);
+    let mut band = Band::new(width as usize);
+    for rows in registers.chunks(6 * width as usize) {
+        band.push(rows, &mut bytes);
     }
     bytes.extend_from_slice(b"\x1b\\");
     bytes
 }
 
-/// The colour of each pixel. Five bits of a channel are enough to find it, dithered as well.
-fn indices(picture: &Picture) -> Vec<u8> {
-    let shades = Shades::new(ColorDepth::Indexed256, &[[0; 3]; 16]);
-    let width = picture.width as usize;
-    let index = |(i, rgb): (usize, &[u8; 3])| {
-        let (x, y) = (i % width, i / width);
-        match shades.color(color::coarse(*rgb, x, y), x, y) {
-            Color::Indexed(index) => index,
-            _ => FIRST,
-        }
-    };
-    picture.pixels.iter().enumerate().map(index).collect()
+/// Six rows: for each colour its sixels.
+struct Band {
+    width: usize,
+    /// Of all registers, one after the other.
+    sixels: Vec<u8>,
+    is_used: [bool; REGISTERS],
 }
 
-/// Six rows: for each colour in them its sixels, back to the left, and at last down.
-fn push_band(band: &[u8], width: usize, bytes: &mut Vec<u8>) {
-    let mut is_used = [false; 256];
-    for index in band {
-        is_used[usize::from(*index)] = true;
+impl Band {
+    fn new(width: usize) -> Self {
+        Self { width, sixels: vec![0; REGISTERS * width], is_used: [false; REGISTERS] }
     }
-    for index in (0..=u8::MAX).filter(|index| is_used[usize::from(*index)]) {
-        bytes.extend(format!("#{index}").into_bytes());
-        let sixel = |x: usize| {
-            let rows = band.chunks(width).enumerate();
-            let bits =
-                rows.filter(|(_, row)| row.get(x) == Some(&index)).fold(0, |bits, (y, _)| bits | 1 << y);
-            b'?' + bits
-        };
-        push_runs((0..width).map(sixel), bytes);
-        bytes.push(b'$');
+
+    /// Appends the sixels of each colour in these rows, back to the left after each, and at last down.
+    fn push(&mut self, rows: &[u8], bytes: &mut Vec<u8>) {
+        for (y, row) in rows.chunks(self.width).enumerate() {
+            for (x, register) in row.iter().enumerate() {
+                self.is_used[usize::from(*register)] = true;
+                self.sixels[usize::from(*register) * self.width + x] |= 1 << y;
+            }
+        }
+        for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
+            bytes.extend(format!("#{register}").into_bytes());
+            let own = &mut self.sixels[register * self.width..][..self.width];
+            push_runs(own.iter().map(|bits| b'?' + bits), bytes);
+            own.fill(0);
+            bytes.push(b'$');
+        }
+        bytes.push(b'-');
     }
-    bytes.push(b'-');
 }
 
 /// Sixels, with a count where many are alike; nothing for empty ones at the end.

@@ -101,8 +101,8 @@ fn sixels_have_the_size_of_their_cells_and_their_colours() {
     let mut images = Images::new(Protocol::Sixel, true);
     images.aim(Some(placed), true);
     let bytes = all(&mut images);
-    assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#21;2;0;0;100#196;2;100;0;0"), "{bytes}");
-    assert!(bytes.contains("#21!32?!32~$#196!32~$-"), "{bytes}");
+    assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#16;2;100;0;0#17;2;0;0;100"), "{bytes}");
+    assert!(bytes.contains("#16!32~$#17!32?!32~$-"), "{bytes}");
     assert!(bytes.ends_with("-\x1b\\\x1b8"));
     assert_eq!(bytes.matches('-').count(), 8, "48 rows are 8 bands");
 }

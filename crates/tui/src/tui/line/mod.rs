@@ -8,6 +8,8 @@
 //!
 //! A terminal that answers nothing within [`PATIENCE`] is paced by time, and so is one inside a multiplexer, which
 //! answers itself and says nothing of the line behind it.
+//!
+//! A terminal that takes slices and answers within [`QUICK`] is quick: it can follow the render.
 
 mod bucket;
 #[cfg(test)]
@@ -31,6 +33,9 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// After this silence, or after so many round trips, answers are taken for lost.
 const SILENCE: Duration = Duration::from_secs(1);
 const SILENT_TRIPS: u32 = 4;
+/// A terminal that usually answers a slice within this time is quick; so many slices tell what is usual.
+const QUICK: Duration = Duration::from_millis(20);
+const USUAL_OF: usize = 8;
 /// The least round trip is that of the last one or two of these.
 const AGE: Duration = Duration::from_secs(15);
 /// Slices are this large at most, and no smaller ones than this are begun.
@@ -78,6 +83,8 @@ pub(super) struct Line {
     /// When the window last shrank: slices from before say nothing new.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
+    /// Of the last slices, small ones too: else one that was slow for a moment would get no more that could tell otherwise.
+    recent: VecDeque<Duration>,
     /// When an answer last came, or one began to be owed.
     heard: Instant,
     bucket: Bucket,
@@ -96,6 +103,7 @@ impl Line {
             window: START,
             shrunk: None,
             round_trips: RoundTrips::default(),
+            recent: VecDeque::with_capacity(USUAL_OF),
             heard: now,
             bucket: Bucket::full(now),
             unwritten: 0,
@@ -157,6 +165,7 @@ impl Line {
             if slice.question == question && slice.bytes <= MOST {
                 let round_trip = now.saturating_duration_since(slice.sent);
                 self.round_trips.add(round_trip, now);
+                self.note_recent(round_trip);
                 self.fit(&slice, round_trip, now);
             }
         }
@@ -201,6 +210,20 @@ impl Line {
             Pace::Asked { .. } => None,
         };
         rate.filter(|rate| *rate < FAST)
+    }
+
+    /// Whether the terminal takes a slice and answers so soon that it can follow the render: of the last slices, more than
+    /// half were answered within [`QUICK`].
+    pub(super) fn is_quick(&self) -> bool {
+        let quick = self.recent.iter().filter(|round_trip| **round_trip <= QUICK).count();
+        self.pace == Pace::Answers && !self.is_multiplexed && 2 * quick > self.recent.len()
+    }
+
+    fn note_recent(&mut self, round_trip: Duration) {
+        if self.recent.len() == USUAL_OF {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(round_trip);
     }
 
     fn window_bytes(&self) -> usize {

@@ -188,3 +188,29 @@ fn answers_that_nobody_asked_for_change_nothing() {
     line.answered(Question::Attributes, now);
     assert!(!line.owes() && line.in_flight == 0);
 }
+
+#[test]
+fn a_terminal_that_was_slow_for_a_moment_is_quick_again_by_small_slices() {
+    let mut line = Line::new(false, Instant::now());
+    let mut now = Instant::now();
+    let mut answer = |line: &mut Line, bytes: usize, milliseconds: u64| {
+        line.send(bytes, Some(Question::Status), now);
+        now += Duration::from_millis(milliseconds);
+        line.answered(Question::Status, now);
+    };
+    assert!(!line.is_quick(), "nothing is known of it");
+    answer(&mut line, 2000, 1);
+    assert!(line.is_quick());
+    for _ in 0..8 {
+        answer(&mut line, 2000, 21);
+    }
+    assert!(!line.is_quick());
+    for _ in 0..5 {
+        answer(&mut line, 60, 20);
+    }
+    assert!(line.is_quick());
+    let mut behind = Line::new(true, now);
+    behind.send(12, Some(Question::Attributes), now);
+    behind.answered(Question::Attributes, now + Duration::from_millis(1));
+    assert!(!behind.is_quick(), "what answers is not the terminal");
+}

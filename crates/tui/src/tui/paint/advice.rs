@@ -1,6 +1,6 @@
 //! Which pictures are worth being drawn.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::Fidelity;
 
@@ -17,8 +17,12 @@ pub struct Moment {
     pub aimed_samples: Option<f64>,
     /// Since then.
     pub since_aim: Duration,
-    /// Whether that picture is on the screen.
+    /// Whether that picture is on the screen: sent, and, where the terminal is quick, answered for.
     pub is_shown: bool,
+    /// Whether the terminal takes what it is sent so soon that it can follow the render.
+    pub is_quick: bool,
+    /// Whether the picture is drawn in pixels.
+    pub is_in_pixels: bool,
     /// Whether the picture stays.
     pub is_final: bool,
     /// Until there is one that stays, where that can be told.
@@ -44,18 +48,25 @@ const MANY_MORE_SAMPLES: f64 = 4.0;
 const FIRST_PASS: f64 = 0.25;
 /// Pictures come no faster than this, but for the first and the last one.
 const SHORTEST: Duration = Duration::from_millis(100);
+/// The same of pictures in pixels, which take time to be encoded and decoded.
+const SHORTEST_IN_PIXELS: Duration = Duration::from_millis(180);
 /// After this any picture is better than one that stands still.
 const LONGEST: Duration = Duration::from_secs(2);
 /// Part of the line that pictures on the way may take.
 const SHARE: f64 = 0.5;
 
-/// Whether a picture is worth its bytes. The first and the last one always are. On a line that takes long for a
-/// picture there are few in between, and none that would keep the last one waiting.
+/// Whether a picture is worth its bytes. The first and the last one always are. A quick terminal gets every picture, 5 to
+/// 10 times a second. On a line that takes long for a picture there are few in between, and none that would keep the
+/// last one waiting.
 pub fn advise(moment: &Moment) -> Advice {
     if moment.is_final {
         return Advice::Aim(Fidelity::Still);
     }
     let Some(aimed) = moment.aimed_samples else { return Advice::Aim(Fidelity::First) };
+    if moment.is_quick {
+        let is_due = moment.is_shown && moment.since_aim >= moment.shortest();
+        return if is_due { Advice::Aim(Fidelity::Following) } else { Advice::Wait };
+    }
     let frame = moment.frame();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
     let is_too_soon = moment.since_aim < SHORTEST.max(frame.div_f64(SHARE));
@@ -74,6 +85,16 @@ pub fn advise(moment: &Moment) -> Advice {
 }
 
 impl Moment {
+    /// The time between two pictures on a quick terminal.
+    fn shortest(&self) -> Duration {
+        if self.is_in_pixels { SHORTEST_IN_PIXELS } else { SHORTEST }
+    }
+
+    /// When a quick terminal is to get the next picture, if one waits.
+    pub fn due(&self, aimed: Instant) -> Option<Instant> {
+        (self.is_quick && self.is_shown).then(|| aimed + self.shortest())
+    }
+
     /// How long the line takes for a picture on the way.
     fn frame(&self) -> Duration {
         let bytes = f64::from(self.cells) * MOVING_BYTES;
@@ -97,6 +118,8 @@ mod tests {
         aimed_samples: Some(1.0),
         since_aim: Duration::from_secs(1),
         is_shown: true,
+        is_quick: false,
+        is_in_pixels: false,
         is_final: false,
         final_in: None,
     };
@@ -119,6 +142,19 @@ mod tests {
         let late = Moment { since_aim: Duration::from_secs(3), ..MOMENT };
         assert_eq!(advise(&late), MOVING, "or it is a while ago");
         assert_eq!(advise(&Moment { samples: 1.0, ..late }), Advice::Wait, "but not the same one again");
+    }
+
+    #[test]
+    fn a_quick_terminal_gets_every_picture_5_to_10_times_a_second() {
+        let following = Advice::Aim(Fidelity::Following);
+        let quick = Moment { is_quick: true, since_aim: Duration::from_millis(100), ..MOMENT };
+        assert_eq!(advise(&quick), following, "however few samples are new");
+        assert_eq!(advise(&Moment { samples: 0.5, ..quick }), following, "their number may be told late");
+        assert_eq!(advise(&Moment { since_aim: Duration::from_millis(99), ..quick }), Advice::Wait);
+        assert_eq!(advise(&Moment { is_shown: false, ..quick }), Advice::Wait, "one after the other");
+        let in_pixels = Moment { is_in_pixels: true, ..quick };
+        assert_eq!(advise(&in_pixels), Advice::Wait);
+        assert_eq!(advise(&Moment { since_aim: Duration::from_millis(200), ..in_pixels }), following);
     }
 
     #[test]

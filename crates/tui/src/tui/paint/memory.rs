@@ -53,7 +53,12 @@ impl Memory {
         }
         match wanted.fidelity {
             Fidelity::First => self.begin(wanted),
-            Fidelity::Moving => self.noise = screen.map_or(0, |screen| self.measure(wanted, screen)),
+            Fidelity::Moving => self.noise = noise(self.median(wanted, screen)),
+            Fidelity::Following => match self.median(wanted, screen) {
+                // There is hardly any left to hide.
+                ..=1 => self.steady.fill(false),
+                median => self.noise = noise(median),
+            },
             Fidelity::Still => self.steady.fill(false),
         }
     }
@@ -68,9 +73,10 @@ impl Memory {
         }
     }
 
-    /// The noise in what is wanted, from how far it is off the cells that did not change: four times the median.
-    fn measure(&self, wanted: &Wanted, screen: &Screen) -> u8 {
+    /// The median of how far what is wanted is off the cells that did not change.
+    fn median(&self, wanted: &Wanted, screen: Option<&Screen>) -> usize {
         let mut counts = [0_u32; 256];
+        let Some(screen) = screen else { return 0 };
         for y in wanted.picture.top()..wanted.picture.bottom() {
             for x in wanted.picture.left()..wanted.picture.right() {
                 if let (true, Look::Mosaic(shown), Some(wanted)) =
@@ -86,7 +92,7 @@ impl Memory {
             below += **count;
             below * 2 < all
         });
-        u8::try_from(4 * median.count() + 2).unwrap_or(u8::MAX).min(MOST_NOISE)
+        median.count()
     }
 
     /// What a cell is to show: what it shows already where nothing but noise speaks against it.
@@ -134,6 +140,11 @@ impl Memory {
     pub(super) fn finish(&mut self) {
         self.newest.clear();
     }
+}
+
+/// The noise that is not worth being drawn where it is usually off by this much.
+fn noise(median: usize) -> u8 {
+    u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MOST_NOISE)
 }
 
 /// The largest difference of a channel; 255 where there is no telling.

@@ -6,7 +6,8 @@
 //! other characters do other parts, and the one that costs least after what was drawn before is taken.
 //!
 //! Words are exact. A picture that will be followed by better ones is drawn as far as an error is worth its bytes,
-//! and where an edit changed nothing the screen is left alone. A picture that stays is exact to 1/255.
+//! on a quick terminal exactly, and where an edit changed nothing the screen is left alone. A picture that stays is
+//! exact to 1/255.
 //! [`advise`] tells which pictures are worth being aimed at on a line of some speed.
 
 mod abilities;
@@ -48,6 +49,8 @@ pub enum Fidelity {
     First,
     /// A picture of the same request that better ones will follow.
     Moving,
+    /// The same on a terminal that can follow the render: every colour.
+    Following,
     /// A picture that stays: every colour to 1/255.
     Still,
 }

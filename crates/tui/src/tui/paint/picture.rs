@@ -70,6 +70,7 @@ pub(super) fn plan(
     };
     let row = match wanted.fidelity {
         Fidelity::Still => row(&targets, start, Taste::EXACT),
+        Fidelity::Following => row(&targets, start, Taste::ALL),
         Fidelity::Moving => row(&targets, start, Taste::MOVING),
         Fidelity::First => budget.spend(&targets, start),
     };

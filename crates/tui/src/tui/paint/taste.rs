@@ -18,6 +18,9 @@ impl Taste {
     /// Every colour to 1/255.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
+    /// Every colour, whatever it takes.
+    pub(super) const ALL: Self = Self { byte: 64.0, most: 0, spans: &[0] };
+
     /// An error of 14/255 in all channels of a half is about worth the bytes of a colour.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 

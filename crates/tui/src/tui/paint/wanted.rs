@@ -42,7 +42,8 @@ impl Wanted {
     /// Whether a row that shows this picture shows that one as well.
     pub(super) fn serves(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
-            || (self.fidelity == Fidelity::Still && other.fidelity == Fidelity::Moving);
+            || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
+                && other.fidelity == Fidelity::Moving);
         let columns = usize::from(self.picture.left())..usize::from(self.picture.right());
         is_as_near
             && (self.columns, self.picture) == (other.columns, other.picture)

@@ -17,6 +17,7 @@ fn show(desk: &mut Desk) -> Vec<crate::tui::event::Effect> {
         picture: plain_picture(50, 38, BLUE),
         range: None,
         section: None,
+        lacks_photons: false,
     })
 }
 

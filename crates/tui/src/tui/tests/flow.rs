@@ -31,6 +31,7 @@ fn pictures_of_older_generations_are_dropped() {
         picture: plain_picture(50, 38, BLUE),
         range: None,
         section: None,
+        lacks_photons: false,
     });
     desk.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
     desk.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
@@ -55,6 +56,7 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
         picture: plain_picture(50, 38, BLUE),
         range: None,
         section: None,
+        lacks_photons: false,
     });
     desk.now += Duration::from_millis(20);
     desk.event(Event::Shown { generation: 2 });
@@ -75,6 +77,7 @@ fn only_the_first_picture_of_a_request_does_not_wait_for_its_turn() {
             picture: plain_picture(50, 38, RED),
             range: None,
             section: None,
+            lacks_photons: false,
         });
         desk.state.urgent
     };
@@ -131,6 +134,7 @@ fn another_window_asks_for_another_preview_once_it_is_quiet() {
         picture: plain_picture(149, 112, BLUE),
         range: None,
         section: None,
+        lacks_photons: false,
     });
     assert!(cells_of(&mut desk, BLUE) > 0, "the same request shows its picture again");
     desk.finish(RED);

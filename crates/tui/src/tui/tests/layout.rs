@@ -32,7 +32,7 @@ fn show(desk: &mut Desk, size: (u32, u32)) {
     let generation = desk.state.generation;
     let (width, height) = previewed(size, desk.state.requested.expect("a preview"));
     let picture = plain_picture(width, height, RED);
-    desk.event(Event::Picture { generation, picture, range: None, section: None });
+    desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
 }
 
 /// Cells of the largest picture that a window could hold beside one line of words.

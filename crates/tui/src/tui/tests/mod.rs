@@ -2,6 +2,7 @@
 
 mod camera;
 mod flow;
+mod following;
 mod keys;
 mod layout;
 mod noise;

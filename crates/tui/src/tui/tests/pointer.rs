@@ -205,6 +205,7 @@ fn older_pictures_wait_for_no_newer_one_and_a_render_ends_them() {
         picture: plain_picture(50, 38, [10, 200, 10]),
         range: None,
         section: None,
+        lacks_photons: false,
     });
     assert!(super::cells_of(&mut desk, RED) > 0, "the older one stays");
     desk.press('N');
@@ -276,7 +277,7 @@ fn a_close_up_is_drawn_pixel_by_pixel_and_clicks_know_where_they_are() {
     let section = Some(Section { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = desk.state.generation;
     let picture = plain_picture(20, 10, BLUE);
-    desk.event(Event::Picture { generation, picture, range: None, section });
+    desk.event(Event::Picture { generation, picture, range: None, section, lacks_photons: false });
     assert_eq!(super::cells_of(&mut desk, BLUE), 20 * 5, "{}", desk.text());
     assert!(desk.text().contains("cornell.toml  1:1"), "{}", desk.text());
     // The area has 56 × 21 cells from (0, 1) on: the picture begins at (18, 9).

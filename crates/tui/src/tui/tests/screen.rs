@@ -39,7 +39,13 @@ fn upper_and_lower_pixels_are_foreground_and_background() {
             *pixel = BLUE;
         }
     }
-    desk.event(Event::Picture { generation, picture: picture.into(), range: None, section: None });
+    desk.event(Event::Picture {
+        generation,
+        picture: picture.into(),
+        range: None,
+        section: None,
+        lacks_photons: false,
+    });
     let screen = desk.screen();
     for place in [(0, 1), (55, 21), (17, 9)] {
         assert_eq!((screen[place].fg, screen[place].bg), (Color::Rgb(200, 20, 10), Color::Rgb(10, 20, 200)));
@@ -69,7 +75,13 @@ fn what_a_picture_is_stretched_to_stands_beside_its_view() {
         (None, "view depth  "),
     ] {
         let generation = desk.state.generation;
-        desk.event(Event::Picture { generation, picture: plain_picture(51, 40, RED), range, section: None });
+        desk.event(Event::Picture {
+            generation,
+            picture: plain_picture(51, 40, RED),
+            range,
+            section: None,
+            lacks_photons: false,
+        });
         assert!(desk.text().contains(words), "{words}: {}", desk.text());
     }
 }
@@ -79,7 +91,13 @@ fn a_picture_that_lies_about_its_size_is_not_shown() {
     let mut desk = Desk::new();
     let mut picture = (*plain_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
-    desk.event(Event::Picture { generation: 1, picture: picture.into(), range: None, section: None });
+    desk.event(Event::Picture {
+        generation: 1,
+        picture: picture.into(),
+        range: None,
+        section: None,
+        lacks_photons: false,
+    });
     assert!(desk.state.picture.is_none());
 }
 
@@ -363,7 +381,7 @@ proptest! {
                 3 => { desk.worker(protocol::Event::Progress { generation, progress: progress(0.3, Some(9.0)) }); }
                 4 => {
                     let picture = plain_picture(picture.0, picture.1, BLUE);
-                    desk.event(Event::Picture { generation, picture, range: None, section: None });
+                    desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
                 }
                 5 => { desk.event(Event::Resize(window(rows, columns.min(80)))); }
                 6 => { desk.wait(300); }
@@ -444,4 +462,28 @@ fn a_change_of_time_that_has_no_room_is_left_out() {
     desk.event(Event::Resize(window(80, 24)));
     let text = desk.text();
     assert!(text.contains("350 ms") && !text.contains('−'), "{text}");
+}
+
+#[test]
+fn a_picture_that_lacks_photons_is_said_to() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    desk.worker(protocol::Event::Stage {
+        generation: 1,
+        stage: stage(Stage::Photons, Status::Running, 0.0, ""),
+    });
+    assert!(!desk.text().contains("without photons"), "there is no picture yet");
+    let picture = |lacks_photons| Event::Picture {
+        generation: 1,
+        picture: plain_picture(50, 38, RED),
+        range: None,
+        section: None,
+        lacks_photons,
+    };
+    desk.event(picture(true));
+    assert!(desk.text().contains("shown without photons yet"), "{}", desk.text());
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.1, None) });
+    assert!(desk.text().contains("shown without photons yet"), "as long as that picture is shown");
+    desk.event(picture(false));
+    assert!(!desk.text().contains("without photons"), "{}", desk.text());
 }

@@ -58,8 +58,8 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
-        Event::Picture { generation, picture, range, section } => {
-            show(state, Shown { generation, picture, range, section })
+        Event::Picture { generation, picture, range, section, lacks_photons } => {
+            show(state, Shown { generation, picture, range, section, lacks_photons })
         }
         Event::Changed(Changed { noticed }) => {
             // It may be glimt's own save, or the one that kept it from its own: what was said of that stays.
@@ -155,10 +155,31 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
             return Vec::new();
         }
         state.urgent |= state.picture.as_ref().is_none_or(|last| last.generation != shown.generation);
-        state.picture = Some(shown);
+        let last = state.picture.take().filter(|last| last.generation == shown.generation);
+        state.picture = Some(match last {
+            Some(last) if state.mixes_colors() => steadied(shown, &last),
+            Some(_) | None => shown,
+        });
         state.dirty = true;
     }
     Vec::new()
+}
+
+/// A picture whose pixels keep the colours of the one before it that they hardly differ from. Where colours are mixed from a
+/// few others, one code more is quite another mixture.
+fn steadied(mut shown: Shown, last: &Shown) -> Shown {
+    const HARDLY: u8 = 1;
+    let what = |shown: &Shown| (shown.picture.width, shown.picture.height, shown.section);
+    if what(&shown) == what(last) {
+        let mut picture = (*shown.picture).clone();
+        for (new, old) in picture.pixels.iter_mut().zip(&last.picture.pixels) {
+            if new.iter().zip(old).all(|(new, old)| new.abs_diff(*old) <= HARDLY) {
+                *new = *old;
+            }
+        }
+        shown.picture = picture.into();
+    }
+    shown
 }
 
 fn is_whole(picture: &Picture) -> bool {

@@ -109,6 +109,11 @@ fn view(state: &State) -> String {
     format!("  view {}{range}", state.view().name())
 }
 
+/// Whether the picture at hand lacks the light that photons bring.
+fn lacks_photons(state: &State) -> bool {
+    state.picture.as_ref().is_some_and(|shown| shown.lacks_photons && shown.generation == state.generation)
+}
+
 /// Whether the picture is shown pixel by pixel.
 fn close_up(state: &State) -> String {
     let is_close = state.picture.as_ref().is_some_and(|shown| shown.section.is_some());
@@ -121,6 +126,9 @@ fn figures(state: &State) -> Vec<String> {
         let place = format!("{number} of {count}");
         let age = ago(state.now.saturating_duration_since(time));
         return vec![format!("picture {place}, {age}"), place];
+    }
+    if state.is_running() && lacks_photons(state) {
+        return ["shown without photons yet", "no photons yet"].map(str::to_owned).to_vec();
     }
     match (state.activity, &state.report, &state.progress) {
         (Activity::Running { .. }, _, Some(progress)) => {

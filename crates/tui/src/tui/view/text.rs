@@ -54,8 +54,10 @@ impl Tone {
             Self::Error => (Color::White, Color::Red),
             Self::Plain | Self::Faint | Self::Strong | Self::Chosen => (Color::Reset, Color::Reset),
         };
-        let modifier = if bg == Color::Reset { Modifier::REVERSED } else { Modifier::empty() };
-        Style::new().fg(fg).bg(bg).add_modifier(modifier | Modifier::BOLD)
+        // Bold black is grey in xterm and others, which draw bold by the brighter half of the palette.
+        let reversed = Modifier::REVERSED.union(Modifier::BOLD);
+        let modifier = if bg == Color::Reset { reversed } else { Modifier::empty() };
+        Style::new().fg(fg).bg(bg).add_modifier(modifier)
     }
 }
 
@@ -231,6 +233,16 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// xterm draws bold black as grey.
+    #[test]
+    fn nothing_on_a_block_of_colour_is_bold() {
+        for tone in [Tone::Working, Tone::Good, Tone::Warning, Tone::Error] {
+            let style = tone.block(ColorDepth::TrueColor);
+            assert!(!style.add_modifier.contains(Modifier::BOLD), "{tone:?}");
+            assert!(tone.block(ColorDepth::None).add_modifier.contains(Modifier::REVERSED), "{tone:?}");
+        }
+    }
 
     #[test]
     fn shares_have_two_digits() {

@@ -1,0 +1,57 @@
+//! How much of a thin line the pictures of a camera take that a key moves.
+
+use std::error::Error;
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::watched::{Line, Watched};
+
+/// How often the key repeats, how long it is held before the line is looked at, and how long it is looked at.
+const REPEAT: Duration = Duration::from_millis(33);
+const BEFORE: Duration = Duration::from_secs(2);
+const HELD: Duration = Duration::from_secs(6);
+
+/// Prints a line for each of some scenes.
+pub(crate) fn print() -> Result<(), Box<dyn Error>> {
+    println!(
+        "a key on the camera is held for {} s, at the end of a line of 1 Mbit/s and 150 ms",
+        HELD.as_secs()
+    );
+    println!("{:<16} {:>14} {:>22}", "", "line used", "most unanswered bytes");
+    for scene in ["cornell", "cornell_glass", "textures", "spheres"] {
+        let (share, most) = orbit(scene)?;
+        println!("{scene:<16} {:>12.0} % {most:>22}", 100.0 * share);
+    }
+    Ok(())
+}
+
+/// The part of the line that was used, and the most bytes that had not been answered for.
+fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
+    let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene).with_extension("toml");
+    let folder = tempfile::tempdir()?;
+    let scene = scene.to_str().ok_or("a name that is no text")?;
+    let command = [&*program, scene, "--samples", "100000", "-o", "out.png"];
+    let terminal = Watched::open(&command, folder.path(), Line::THIN)?;
+    terminal.wait("a picture", |far| far.percent().is_some())?;
+    thread::sleep(BEFORE);
+    hold(&terminal, BEFORE)?;
+    let before = terminal.far().came;
+    hold(&terminal, HELD)?;
+    let far = terminal.far();
+    let most = Line::THIN.bytes_per_second * HELD.as_secs_f64();
+    Ok(((far.came - before) as f64 / most, far.most_unanswered))
+}
+
+/// Holds a key that orbits, as keyboards repeat it.
+fn hold(terminal: &Watched, time: Duration) -> Result<(), Box<dyn Error>> {
+    let begin = Instant::now();
+    let mut presses = 0;
+    while begin.elapsed() < time {
+        terminal.press("l")?;
+        presses += 1;
+        thread::sleep((begin + REPEAT * presses).saturating_duration_since(Instant::now()));
+    }
+    Ok(())
+}

@@ -1,0 +1,230 @@
+//! The program in a pseudo-terminal, at the end of a line, with what is seen at the other end.
+
+use std::error::Error;
+use std::io::{Read, Write};
+use std::num::NonZeroU16;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use glimt::tui::{PixelScreen, filled, in_xterm};
+use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
+use ratatui::style::Color;
+
+pub(crate) const COLUMNS: u16 = 120;
+pub(crate) const ROWS: u16 = 40;
+/// Width and height of a cell in pixels.
+const CELL: (u16, u16) = (8, 16);
+/// Nothing that is waited for takes this long.
+const LIMIT: Duration = Duration::from_secs(600);
+/// What a terminal answers to what it is asked: whether it is there, what it is, whether it synchronises its output.
+const ANSWERS: [(&[u8], &[u8]); 3] =
+    [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;4;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
+
+/// A way to the terminal.
+#[derive(Clone, Copy)]
+pub(crate) struct Line {
+    pub(crate) bytes_per_second: f64,
+    /// One way.
+    pub(crate) delay: Duration,
+}
+
+impl Line {
+    /// To a terminal on the same machine.
+    pub(crate) const NONE: Self = Self { bytes_per_second: f64::INFINITY, delay: Duration::ZERO };
+    /// 1 Mbit/s, 150 ms there and back.
+    pub(crate) const THIN: Self = Self { bytes_per_second: 125e3, delay: Duration::from_millis(75) };
+}
+
+/// What is at the other end.
+pub(crate) struct Far {
+    pub(crate) cells: vt100::Parser,
+    pub(crate) pixels: PixelScreen,
+    /// Bytes that have come.
+    pub(crate) came: usize,
+    /// Bytes that were sent, and those up to the last question that was answered.
+    sent: usize,
+    answered: usize,
+    pub(crate) most_unanswered: usize,
+}
+
+impl Far {
+    /// The colours of the parts of the picture's cells, or of its pixels.
+    pub(crate) fn seen(&self) -> Vec<[u8; 3]> {
+        if let Some(picture) = self.pixels.shown() {
+            return picture.pixels.clone();
+        }
+        let (rows, columns) = self.cells.screen().size();
+        let places = (1..rows.get()).flat_map(|row| (0..columns.get()).map(move |column| (row, column)));
+        let cells = places.filter_map(|(row, column)| self.cells.screen().cell(row, column));
+        cells.flat_map(parts).collect()
+    }
+
+    /// How much of the render is done, as the screen says; 100 when it is over.
+    pub(crate) fn percent(&self) -> Option<u32> {
+        let row =
+            self.cells.screen().rows(0, COLUMNS).find(|row| row.contains("glimt") || !row.is_empty())?;
+        if row.contains("✓ done") || row.contains("! unwritten") {
+            return Some(100);
+        }
+        let words: Vec<&str> = row.split_whitespace().collect();
+        let place = words.iter().position(|word| *word == "%")?;
+        words.get(place.checked_sub(1)?)?.parse().ok()
+    }
+}
+
+/// The colours of the parts of a cell; black for what is not of blocks, so that all screens have as many.
+fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
+    let color = |color| match color {
+        vt100::Color::Default => None,
+        vt100::Color::Idx(index) => in_xterm(Color::Indexed(index)),
+        vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
+    };
+    let (fg, bg) = (color(cell.fgcolor()), color(cell.bgcolor()));
+    let filled = filled(cell.contents().chars().next().unwrap_or(' ')).unwrap_or([false; 24]);
+    filled.map(|is_ink| if is_ink { fg } else { bg }.unwrap_or_default())
+}
+
+/// A terminal with the program inside.
+pub(crate) struct Watched {
+    // Held so that the terminal stays.
+    _master: Box<dyn MasterPty + Send>,
+    child: Box<dyn Child + Send + Sync>,
+    keys: Arc<Mutex<Box<dyn Write + Send>>>,
+    far: Arc<Mutex<Far>>,
+}
+
+impl Watched {
+    /// Starts a command in this folder.
+    pub(crate) fn open(command: &[&str], folder: &Path, line: Line) -> Result<Self, Box<dyn Error>> {
+        let size =
+            PtySize { rows: ROWS, cols: COLUMNS, pixel_width: COLUMNS * CELL.0, pixel_height: ROWS * CELL.1 };
+        let pair = native_pty_system().openpty(size)?;
+        let mut builder = CommandBuilder::new(command[0]);
+        builder.args(&command[1..]);
+        builder.cwd(folder);
+        for name in ["NO_COLOR", "TMUX", "TERM_PROGRAM", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"] {
+            builder.env_remove(name);
+        }
+        builder.env("TERM", "xterm-256color");
+        builder.env("COLORTERM", "truecolor");
+        let child = pair.slave.spawn_command(builder)?;
+        let keys = Arc::new(Mutex::new(pair.master.take_writer()?));
+        let side = |length| NonZeroU16::new(length).ok_or("a terminal has no cells");
+        let far = Arc::new(Mutex::new(Far {
+            cells: vt100::Parser::new(side(ROWS)?, side(COLUMNS)?, 0),
+            pixels: PixelScreen::default(),
+            came: 0,
+            sent: 0,
+            answered: 0,
+            most_unanswered: 0,
+        }));
+        carry(pair.master.try_clone_reader()?, far.clone(), keys.clone(), line);
+        Ok(Self { _master: pair.master, child, keys, far })
+    }
+
+    /// Types these characters.
+    pub(crate) fn press(&self, keys: &str) -> Result<(), Box<dyn Error>> {
+        Ok(lock(&self.keys).write_all(keys.as_bytes())?)
+    }
+
+    /// What is at the other end now.
+    pub(crate) fn far(&self) -> MutexGuard<'_, Far> {
+        lock(&self.far)
+    }
+
+    /// Waits until the other end is as told.
+    pub(crate) fn wait(&self, what: &str, holds: impl Fn(&Far) -> bool) -> Result<(), Box<dyn Error>> {
+        let deadline = Instant::now() + LIMIT;
+        while !holds(&self.far()) {
+            if Instant::now() > deadline {
+                let screen = self.far().cells.screen().contents();
+                return Err(format!("not seen: {what}\n{screen}").into());
+            }
+            thread::sleep(Duration::from_millis(2));
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        // The figures are there; how it ends is of no interest.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Bytes that arrive at that time.
+type Due = (Instant, Vec<u8>);
+
+/// The line: what the program writes comes to the other end, and the answers come back.
+fn carry(
+    mut output: Box<dyn Read + Send>,
+    far: Arc<Mutex<Far>>,
+    keys: Arc<Mutex<Box<dyn Write + Send>>>,
+    line: Line,
+) {
+    let ((down, arriving), (up, rising)) = (channel::<Due>(), channel::<(Instant, usize, &'static [u8])>());
+    let at_end = far.clone();
+    thread::spawn(move || arrive(&arriving, &at_end, &up, line.delay));
+    let at_start = far.clone();
+    thread::spawn(move || {
+        while let Ok((when, asked, answer)) = rising.recv() {
+            thread::sleep(when.saturating_duration_since(Instant::now()));
+            lock(&at_start).answered = asked;
+            if lock(&keys).write_all(answer).is_err() {
+                return;
+            }
+        }
+    });
+    thread::spawn(move || {
+        let (mut bytes, mut free) = ([0; 1 << 12], Instant::now());
+        while let Ok(count @ 1..) = output.read(&mut bytes) {
+            let now = Instant::now();
+            {
+                let mut far = lock(&far);
+                far.sent += count;
+                far.most_unanswered = far.most_unanswered.max(far.sent - far.answered);
+            }
+            for part in bytes[..count].chunks(1 << 10) {
+                free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / line.bytes_per_second);
+                if down.send((free + line.delay, part.to_vec())).is_err() {
+                    return;
+                }
+            }
+        }
+    });
+}
+
+fn arrive(
+    arriving: &Receiver<Due>,
+    far: &Mutex<Far>,
+    up: &Sender<(Instant, usize, &'static [u8])>,
+    delay: Duration,
+) {
+    let mut tail = Vec::new();
+    while let Ok((when, bytes)) = arriving.recv() {
+        thread::sleep(when.saturating_duration_since(Instant::now()));
+        let mut far = lock(far);
+        far.cells.process(&bytes);
+        far.pixels.take(&bytes);
+        for byte in bytes {
+            far.came += 1;
+            tail.push(byte);
+            if let Some((_, answer)) = ANSWERS.iter().find(|(question, _)| tail.ends_with(question)) {
+                // A program that is gone needs no answer.
+                let _ = up.send((Instant::now() + delay, far.came, *answer));
+            }
+            if tail.len() > 64 {
+                tail.drain(..48);
+            }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Pictures in pixels as a terminal takes them, for tests and benchmarks.
+
+use super::base64::decoded;
+use crate::film::Picture;
+
+/// A terminal that takes kitty's graphics and sixels and nothing else, and shows the last whole picture.
+#[derive(Debug, Default)]
+pub struct PixelScreen {
+    /// The string that has begun, with its introducer.
+    string: Option<Vec<u8>>,
+    is_escaped: bool,
+    /// Base64 of kitty's chunks so far.
+    chunks: Vec<u8>,
+    shown: Option<Picture>,
+    count: usize,
+}
+
+impl PixelScreen {
+    /// Takes what was written to the terminal, cut anywhere.
+    pub fn take(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            let is_escaped = std::mem::replace(&mut self.is_escaped, *byte == 0x1b);
+            match (is_escaped, byte, &mut self.string) {
+                (true, b'P' | b'_', _) => self.string = Some(vec![*byte]),
+                (true, b'\\', string) => {
+                    if let Some(string) = string.take() {
+                        self.end(&string);
+                    }
+                }
+                (_, 0x1b, _) => {}
+                (false, byte, Some(string)) => string.push(*byte),
+                (..) => {}
+            }
+        }
+    }
+
+    /// The picture that is shown.
+    pub fn shown(&self) -> Option<&Picture> {
+        self.shown.as_ref()
+    }
+
+    /// How many pictures were shown so far.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    fn end(&mut self, string: &[u8]) {
+        let picture = match string {
+            [b'_', b'G', command @ ..] => self.chunk(command),
+            [b'P', sixels @ ..] => sixel(sixels),
+            _ => None,
+        };
+        if picture.is_some() {
+            self.shown = picture;
+            self.count += 1;
+        }
+    }
+
+    /// One of kitty's commands; the picture if it is the last chunk of one.
+    fn chunk(&mut self, command: &[u8]) -> Option<Picture> {
+        let split = command.iter().position(|byte| *byte == b';')?;
+        let (keys, data) = (std::str::from_utf8(&command[..split]).ok()?, &command[split + 1..]);
+        self.chunks.extend_from_slice(data);
+        if keys.split(',').any(|key| key == "m=1") {
+            return None;
+        }
+        png(&decoded(&std::mem::take(&mut self.chunks)))
+    }
+}
+
+/// A picture of three channels from PNG.
+fn png(bytes: &[u8]) -> Option<Picture> {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
+    let mut data = vec![0; reader.output_buffer_size()?];
+    let info = reader.next_frame(&mut data).ok()?;
+    let pixels = data[..info.buffer_size()].as_chunks().0.to_vec();
+    (info.color_type == png::ColorType::Rgb).then_some(Picture {
+        width: info.width,
+        height: info.height,
+        pixels,
+    })
+}
+
+/// A picture from a string of sixels with its size and its palette in it.
+fn sixel(string: &[u8]) -> Option<Picture> {
+    let start = string.iter().position(|byte| *byte == b'q')? + 1;
+    let mut rest = &string[start..];
+    let (mut width, mut height, mut pixels) = (0, 0, Vec::new());
+    let (mut palette, mut color, mut count) = ([[0; 3]; 256], 0, 1);
+    let (mut x, mut top) = (0, 0);
+    while let Some((byte, after)) = rest.split_first() {
+        rest = after;
+        match byte {
+            b'"' => {
+                let numbers = numbers(&mut rest);
+                (width, height) = (*numbers.get(2)?, *numbers.get(3)?);
+                pixels = vec![[0; 3]; width * height];
+            }
+            b'#' => {
+                let numbers = numbers(&mut rest);
+                color = *numbers.first()?;
+                if let [_, 2, rgb @ ..] = &*numbers {
+                    let channel = |i: usize| (rgb.get(i).copied().unwrap_or(0) * 255 + 50) / 100;
+                    *palette.get_mut(color)? = std::array::from_fn(|i| channel(i) as u8);
+                }
+            }
+            b'!' => count = *numbers(&mut rest).first()?,
+            b'$' => x = 0,
+            b'-' => (x, top) = (0, top + 6),
+            b'?'..=b'~' => {
+                for row in (0..6).filter(|row| (byte - b'?') >> row & 1 == 1 && top + row < height) {
+                    let line = &mut pixels[(top + row) * width..][..width];
+                    line[x.min(width)..(x + count).min(width)].fill(*palette.get(color)?);
+                }
+                (x, count) = (x + count, 1);
+            }
+            _ => {}
+        }
+    }
+    Some(Picture { width: width as u32, height: height as u32, pixels })
+}
+
+/// The numbers at the beginning, with semicolons between them, which are taken away.
+fn numbers(rest: &mut &[u8]) -> Vec<usize> {
+    let end = rest.iter().position(|byte| !matches!(byte, b'0'..=b'9' | b';')).unwrap_or(rest.len());
+    let (text, after) = rest.split_at(end);
+    *rest = after;
+    let number = |text: &[u8]| text.iter().fold(0, |number, digit| number * 10 + usize::from(digit - b'0'));
+    text.split(|byte| *byte == b';').map(number).collect()
+}
