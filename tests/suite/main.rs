@@ -14,6 +14,7 @@ mod house;
 mod inputs;
 mod kernel;
 mod mutation;
+mod noise;
 mod once;
 mod options;
 mod output;
