@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The noise that is left beside the error that was asked for.
 
-    python3 benches/adaptive/truth.py [SCENE...] [--error E] [--seeds N] [--side PIXELS] [--photons] [--glimt BINARY]
+    python3 benches/adaptive/truth.py [SCENE...] [--error E] [--seeds N] [--side PIXELS] [--photons]
+        [--integrator I] [--glimt BINARY]
 
 Each scene is rendered by N seeds with `error = E`. The spread of these pictures is the true noise of each tile: the root mean square
 standard deviation of its pixels' luminance, over the larger of its mean and 1 % of the picture's. Printed, as parts of E: the root mean
@@ -48,6 +49,7 @@ def arguments():
     parser.add_argument("--seeds", type=int, default=8)
     parser.add_argument("--side", type=int, default=192)
     parser.add_argument("--photons", action="store_true")
+    parser.add_argument("--integrator")
     parser.add_argument("--glimt", default=str(ROOT / "target" / "release" / "glimt"))
     return parser.parse_args()
 
@@ -83,9 +85,10 @@ def rendered(asked, scene, folder):
         image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
         return image.astype(np.float64), json.loads(report.read_text())["image"], foretold(told)
 
-    photons = ["--photons", "on"] if asked.photons else []
-    runs = [render(seed, photons) for seed in range(1, asked.seeds + 1)]
-    counts = render(1, [*photons, "--view", "samples"])[0][..., 0]
+    options = ["--photons", "on"] if asked.photons else []
+    options += ["--integrator", asked.integrator] if asked.integrator else []
+    runs = [render(seed, options) for seed in range(1, asked.seeds + 1)]
+    counts = render(1, [*options, "--view", "samples"])[0][..., 0]
     told = [image["error"] for _, image, _ in runs], [image["samples"]["mean"] for _, image, _ in runs]
     luminance = np.array([picture @ np.array(WEIGHTS) for picture, _, _ in runs])
     return luminance, counts, *told, [share for _, _, share in runs if share]

@@ -16,6 +16,7 @@ mod json;
 mod keeping;
 mod kernel;
 mod mutation;
+mod noise;
 mod once;
 mod options;
 mod output;

@@ -40,6 +40,8 @@ struct LevelSums {
     outer: f64,
     /// Steps within the second half of the samples.
     inner: f64,
+    /// Squares of these: how few pixels the sum hangs on.
+    outer_squares: f64,
     /// `outer`, each over luminance² + [`RELMSE_LEAST`].
     relative: f64,
     /// `inner`, each over luminance² + [`RELMSE_LEAST`].
@@ -105,6 +107,7 @@ impl Steps {
             let scale = 1.0 / (luminance * luminance + RELMSE_LEAST);
             let sums = &mut self.levels[level - 1][cell][half];
             sums.outer += outer;
+            sums.outer_squares += outer * outer;
             sums.inner += inner;
             sums.relative += outer * scale;
             sums.relative_inner += inner * scale;
@@ -352,6 +355,17 @@ impl Film {
         tile.steps.fall(tile.steps.levels.len(), &[0, 1])
     }
 
+    /// The relative spread to expect of the variance that one half of all cells of a tile tells: 1 where a single pixel decides it, less
+    /// the more pixels share it. Cells that have fewer samples than others do not count.
+    pub fn tile_spread(&self, tile: usize, half: usize) -> f64 {
+        let tile = self.tile(tile);
+        let Some(cells) = tile.steps.levels.last() else { return 1.0 };
+        let sums = cells.iter().map(|halves| halves[half]);
+        let (sum, squares) =
+            sums.fold((0.0, 0.0), |(sum, squares), cell| (sum + cell.outer, squares + cell.outer_squares));
+        if sum > 0.0 { squares.sqrt() / sum } else { 0.0 }
+    }
+
     /// The noise in one half of all cells of a tile; none as in [`Film::half_noise`].
     pub fn tile_noise(&self, tile: usize, half: usize) -> Option<HalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
@@ -452,6 +466,17 @@ mod tests {
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
         assert_eq!(film.tile_fall(0), Some(4.0));
         assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_fall(0), None, "one step");
+    }
+
+    #[test]
+    fn what_few_pixels_tell_is_known_to_be_unsure() {
+        let one: &[f32] = &[0.0, 8.0];
+        let none: &[f32] = &[1.0, 1.0];
+        // The halves take turns along a row.
+        let of = |pixels: &[&[f32]]| film(pixels).tile_spread(0, 0);
+        assert_eq!(of(&[one, one, none, none, none, none, none, none]), 1.0);
+        assert_eq!(of(&[one; 8]), 0.5);
+        assert_eq!(of(&[none; 8]), 0.0);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! One method on a scene: step after step, seed after seed.
 
 use super::bias::bias;
+use super::brightness::brightness;
 use super::methods::Method;
 use super::order::{Steps, Trouble};
 use super::pace::Pace;
@@ -86,11 +87,13 @@ impl Measure<'_> {
     fn step(&self, session: &mut Session, aim: Aim, pace: &Pace, took: &[f64]) -> Result<Step, Trouble> {
         let seeds = self.run.order.seeds;
         let (mut pictures, mut images): (Vec<Picture>, Vec<RadianceImage>) = Default::default();
+        let mut are_pixels_apart = true;
         for number in 0..seeds {
             let seed = self.run.order.seed + aim.index * seeds + number;
             self.say_picture(aim, number, pace, took, &pictures);
             let Rendered { image, report, .. } = self.render(session, seed, aim)?;
             let relmse = self.two.error(&image);
+            are_pixels_apart &= report.photons.is_none();
             if !relmse.is_finite() {
                 let name = &self.method.name;
                 return Err(Trouble::Failed(Failure::Work(format!(
@@ -105,7 +108,8 @@ impl Measure<'_> {
             });
             images.push(image);
         }
-        let step = summary(aim, pictures, &images, self.two);
+        let brightness = brightness(self.two, &images, are_pixels_apart);
+        let step = Step { brightness, ..summary(aim, pictures, &images, self.two) };
         let (name, seconds) = (&self.method.name, words::seconds(step.seconds));
         self.run.done(&format!(
             "{name}, {}: {seconds}, relMSE {}",
@@ -188,6 +192,7 @@ fn summary(aim: Aim, pictures: Vec<Picture>, images: &[RadianceImage], two: &Two
         spread: [least, most],
         uncertainty: images.first().map_or(0.0, |image| two.uncertainty(image)),
         bias: bias(two, images),
+        brightness: None,
         pictures,
     }
 }

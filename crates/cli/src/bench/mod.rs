@@ -5,6 +5,7 @@
 
 pub mod baseline;
 mod bias;
+mod brightness;
 pub mod cache;
 pub mod csv;
 mod measure;
@@ -20,6 +21,7 @@ mod statistics;
 pub mod table;
 
 pub use bias::{Bias, LEAST_SEEDS};
+pub use brightness::Brightness;
 pub use methods::{Method, Toggles, methods};
 pub use order::{News, Order, ReferenceOrder, Steps, Trouble, Unfinished};
 pub use results::{MethodResult, Picture, ReferenceResult, Results, SceneResult, Step, Verdict};

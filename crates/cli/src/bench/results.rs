@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bias::Bias;
+use super::brightness::Brightness;
 use super::slope::{Slope, TimeTo, slope, time_to};
 use super::statistics::mean;
 
@@ -88,6 +89,9 @@ pub struct Step {
     pub uncertainty: f64,
     /// What the pictures have in common; none of too few.
     pub bias: Option<Bias>,
+    /// How much brighter they are than the references; none of too few.
+    #[serde(default)]
+    pub brightness: Option<Brightness>,
     /// Each.
     pub pictures: Vec<Picture>,
 }
@@ -205,6 +209,11 @@ pub(super) mod tests {
             spread: [relmse * 0.9, relmse * 1.1],
             uncertainty: 1e-9,
             bias: Some(Bias { size: bias, error: bias * 0.01 + 1e-9, by_chance, bound: bias + 1e-8 }),
+            brightness: Some(Brightness {
+                value: -0.01,
+                error: 0.001,
+                by_chance: if bias > 0.0 { 1e-9 } else { 0.4 },
+            }),
             pictures: [(1, 0.9), (2, 1.0), (3, 1.1)].map(of).to_vec(),
         }
     }

@@ -30,7 +30,13 @@ fn of_scene(scene: &SceneResult) -> Vec<String> {
     lines.push(String::new());
     for method in &scene.methods {
         lines.push(format!("{}: {}", method.name, speed(method)));
-        lines.extend(times(method).into_iter().chain([verdict(method)]).map(|line| format!("  {line}")));
+        lines.extend(
+            times(method)
+                .into_iter()
+                .chain([verdict(method)])
+                .chain(brightness(method))
+                .map(|line| format!("  {line}")),
+        );
     }
     lines.push(String::new());
     lines
@@ -119,6 +125,19 @@ fn verdict(method: &MethodResult) -> String {
     }
 }
 
+/// What is known of the mean luminance at the last step.
+fn brightness(method: &MethodResult) -> Option<String> {
+    let brightness = method.steps.last()?.brightness?;
+    let percent = |part: f64| format!("{:.2} %", 100.0 * part.abs());
+    let side = if brightness.value < 0.0 { "below" } else { "above" };
+    let figures =
+        format!("{} ± {} {side} the references", percent(brightness.value), percent(brightness.error));
+    Some(match brightness.is_biased() {
+        true => format!("BIAS of the mean luminance: {figures}"),
+        false => format!("mean luminance: {figures}, by chance"),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::results::tests::results;
@@ -135,11 +154,13 @@ mod tests {
         assert_eq!(lines[13], "path: set-up 3.0 ms, slope −1.00 ± 0.00");
         assert_eq!(lines[14], "  relMSE 1e-2 in 200 ms, 1e-3 in about 2.00 s, 1e-4 in about 20.0 s");
         assert_eq!(lines[15], "  no bias found: it is below 1.00e-8 at 64 samples");
+        assert_eq!(lines[16], "  mean luminance: 1.00 % ± 0.10 % below the references, by chance");
         assert!(
-            lines[17].starts_with("  BIAS: 1.00e-2, 97 % of the error at 64 samples, last slope −0.0"),
+            lines[18].starts_with("  BIAS: 1.00e-2, 97 % of the error at 64 samples, last slope −0.0"),
             "{}",
-            lines[17]
+            lines[18]
         );
+        assert_eq!(lines[19], "  BIAS of the mean luminance: 1.00 % ± 0.10 % below the references");
     }
 
     #[test]

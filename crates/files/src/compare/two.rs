@@ -3,8 +3,12 @@
 
 use super::Pair;
 use crate::film::RadianceImage;
-use crate::math::color::RELMSE_LEAST;
+use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
 use crate::math::{DVec3, Vec3};
+
+fn luminance(color: DVec3) -> f64 {
+    color.dot(LUMINANCE_WEIGHTS.as_dvec3())
+}
 
 /// Two references of one picture, made independently of each other.
 #[derive(Clone, Debug)]
@@ -67,6 +71,24 @@ impl TwoReferences {
             deviation * deviation
         });
         variances.sum::<f64>().sqrt()
+    }
+
+    /// How much brighter a picture is than the references, as a part of their mean luminance.
+    pub fn brightness(&self, x: &RadianceImage) -> f64 {
+        let sum: f64 = x.pixels.iter().map(|pixel| luminance(pixel.as_dvec3())).sum();
+        sum / x.pixels.len() as f64 / self.mean_luminance() - 1.0
+    }
+
+    /// Mean luminance of both references.
+    pub fn mean_luminance(&self) -> f64 {
+        let sum: f64 = self.places().map(|(_, a, b)| luminance((a + b) / 2.0)).sum();
+        sum / self.weights.len() as f64
+    }
+
+    /// The standard error that the noise of the references gives [`Self::brightness`]: pixels are taken as independent.
+    pub fn brightness_uncertainty(&self) -> f64 {
+        let squares = self.places().map(|(_, a, b)| luminance((a - b) / 2.0).powi(2));
+        squares.sum::<f64>().sqrt() / self.weights.len() as f64 / self.mean_luminance()
     }
 
     fn places(&self) -> impl Iterator<Item = (DVec3, DVec3, DVec3)> {

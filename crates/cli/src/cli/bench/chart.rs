@@ -150,6 +150,7 @@ mod tests {
             spread: [0.0, 1.0],
             uncertainty: 0.0,
             bias: None,
+            brightness: None,
             pictures: Vec::new(),
         };
         let method = MethodResult {

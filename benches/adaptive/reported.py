@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+"""The error that reports tell beside the true one, for each scene, integrator and number of samples.
+
+    python3 benches/adaptive/reported.py [SCENE...] [--seeds N] [--side PIXELS] [--samples N,N] [--integrators A,B] [--glimt BINARY]
+
+Each scene is rendered by N seeds. The spread of these pictures is the true noise: the root mean square over the pixels of the standard
+deviation of their luminance, over its mean. Printed: the root mean square over the seeds of `image.error` as a part of that, with an
+interval of 95 % by the bootstrap over the seeds; then the same of the standard error of the mean luminance that the EXR files hold,
+beside the spread of the means. The last lines sum up: the median of all ratios, how many lie outside of 0.9 to 1.35 (and of these,
+those whose interval does not reach it), and the pooled ratio of the mean's standard error. By itself: all bundled scenes, both
+integrators, 16, 64 and 256 samples, 40 seeds, 64 × 64 pixels. In the environment of ../mitsuba, which is made where it is not there.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import struct
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from truth import ROOT, WEIGHTS, within_environment
+
+BAND = (0.9, 1.35)
+RESAMPLES = 400
+MEAN_ERROR = b"glimtMeanLuminanceError\0double\0"
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", type=Path)
+    parser.add_argument("--seeds", type=int, default=40)
+    parser.add_argument("--side", type=int, default=64)
+    parser.add_argument("--samples", default="16,64,256")
+    parser.add_argument("--integrators", default="whitted,path")
+    parser.add_argument("--glimt", default=str(ROOT / "target" / "release" / "glimt"))
+    return parser.parse_args()
+
+
+def mean_error(picture):
+    """The standard error of the mean luminance that an EXR file holds; none of pictures with photons."""
+    head = picture.read_bytes()[:4096]
+    at = head.find(MEAN_ERROR)
+    return None if at < 0 else struct.unpack("<d", head[at + len(MEAN_ERROR) + 4 :][:8])[0]
+
+
+def rendered(asked, scene, integrator, samples, folder):
+    """Luminance by each seed, and what reports and files tell."""
+    import mitsuba as mi
+    import numpy as np
+
+    mi.set_variant("scalar_rgb")
+    picture, report = folder / "picture.exr", folder / "report.json"
+    call = [asked.glimt, scene, "--once", "--progress", "none", "--width", asked.side, "--height", asked.side, "--error", 0]
+    call += ["--integrator", integrator, "--samples", samples, "-o", picture, "--report", report]
+    luminance, told, of_means = [], [], []
+    for seed in range(1, asked.seeds + 1):
+        subprocess.run([str(word) for word in [*call, "--seed", seed]], check=True, stderr=subprocess.DEVNULL)
+        image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+        luminance.append(image.astype(np.float64) @ np.array(WEIGHTS))
+        told.append(json.loads(report.read_text())["image"]["error"])
+        of_means.append(mean_error(picture))
+    return np.array(luminance), np.array(told), of_means
+
+
+def row(asked, scene, integrator, samples, folder):
+    """Prints a row; gives its ratio, its interval and the squared ratio of the mean's error; none where there is no noise."""
+    import numpy as np
+
+    luminance, told, of_means = rendered(asked, scene, integrator, samples, folder)
+    # Squares sum up by seed, so that seeds can be drawn again.
+    means = luminance.mean(axis=(1, 2))
+
+    def ratio(seeds):
+        true = np.sqrt(luminance[seeds].var(axis=0, ddof=1).mean()) / means[seeds].mean()
+        return np.sqrt((told[seeds] ** 2).mean()) / true if true > 0 else float("nan")
+
+    everyone = np.arange(len(told))
+    found = ratio(everyone)
+    if not np.isfinite(found):
+        print(f"{scene.stem:16}{integrator:9}{samples:5}  no noise", flush=True)
+        return None
+    random = np.random.default_rng(1)
+
+    def drawn():
+        # A seed that is drawn twice counts once in the variance: drawn as a half of them, the spread is that of all.
+        return ratio(random.choice(everyone, size=len(everyone) // 2, replace=False))
+
+    low, high = np.quantile([drawn() for _ in range(RESAMPLES)], [0.025, 0.975])
+    square = None
+    if None not in of_means:
+        # A variance of n normal means, divided by their spread, is 1/(1 − 2/(n − 1)) times too large on average.
+        square = np.mean(np.square(of_means)) / means.var(ddof=1) * (1 - 2 / (len(means) - 1))
+    of_mean = "" if square is None else f"{np.sqrt(square):9.2f}"
+    print(f"{scene.stem:16}{integrator:9}{samples:5}{found:8.2f}  {low:5.2f} to {high:5.2f}{of_mean}", flush=True)
+    return found, low, high, square
+
+
+def main():
+    asked = arguments()
+    print(f"{asked.seeds} seeds, {asked.side} × {asked.side} pixels")
+    print(f"{'':30}{'ratio':>8}{'by chance':>16}{'mean':>7}")
+    rows = []
+    for scene in asked.scenes or sorted((ROOT / "scenes").glob("*.toml")):
+        for integrator in asked.integrators.split(","):
+            for samples in map(int, asked.samples.split(",")):
+                with tempfile.TemporaryDirectory() as folder:
+                    rows.append(row(asked, scene, integrator, samples, Path(folder)))
+    rows = [one for one in rows if one]
+    outside = [one for one in rows if not BAND[0] <= one[0] <= BAND[1]]
+    surely = [one for one in outside if one[2] < BAND[0] or one[1] > BAND[1]]
+    print(f"median {statistics.median(one[0] for one in rows):.2f}, {len(outside)} of {len(rows)} outside of {BAND[0]} to {BAND[1]}, {len(surely)} surely")
+    squares = [one[3] for one in rows if one[3] is not None]
+    print(f"standard error of the mean luminance, pooled: {statistics.fmean(squares) ** 0.5:.2f}")
+
+
+if __name__ == "__main__":
+    if "GLIMT_TRUTH" not in os.environ:
+        within_environment(__file__)
+    sys.exit(main())

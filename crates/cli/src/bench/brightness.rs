@@ -1,0 +1,136 @@
+//! Whether pictures are brighter or darker than the references on average: a bias that all pixels share is small in each square of
+//! relMSE, and large beside the noise of the mean.
+
+use serde::{Deserialize, Serialize};
+
+use super::bias::{FALSE_ALARMS, LEAST_SEEDS};
+use super::statistics::{above, mean};
+use crate::compare::TwoReferences;
+use crate::film::RadianceImage;
+use crate::math::DVec3;
+use crate::math::color::LUMINANCE_WEIGHTS;
+
+/// How much brighter pictures are than the references.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Brightness {
+    /// As a part of the mean luminance of the references.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// The probability that it is as far from 0 without a bias.
+    pub by_chance: f64,
+}
+
+impl Brightness {
+    /// Whether chance is no explanation.
+    pub fn is_biased(&self) -> bool {
+        self.by_chance < FALSE_ALARMS
+    }
+}
+
+/// The brightness of pictures of different seeds, whose pixels err apart from each other or, by photons, together; none for fewer
+/// than [`LEAST_SEEDS`], and beside references that are black.
+pub fn brightness(
+    references: &TwoReferences,
+    pictures: &[RadianceImage],
+    are_pixels_apart: bool,
+) -> Option<Brightness> {
+    if pictures.len() < LEAST_SEEDS || !(references.mean_luminance() > 0.0) {
+        return None;
+    }
+    let values: Vec<f64> = pictures.iter().map(|picture| references.brightness(picture)).collect();
+    let (value, by_seeds) = mean(&values);
+    let seeds = pictures.len() as f64 - 1.0;
+    let (of_pictures, freedom) = if are_pixels_apart {
+        // All pixels tell how large the noise is, not some seeds alone.
+        (error_of_pixels(pictures) / references.mean_luminance(), seeds * pictures[0].pixels.len() as f64)
+    } else {
+        (by_seeds, seeds)
+    };
+    let of_references = references.brightness_uncertainty();
+    let error = (of_pictures * of_pictures + of_references * of_references).sqrt();
+    let by_chance = match error > 0.0 {
+        true => 2.0 * above(value.abs() / error, freedom),
+        false => f64::from(u8::from(value == 0.0)),
+    };
+    Some(Brightness { value, error, by_chance })
+}
+
+/// The standard error of the mean luminance of all pictures, by the spread of each pixel.
+fn error_of_pixels(pictures: &[RadianceImage]) -> f64 {
+    let count = pictures.len() as f64;
+    let weights: DVec3 = LUMINANCE_WEIGHTS.as_dvec3();
+    let pixels = pictures[0].pixels.len();
+    let variance = |pixel: usize| {
+        let values = || pictures.iter().map(move |picture| picture.pixels[pixel].as_dvec3().dot(weights));
+        let mean = values().sum::<f64>() / count;
+        values().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (count - 1.0) / count
+    };
+    (0..pixels).map(variance).sum::<f64>().sqrt() / pixels as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::bench::bias::bias;
+    use crate::compare::Pair;
+    use crate::math::Vec3;
+    use crate::math::random::unit;
+
+    const SIDE: u32 = 64;
+
+    /// Grey of 0.5, brighter by a part, with noise of each pixel or of the whole picture.
+    fn picture(next: &mut impl FnMut() -> f32, brighter: f32, noise: f32, shared: f32) -> RadianceImage {
+        let all = shared * (2.0 * next() - 1.0);
+        let pixels = (0..SIDE * SIDE)
+            .map(|_| Vec3::splat(0.5 * (1.0 + brighter) + all + noise * (2.0 * next() - 1.0)));
+        RadianceImage { width: SIDE, height: SIDE, pixels: pixels.collect() }
+    }
+
+    fn references(next: &mut impl FnMut() -> f32) -> TwoReferences {
+        let pair = [Path::new("r1"), Path::new("r2")];
+        let [a, b] = [picture(next, 0.0, 0.02, 0.0), picture(next, 0.0, 0.02, 0.0)];
+        TwoReferences::new(Pair::new(pair, a, b).expect("a pair"))
+    }
+
+    #[test]
+    fn one_percent_too_dark_is_found_where_relmse_hides_it() {
+        let mut next = unit(3);
+        let references = references(&mut next);
+        let pictures: Vec<_> = (0..3).map(|_| picture(&mut next, -0.01, 0.2, 0.0)).collect();
+        let found = brightness(&references, &pictures, true).expect("enough seeds");
+        assert!(found.is_biased() && (found.value + 0.01).abs() < 4.0 * found.error, "{found:?}");
+        assert!(
+            !bias(&references, &pictures).expect("enough seeds").is_found(),
+            "or this test tells nothing"
+        );
+    }
+
+    #[test]
+    fn noise_is_no_bias_whether_pixels_share_it_or_not() {
+        for (noise, shared) in [(0.2, 0.0), (0.02, 0.02)] {
+            let mut next = unit(5);
+            let alarms = (0..200).filter(|_| {
+                let references = references(&mut next);
+                let pictures: Vec<_> = (0..4).map(|_| picture(&mut next, 0.0, noise, shared)).collect();
+                brightness(&references, &pictures, shared == 0.0).expect("enough seeds").is_biased()
+            });
+            // 0.2 are expected; four or more come once in ten thousand times.
+            let alarms = alarms.count();
+            assert!(alarms <= 3, "{noise} {shared}: {alarms} false alarms of 200");
+        }
+    }
+
+    #[test]
+    fn few_pictures_and_black_references_tell_nothing() {
+        let mut next = unit(7);
+        let references = references(&mut next);
+        let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();
+        assert_eq!(brightness(&references, &pictures, true), None);
+        let black = || RadianceImage::black(2, 2);
+        let dark = Pair::new([Path::new("a"), Path::new("b")], black(), black()).expect("a pair");
+        assert_eq!(brightness(&TwoReferences::new(dark), &[black(), black(), black()], true), None);
+    }
+}
