@@ -5,7 +5,7 @@ pub mod cli;
 
 // The rooms below, under the names that they have in the whole house.
 use glimt_base::{choice, control, film, math, system};
-use glimt_scene::scene;
 use glimt_files::{compare, output};
 use glimt_pipeline::pipeline;
+use glimt_scene::scene;
 use glimt_tui::tui;

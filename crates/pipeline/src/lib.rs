@@ -4,7 +4,7 @@ pub mod pipeline;
 
 // The rooms below, under the names that they have in the whole house.
 use glimt_base::{choice, control, film, math, system};
+use glimt_files::{assets, output};
 use glimt_kernel::{lights, materials};
 use glimt_scene::scene;
-use glimt_files::{assets, output};
 use glimt_trace::{integrators, world};

@@ -5,6 +5,6 @@ pub mod world;
 
 // The rooms below, under the names that they have in the whole house.
 use glimt_base::{choice, control, film, math, sampling};
+use glimt_files::assets;
 use glimt_kernel::{accel, geometry, lights, materials};
 use glimt_scene::scene;
-use glimt_files::assets;

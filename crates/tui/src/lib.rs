@@ -4,5 +4,5 @@ pub mod tui;
 
 // The rooms below, under the names that they have in the whole house.
 use glimt_base::{choice, film, math, system};
-use glimt_scene::scene;
 use glimt_pipeline::pipeline;
+use glimt_scene::scene;

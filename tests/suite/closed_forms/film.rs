@@ -68,7 +68,7 @@ fn balls() -> Build {
 }
 
 #[test]
-fn the_estimate_of_the_error_is_within_a_factor_of_two_of_it() {
+fn the_estimate_of_the_error_is_right_over_many_seeds() {
     const SEEDS: u32 = 16;
     for (name, build) in [("room", room()), ("balls", balls())] {
         let world = build.world();
@@ -98,7 +98,12 @@ fn the_estimate_of_the_error_is_within_a_factor_of_two_of_it() {
             let ratios: Vec<f64> =
                 films.iter().map(|film| film.relative_error().expect("an estimate") / truth).collect();
             eprintln!("{name}, {samples} samples, {truth:.1e}: {ratios:.2?}");
-            assert!(ratios.iter().all(|ratio| (0.5..=2.0).contains(ratio)), "{name}, {samples} samples");
+            let rms = (ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / count).sqrt();
+            assert!((0.9..=1.35).contains(&rms), "{name}, {samples} samples: {rms:.2}");
+            // One seed's estimate at few samples knows little of the rate at which noise falls.
+            let factor = if samples > 16 { 2.0 } else { 2.5 };
+            let is_near = |ratio: &f64| (1.0 / factor..=factor).contains(ratio);
+            assert!(ratios.iter().all(is_near), "{name}, {samples} samples");
         }
     }
 }

@@ -134,7 +134,7 @@ mod tests {
     fn a_refused_allocation_is_remembered() {
         let layout = Layout::from_size_align(usize::MAX / 4, 1).expect("a layout");
         // SAFETY: the layout has a size; a null pointer is not used.
-        let memory = unsafe { Allocator.alloc(layout) };
+        let memory = std::hint::black_box(unsafe { Allocator.alloc(layout) });
         assert!(memory.is_null());
         assert_eq!(REFUSED_BYTES.load(Ordering::Relaxed), usize::MAX / 4);
     }

@@ -32,6 +32,14 @@ pub enum AssetError {
         /// In words.
         reason: String,
     },
+    /// There is no memory for its content.
+    #[error("out of memory: {} MB for {} were refused", bytes.div_ceil(1_000_000), path.display())]
+    OutOfMemory {
+        /// The file.
+        path: PathBuf,
+        /// Size of what was refused.
+        bytes: usize,
+    },
     /// The work was told to stop.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),

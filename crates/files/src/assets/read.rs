@@ -78,7 +78,8 @@ fn bytes_if(
     let mut file = file.take(limit);
     let length = length as usize;
     let mut bytes = Vec::new();
-    bytes.try_reserve_exact(length + 1).map_err(|error| AssetError::unreadable(path, error.to_string()))?;
+    let out_of_memory = |_| AssetError::OutOfMemory { path: path.to_owned(), bytes: length };
+    bytes.try_reserve_exact(length + 1).map_err(out_of_memory)?;
     loop {
         watch.tick(bytes.len().min(length), 2 * length)?;
         let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;

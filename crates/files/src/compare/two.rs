@@ -87,7 +87,8 @@ impl TwoReferences {
 
     /// The standard error that the noise of the references gives [`Self::brightness`]: pixels are taken as independent.
     pub fn brightness_uncertainty(&self) -> f64 {
-        let squares = self.places().map(|(_, a, b)| luminance((a - b) / 2.0).powi(2));
+        let square = |x: f64| x * x;
+        let squares = self.places().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
         squares.sum::<f64>().sqrt() / self.weights.len() as f64 / self.mean_luminance()
     }
 

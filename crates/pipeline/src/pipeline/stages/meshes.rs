@@ -79,6 +79,7 @@ pub(in crate::pipeline) fn meshes(
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
+            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
             Err(error) => {
                 counts.failed += 1;
                 findings.asset_error(loaded, file.span.clone(), &error);

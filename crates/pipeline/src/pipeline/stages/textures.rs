@@ -180,6 +180,7 @@ pub(in crate::pipeline) fn textures(
                 cache.texels.insert(image.name, key, (texels.clone(), texels.memory_bytes()));
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
+            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
             Err(error) => {
                 counts.failed += 1;
                 for one in &image.asked_by {

@@ -80,8 +80,8 @@ fn a_step_that_can_have_no_picture_holds_nothing_up() {
     desk.press('l');
     let generation = desk.state.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
-    desk.worker(protocol::Event::Failed { generation, failure });
-    assert!(request(&desk.press('l')).is_some(), "the work failed");
+    let effects = desk.worker(protocol::Event::Failed { generation, failure });
+    assert!(request(&effects).is_some(), "the work failed: the step that waited goes");
     let mut desk = Desk::with(state(80, 1));
     desk.finish(RED);
     for _ in 0..3 {

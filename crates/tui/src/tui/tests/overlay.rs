@@ -310,7 +310,8 @@ fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
     assert!(request(&desk.press('h')).is_none(), "the first has no picture yet");
     let generation = desk.state.generation;
     let picture = plain_picture(50, 38, RED);
-    let effects = desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
+    let effects =
+        desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
     assert!(request(&effects).is_some(), "the newest step follows");
 }
 
