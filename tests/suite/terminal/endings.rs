@@ -40,6 +40,15 @@ fn keys_and_signals_end_it_and_the_terminal_is_given_back() {
 }
 
 #[test]
+fn an_abort_gives_the_terminal_back_and_says_so() {
+    let folder = Folder::new();
+    let terminal = folder.terminal();
+    terminal.wait_for_color("red");
+    terminal.signal(Signal::SIGABRT);
+    assert_eq!(terminal.end_saying("error: glimt was ended by SIGABRT"), 1);
+}
+
+#[test]
 fn it_ends_in_the_middle_of_a_render_and_leaves_the_last_picture() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();

@@ -268,8 +268,7 @@ mod tests {
     fn pictures_have_the_aspect_of_the_scene() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell.toml");
         let of = |width, height, asked| {
-            let mut scene =
-                Scene::clone(&scene::load(Path::new(file), &[]).expect("a scene").scene);
+            let mut scene = Scene::clone(&scene::load(Path::new(file), &[]).expect("a scene").scene);
             (scene.render.width, scene.render.height) = (width, height);
             size(&scene, asked)
         };

@@ -21,8 +21,9 @@ fn pictured(columns: u16, rows: u16, pixel: impl Fn(u16, u16) -> [u8; 3]) -> (Bu
 
 /// Numbers without an order, the same for the same place and seed.
 fn noise(x: u16, y: u16, seed: u32) -> u8 {
-    let mut hash =
-        u32::from(x).wrapping_mul(0x9E37_79B1) ^ u32::from(y).wrapping_mul(0x85EB_CA77) ^ seed.wrapping_mul(0xC2B2_AE3D);
+    let mut hash = u32::from(x).wrapping_mul(0x9E37_79B1)
+        ^ u32::from(y).wrapping_mul(0x85EB_CA77)
+        ^ seed.wrapping_mul(0xC2B2_AE3D);
     hash = (hash ^ (hash >> 15)).wrapping_mul(0x2C1B_3C6D);
     hash = (hash ^ (hash >> 12)).wrapping_mul(0x297A_2D39);
     (hash ^ (hash >> 15)) as u8

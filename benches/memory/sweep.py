@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+"""What happens when memory runs out: the program under limits of its address space, headless and in a pseudo-terminal.
+
+    python3 benches/memory/sweep.py [--program target/release/glimt] [--runs 200] [--csv FILE] [SCENE…]
+
+Every run has to end with exit code 0, 1 or 2 (127 where the loader itself has no room), with a sentence if the code is not 0, and a
+terminal has to be as it was before: keys echoed, lines edited, the shell's screen shown.
+"""
+
+import argparse
+import collections
+import csv
+import os
+import pty
+import resource
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SCENES = ["cornell", "cornell_glass", "lamps", "mesh", "photons", "shapes", "textures", "million"]
+LEAST, MOST = 30e6, 1e9
+SECONDS = 20
+ALLOWED = {0, 1, 2}
+
+
+def limited(size):
+    def limit():
+        resource.setrlimit(resource.RLIMIT_AS, (size, size))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    return limit
+
+
+def headless(program, scene, size, folder):
+    command = [program, scene, "--once", "--width", "160", "--height", "120", "--samples", "4", "--progress", "none",
+               "-o", os.path.join(folder, "x.png")]
+    run = subprocess.run(command, preexec_fn=limited(size), capture_output=True, text=True, cwd=folder)
+    faults = []
+    if run.returncode not in ALLOWED and run.returncode != 127:
+        faults.append(f"exit {run.returncode}")
+    if run.returncode in (1, 2) and "error" not in run.stderr:
+        faults.append("no sentence")
+    return run.returncode, faults, run.stderr.strip().splitlines()[-1:] or [""]
+
+
+def in_terminal(program, scene, size, folder):
+    master, slave = pty.openpty()
+    before = termios.tcgetattr(slave)
+    command = [program, scene, "--width", "160", "--height", "120", "--samples", "4", "-o", os.path.join(folder, "y.png")]
+    child = subprocess.Popen(command, preexec_fn=lambda: (os.setsid(), limited(size)()), stdin=slave, stdout=slave,
+                             stderr=slave, cwd=folder)
+    seen, start, asked = b"", time.monotonic(), False
+    while child.poll() is None and time.monotonic() - start < SECONDS:
+        if select.select([master], [], [], 0.05)[0]:
+            seen += os.read(master, 1 << 16)
+        # A picture, or an error that is shown: leave.
+        if not asked and time.monotonic() - start > 2.5:
+            os.write(master, b"q")
+            asked = True
+    faults = []
+    if child.poll() is None:
+        faults.append("hangs")
+        child.send_signal(signal.SIGKILL)
+    code = child.wait()
+    while select.select([master], [], [], 0.1)[0]:
+        seen += os.read(master, 1 << 16)
+    after = termios.tcgetattr(slave)
+    if code not in ALLOWED and code != 127:
+        faults.append(f"exit {code}")
+    if after[3] & (termios.ECHO | termios.ICANON) != before[3] & (termios.ECHO | termios.ICANON):
+        faults.append("terminal raw")
+    if seen.rfind(b"\x1b[?1049h") > seen.rfind(b"\x1b[?1049l"):
+        faults.append("alternate screen")
+    os.close(master)
+    os.close(slave)
+    return code, faults, [seen[-120:].decode("utf-8", "replace")]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", default=str(ROOT / "target/release/glimt"))
+    parser.add_argument("--runs", type=int, default=200)
+    parser.add_argument("--csv")
+    parser.add_argument("scenes", nargs="*", default=[str(ROOT / f"scenes/{name}.toml") for name in SCENES])
+    asked = parser.parse_args()
+    ways = {"once": headless, "terminal": in_terminal}
+    each = max(1, asked.runs // (len(asked.scenes) * len(ways)))
+    rows, wrong = [], 0
+    with tempfile.TemporaryDirectory() as folder:
+        for way, run in ways.items():
+            for scene in map(os.path.abspath, asked.scenes):
+                for step in range(each):
+                    size = int(LEAST * (MOST / LEAST) ** ((step + 0.5) / each))
+                    code, faults, said = run(os.path.abspath(asked.program), scene, size, folder)
+                    rows.append((way, Path(scene).stem, size, code, "; ".join(faults)))
+                    wrong += bool(faults)
+                    if faults:
+                        print(way, Path(scene).stem, f"{size / 1e6:.0f} MB", code, faults, said, flush=True)
+    for way in ways:
+        codes = collections.Counter(row[3] for row in rows if row[0] == way)
+        print(f"{way}: " + ", ".join(f"{count} × exit code {code}" for code, count in sorted(codes.items())))
+    print(f"{len(rows)} runs, {wrong} wrong")
+    if asked.csv:
+        with open(asked.csv, "w", newline="") as file:
+            csv.writer(file).writerows([("way", "scene", "bytes", "code", "faults"), *rows])
+    sys.exit(1 if wrong else 0)
+
+
+main()
