@@ -18,7 +18,7 @@ fn harmless(bytes: &[u8]) -> &str {
 
 #[track_caller]
 fn object(text: &str) -> Value {
-    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+    serde_json::from_str(text).expect(text)
 }
 
 fn run(desk: &Desk, arguments: &[&str]) -> std::process::Output {

@@ -147,7 +147,7 @@ impl Steps {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convergence {
     /// The samples of a pixel fill each other's gaps. Twice as many make the variance 2 times smaller where light is rare, 2.8 times at
-    /// edges and in penumbras, 4 times and more where all is smooth: [`Steps`] tell.
+    /// edges and in penumbras, 4 times and more where all is smooth: the steps between pairs of them tell.
     #[default]
     Stratified,
     /// Each sample has photons of its own: samples are independent.

@@ -68,23 +68,6 @@ fn quoted(file: &Path) -> String {
     shlex::try_quote(&name).map_or(name.clone(), |quoted| quoted.into_owned())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_is_one_word_for_a_shell() {
-        for name in
-            ["ball.toml", "my scene.toml", "it's.toml", "a \"b\" $HOME `c`.toml", "a;b.toml", "tilde~.toml"]
-        {
-            assert_eq!(shlex::split(&quoted(Path::new(name))), Some(vec![name.to_owned()]), "{name}");
-        }
-        assert_eq!(quoted(Path::new("ball.toml")), "ball.toml");
-        assert_eq!(quoted(Path::new("-b.toml")), "./-b.toml");
-        assert_eq!(quoted(Path::new("check")), "./check");
-    }
-}
-
 /// Whether a name is that of a picture, of a format that glimt writes or will.
 fn is_picture(file: &Path) -> bool {
     match Format::of(file) {
@@ -102,4 +85,21 @@ fn create(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
         let _ = std::fs::remove_file(path);
     }
     written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_one_word_for_a_shell() {
+        for name in
+            ["ball.toml", "my scene.toml", "it's.toml", "a \"b\" $HOME `c`.toml", "a;b.toml", "tilde~.toml"]
+        {
+            assert_eq!(shlex::split(&quoted(Path::new(name))), Some(vec![name.to_owned()]), "{name}");
+        }
+        assert_eq!(quoted(Path::new("ball.toml")), "ball.toml");
+        assert_eq!(quoted(Path::new("-b.toml")), "./-b.toml");
+        assert_eq!(quoted(Path::new("check")), "./check");
+    }
 }

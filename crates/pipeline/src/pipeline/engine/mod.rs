@@ -284,7 +284,7 @@ impl Engine {
         let of_film = keys::render(ready.world.0, &plan.settings, plan.crop);
         let is_new = request.force || !self.films.holds(of_film);
         let coarse = Coarse {
-            tracer: tracer(self.means.kernel, &pool, &ready, meanwhile.token),
+            tracer: tracer(self.means.kernel, &pool, ready, meanwhile.token),
             plan,
             is_moved: request.overrides.camera.is_any(),
             rate: &self.coarse_rate,
