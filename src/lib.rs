@@ -28,6 +28,25 @@
 //! | [`tui`] | the terminal front end |
 //! | [`cli`] | arguments, the headless front end |
 //!
+//! ## The crates
+//!
+//! The rooms stand in member crates under `crates/`, so that they are compiled side by side and an edit compiles what lies above it
+//! alone; this crate hands them all on. Each crate names the rooms below it at its root: `crate::math` is the same everywhere.
+//!
+//! | crate | rooms |
+//! | --- | --- |
+//! | `base` | [`system`], [`choice`](mod@choice), [`math`], [`control`], [`sampling`], [`film`] |
+//! | `kernel` | [`geometry`], [`accel`], [`materials`], [`lights`] |
+//! | `scene` | [`scene`] |
+//! | `files` | [`assets`], [`output`], [`compare`] |
+//! | `trace` | [`world`], [`integrators`] |
+//! | `pipeline` | [`pipeline`] |
+//! | `tui` | [`tui`] |
+//! | `cli` | [`mod@bench`], [`cli`] |
+//!
+//! Nothing is optimised across crates at the end of a build: a small function that others call for each ray or sample is marked
+//! `#[inline]`.
+//!
 //! ## The arrows
 //!
 //! Each room uses the rooms on its right and no others; `tests/suite/house.rs` reads the sources and holds them to
@@ -68,7 +87,8 @@
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
 //! - Files are touched in `assets`, `output`, `scene` (the scene, and whether what it names is there),
 //!   `pipeline::watch`, `bench::cache` and `cli::new` alone.
-//! - `unsafe` code is in `accel::wide_bvh::simd` alone, with a portable twin that gives the same bits.
+//! - `unsafe` code is in `accel::wide_bvh::simd`, with a portable twin that gives the same bits, and in `system::abort`, which gives
+//!   the terminal back when an allocation fails.
 //! - `tui` does not know `world`; `world` does not know pixels or time.
 
 pub use glimt_base::{choice, control, film, math, sampling, system};

@@ -9,9 +9,9 @@ use std::fmt::Write;
 use std::io;
 use std::os::fd::BorrowedFd;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use nix::unistd::write;
+use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
@@ -78,8 +78,15 @@ pub fn give_back_by(give_back: fn()) {
     let _ = GIVE_BACK.set(give_back);
 }
 
-/// Gives the terminal back, says why the process ends, ends it.
+/// Whether a thread is at its last words.
+static IS_ENDING: AtomicBool = AtomicBool::new(false);
+
+/// Gives the terminal back, says why the process ends, ends it. Where memory is out, several threads abort at once: the first one
+/// speaks, the others are held until the process is gone.
 fn last_words() {
+    while IS_ENDING.swap(true, Ordering::AcqRel) {
+        pause();
+    }
     if let Some(give_back) = GIVE_BACK.get() {
         give_back();
     }

@@ -431,9 +431,16 @@ impl State {
     /// Pixels of the preview in the width of a cell.
     pub(super) fn pixels_across(&self) -> u32 {
         /// More are not worth their bytes.
-        const MOST: u16 = 10;
+        const MOST: u32 = 10;
+        /// Pixels of the whole window: rendering, developing and encoding them takes some 20 bytes each.
+        const MOST_PIXELS: f32 = 2_500_000.0;
         match self.preview {
-            PreviewKind::Pixels(_) => u32::from(self.window.cell_pixels.0.clamp(1, MOST)),
+            PreviewKind::Pixels(_) => {
+                let window = &self.window;
+                let squares = f32::from(window.columns) * f32::from(window.rows) * window.cell_aspect;
+                let affordable = (MOST_PIXELS / squares.max(1.0)).sqrt() as u32;
+                u32::from(window.cell_pixels.0).min(affordable).clamp(1, MOST)
+            }
             kind => kind.grid().map_or(1, Grid::columns),
         }
     }

@@ -2,11 +2,14 @@
 
 use super::{RED, cells_of};
 use crate::pipeline::protocol::{self, Command, PreviewSize, Stage, Status};
-use crate::pipeline::settings::Effective;
+use crate::pipeline::settings::{Effective, Overrides};
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
+use crate::tui::color::ColorDepth;
 use crate::tui::event::{Effect, Event};
 use crate::tui::fixtures::*;
+use crate::tui::graphics::Protocol;
+use crate::tui::preview_kind::PreviewKind;
 use crate::tui::view::layout::Layout;
 
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
@@ -253,5 +256,22 @@ fn hints_wrap_at_the_width_of_the_panel() {
             "{panel:?}\n{}",
             desk.text()
         );
+    }
+}
+
+#[test]
+fn a_picture_in_pixels_takes_no_more_memory_in_a_huge_terminal() {
+    let of = |columns, rows, cell_pixels| {
+        let kind = PreviewKind::Pixels(Protocol::Kitty);
+        let mut state = state_with(columns, rows, kind, ColorDepth::TrueColor, Overrides::default());
+        state.window.cell_pixels = cell_pixels;
+        state.pixels_across()
+    };
+    assert_eq!(of(80, 24, (8, 16)), 8, "pixel for pixel");
+    assert_eq!(of(200, 60, (20, 40)), 10, "fine enough");
+    for (columns, rows) in [(480, 130), (1000, 500), (4000, 2000), (u16::MAX, u16::MAX)] {
+        let across = of(columns, rows, (10, 20));
+        let pixels = u64::from(columns) * u64::from(rows) * 2 * u64::from(across * across);
+        assert!(across == 1 || pixels <= 2_500_000, "{columns}×{rows}: {across}");
     }
 }
