@@ -1,4 +1,4 @@
-//! How near the screen is to the final picture while that is rendered.
+//! Distance of the screen from the final picture while glimt renders.
 
 use std::error::Error;
 use std::fs;

@@ -1,4 +1,4 @@
-//! How much of a thin line the pictures of a camera take that a key moves.
+//! Share of a thin line that pictures use while a held key moves the camera.
 
 use std::error::Error;
 use std::path::Path;

@@ -38,7 +38,7 @@ impl Line {
     pub(crate) const THIN: Self = Self { bytes_per_second: 125e3, delay: Duration::from_millis(75) };
 }
 
-/// What is at the other end.
+/// Byte counts and screen at the other end.
 pub(crate) struct Far {
     pub(crate) cells: vt100::Parser,
     pub(crate) pixels: PixelScreen,
@@ -62,7 +62,7 @@ impl Far {
         cells.flat_map(parts).collect()
     }
 
-    /// How much of the render is done, as the screen says; 100 when it is over.
+    /// Percent of the render that the screen reports; 100 at the end.
     pub(crate) fn percent(&self) -> Option<u32> {
         let row =
             self.cells.screen().rows(0, COLUMNS).find(|row| row.contains("glimt") || !row.is_empty())?;
@@ -130,7 +130,7 @@ impl Watched {
         Ok(lock(&self.keys).write_all(keys.as_bytes())?)
     }
 
-    /// What is at the other end now.
+    /// Returns the state at the other end.
     pub(crate) fn far(&self) -> MutexGuard<'_, Far> {
         lock(&self.far)
     }

@@ -155,7 +155,7 @@ fn a_million_rays_see_the_same_by_brute_force_and_under_both_trees() {
 }
 
 #[test]
-#[ignore = "43 s on two cores: cargo test --release --lib ten_million_rays -- --ignored"]
+#[ignore = "43 s on two cores: cargo test --release -p glimt-kernel --lib ten_million_rays -- --ignored"]
 fn ten_million_rays_see_the_same_by_brute_force_and_under_both_trees() {
     no_difference(10_000_000);
 }
