@@ -9,13 +9,15 @@ use crate::watched::{Line, Watched};
 
 /// How often the key repeats, how long it is held before the line is looked at, and how long it is looked at.
 const REPEAT: Duration = Duration::from_millis(33);
+/// Presses in one direction. The camera swings in front of the scene: behind the wall of a room all is black, and nothing is to be sent.
+const SWING: u32 = 8;
 const BEFORE: Duration = Duration::from_secs(2);
 const HELD: Duration = Duration::from_secs(6);
 
 /// Prints a line for each of some scenes.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     println!(
-        "a key on the camera is held for {} s, at the end of a line of 1 Mbit/s and 150 ms",
+        "keys on the camera are held for {} s, at the end of a line of 1 Mbit/s and 150 ms",
         HELD.as_secs()
     );
     println!("{:<16} {:>14} {:>22}", "", "line used", "most unanswered bytes");
@@ -44,12 +46,14 @@ fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     Ok(((far.came - before) as f64 / most, far.most_unanswered))
 }
 
-/// Holds a key that orbits, as keyboards repeat it.
+/// Holds keys that orbit, one and its opposite in turns, as keyboards repeat them.
 fn hold(terminal: &Watched, time: Duration) -> Result<(), Box<dyn Error>> {
     let begin = Instant::now();
     let mut presses = 0;
     while begin.elapsed() < time {
-        terminal.press("l")?;
+        // The first and the last swing are halves: the scene's own camera is in the middle.
+        let is_right = (presses + SWING / 2) / SWING % 2 == 0;
+        terminal.press(if is_right { "l" } else { "h" })?;
         presses += 1;
         thread::sleep((begin + REPEAT * presses).saturating_duration_since(Instant::now()));
     }
