@@ -1,5 +1,7 @@
 //! The picture so far, at the size of a screen, many times a second.
 
+use std::borrow::Cow;
+use std::ops::Range;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -34,8 +36,17 @@ struct Share {
     /// Columns.
     width: u32,
     /// Weighted sums and their weights, in rows.
-    cells: Vec<(DVec3, f64)>,
+    cells: Vec<Weighted>,
 }
+
+/// A weighted sum and the sum of its weights. There is one for each pixel of a preview: 16 bytes.
+type Weighted = (Vec3, f32);
+
+/// The same while it is summed up.
+type Sum = (DVec3, f64);
+
+/// Rows that are summed up at a time, so that there is no second copy of all shares.
+const BAND_ROWS: u32 = 32;
 
 /// Tiles that one thread looks at between two looks at the clock: less than a millisecond of work.
 const TILES_AT_ONCE: usize = 32;
@@ -65,7 +76,7 @@ impl Previewer {
     /// Bytes that it remembers.
     pub fn memory_bytes(&self) -> u64 {
         let cells: usize = self.shares.iter().map(|share| share.cells.capacity()).sum();
-        (cells * size_of::<(DVec3, f64)>() + self.shares.capacity() * size_of::<Share>()) as u64
+        (cells * size_of::<Weighted>() + self.shares.capacity() * size_of::<Share>()) as u64
     }
 
     /// Whether every tile of the film has been taken up at least once, so that [`Previewer::picture`] leaves nothing
@@ -101,18 +112,30 @@ impl Previewer {
     /// What was taken up. `base` shows where there are no samples yet (the coarse first picture; of any size);
     /// none: black.
     pub fn picture(&self, base: Option<&RadianceImage>) -> RadianceImage {
-        let mut canvas = vec![(DVec3::ZERO, 0.0); self.width as usize * self.height as usize];
-        for share in &self.shares {
-            share.add_to(&mut canvas, self.width);
+        let width = self.width as usize;
+        let mut pixels = Vec::with_capacity(width * self.height as usize);
+        let mut base = base.map(Cow::Borrowed);
+        for top in (0..self.height).step_by(BAND_ROWS as usize) {
+            let rows = top..self.height.min(top + BAND_ROWS);
+            let mut band: Vec<Sum> = vec![(DVec3::ZERO, 0.0); width * rows.len()];
+            for share in &self.shares {
+                share.add_to(&mut band, rows.clone(), self.width);
+            }
+            // The base is made as large as the picture only where it shows.
+            if band.iter().any(|(_, weight)| *weight <= 0.0) {
+                base = base.map(|base| match (base.width, base.height) == (self.width, self.height) {
+                    true => base,
+                    false => Cow::Owned(base.resized(self.width, self.height)),
+                });
+            }
+            let start = pixels.len();
+            pixels.extend(band.into_iter().enumerate().map(|(i, (sum, weight))| match &base {
+                _ if weight > 0.0 => (sum / weight).as_vec3(),
+                Some(base) => base.pixels.get(start + i).copied().unwrap_or(Vec3::ZERO),
+                None => Vec3::ZERO,
+            }));
         }
-        let base = base.map(|base| base.resized(self.width, self.height));
-        let below =
-            |i: usize| base.as_ref().and_then(|base| base.pixels.get(i)).copied().unwrap_or(Vec3::ZERO);
-        let pixels = canvas
-            .iter()
-            .enumerate()
-            .map(|(i, (sum, weight))| if *weight > 0.0 { (sum / weight).as_vec3() } else { below(i) });
-        RadianceImage { width: self.width, height: self.height, pixels: pixels.collect() }
+        RadianceImage { width: self.width, height: self.height, pixels }
     }
 }
 
@@ -138,8 +161,7 @@ impl Share {
         (self.x, self.y) = (first(columns, rect.x), first(rows, rect.y));
         self.width = last(columns, rect.x + rect.width - 1) - self.x + 1;
         let height = last(rows, rect.y + rect.height - 1) - self.y + 1;
-        self.cells.clear();
-        self.cells.resize(self.width as usize * height as usize, (DVec3::ZERO, 0.0));
+        let mut sums: Vec<Sum> = vec![(DVec3::ZERO, 0.0); self.width as usize * height as usize];
         let across: Vec<Vec<_>> =
             (rect.x..rect.x + rect.width).map(|x| columns.covered(x).collect()).collect();
         let tile = film.tile(tile);
@@ -151,7 +173,7 @@ impl Share {
                 let place = (index, rect.width as usize);
                 let Some(mean) = tile.value(quantity, film.convergence(), place) else { continue };
                 for (row, row_weight) in down.clone() {
-                    let line = &mut self.cells[(row - self.y) as usize * self.width as usize..];
+                    let line = &mut sums[(row - self.y) as usize * self.width as usize..];
                     for &(column, column_weight) in across {
                         let (sum, weight) = &mut line[(column - self.x) as usize];
                         *sum += mean * (row_weight * column_weight);
@@ -160,14 +182,20 @@ impl Share {
                 }
             }
         }
+        self.cells.clear();
+        self.cells.extend(sums.into_iter().map(|(sum, weight)| (sum.as_vec3(), weight as f32)));
     }
 
-    fn add_to(&self, canvas: &mut [(DVec3, f64)], canvas_width: u32) {
-        for (row, cells) in self.cells.chunks_exact(self.width.max(1) as usize).enumerate() {
-            let start = (self.y as usize + row) * canvas_width as usize + self.x as usize;
-            for (pixel, cell) in canvas[start..].iter_mut().zip(cells) {
-                pixel.0 += cell.0;
-                pixel.1 += cell.1;
+    /// Adds what lies in these rows of the picture.
+    fn add_to(&self, band: &mut [Sum], rows: Range<u32>, picture_width: u32) {
+        let width = self.width.max(1) as usize;
+        let first = rows.start.saturating_sub(self.y) as usize;
+        let own = self.cells.chunks_exact(width).zip(self.y..).skip(first);
+        for (cells, y) in own.take_while(|(_, y)| *y < rows.end) {
+            let start = (y - rows.start) as usize * picture_width as usize + self.x as usize;
+            for (pixel, cell) in band[start..].iter_mut().zip(cells) {
+                pixel.0 += cell.0.as_dvec3();
+                pixel.1 += f64::from(cell.1);
             }
         }
     }

@@ -432,8 +432,8 @@ impl State {
     pub(super) fn pixels_across(&self) -> u32 {
         /// More are not worth their bytes.
         const MOST: u32 = 10;
-        /// Pixels of the whole window: rendering, developing and encoding them takes some 20 bytes each.
-        const MOST_PIXELS: f32 = 2_500_000.0;
+        /// Pixels of the whole window: summing, developing and encoding those of its picture takes some 45 bytes each.
+        const MOST_PIXELS: f32 = 2_000_000.0;
         match self.preview {
             PreviewKind::Pixels(_) => {
                 let window = &self.window;

@@ -12,7 +12,8 @@ const FIRST: u8 = 16;
 const REGISTERS: usize = 256;
 
 /// The commands that show a picture at the cursor over these cells of so many pixels. The colours are those of a palette made
-/// from it, or from one before that it resembles.
+/// from it, or from one before that it resembles. A picture that has fewer pixels is drawn by larger ones: colours are chosen, and
+/// memory is taken, for those that it has.
 pub(super) fn encode(
     picture: &Picture,
     cells: Rect,
@@ -21,19 +22,30 @@ pub(super) fn encode(
 ) -> Vec<u8> {
     let side = |cells: u16, pixels: u16| (u32::from(cells) * u32::from(pixels)).max(1);
     let (width, height) = (side(cells.width, cell.0), side(cells.height, cell.1));
-    let scaled = resized(picture, width, height);
-    let fitting = Palette::for_picture(&scaled, palette.take());
+    let smaller = (picture.width > width || picture.height > height)
+        .then(|| resized(picture, picture.width.min(width), picture.height.min(height)));
+    let picture = smaller.as_ref().unwrap_or(picture);
+    let fitting = Palette::for_picture(picture, palette.take());
     let palette = palette.insert(fitting);
     let registers: Vec<u8> =
-        palette.indices(&scaled).into_iter().map(|index| FIRST.saturating_add(index)).collect();
+        palette.indices(picture).into_iter().map(|index| FIRST.saturating_add(index)).collect();
     let mut bytes = format!("\x1bP0;1;0q\"1;1;{width};{height}").into_bytes();
     for (register, color) in (FIRST..=u8::MAX).zip(palette.colors()) {
         let [r, g, b] = color.map(|level| (u32::from(level) * 100 + 127) / 255);
         bytes.extend(format!("#{register};2;{r};{g};{b}").into_bytes());
     }
+    // Each sixel column and row shows the pixel at its middle.
+    let middle = |i: u32, count: u32, of: u32| {
+        ((2 * u64::from(i) + 1) * u64::from(of) / (2 * u64::from(count))) as usize
+    };
+    let columns: Vec<usize> = (0..width).map(|x| middle(x, width, picture.width)).collect();
     let mut band = Band::new(width as usize);
-    for rows in registers.chunks(6 * width as usize) {
-        band.push(rows, &mut bytes);
+    for top in (0..height).step_by(6) {
+        for y in top..height.min(top + 6) {
+            let row = &registers[middle(y, height, picture.height) * picture.width as usize..];
+            band.set_row(y - top, columns.iter().map(|x| row[*x]));
+        }
+        band.push(&mut bytes);
     }
     bytes.extend_from_slice(b"\x1b\\");
     bytes
@@ -52,14 +64,16 @@ impl Band {
         Self { width, sixels: vec![0; REGISTERS * width], is_used: [false; REGISTERS] }
     }
 
-    /// Appends the sixels of each colour in these rows, back to the left after each, and at last down.
-    fn push(&mut self, rows: &[u8], bytes: &mut Vec<u8>) {
-        for (y, row) in rows.chunks(self.width).enumerate() {
-            for (x, register) in row.iter().enumerate() {
-                self.is_used[usize::from(*register)] = true;
-                self.sixels[usize::from(*register) * self.width + x] |= 1 << y;
-            }
+    /// Sets a row of the six.
+    fn set_row(&mut self, y: u32, registers: impl Iterator<Item = u8>) {
+        for (x, register) in registers.enumerate() {
+            self.is_used[usize::from(register)] = true;
+            self.sixels[usize::from(register) * self.width + x] |= 1 << y;
         }
+    }
+
+    /// Appends the sixels of each colour in these rows, back to the left after each, and at last down; the next rows are empty.
+    fn push(&mut self, bytes: &mut Vec<u8>) {
         for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());
             let own = &mut self.sixels[register * self.width..][..self.width];
