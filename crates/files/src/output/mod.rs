@@ -15,6 +15,7 @@ mod origin;
 mod place;
 mod png;
 mod ppm;
+mod protection;
 mod stoppable;
 mod temporary;
 pub mod write;
