@@ -1,5 +1,7 @@
 //! The report of a finished request, and its file.
 
+mod marks;
+
 use std::path::{Path, PathBuf};
 
 use super::inputs::Inputs;
@@ -15,6 +17,8 @@ use crate::integrators::{RayCounters, picks};
 use crate::lights::LightTree;
 use crate::output::{OutputError, json, write::atomic_until};
 use crate::world::World;
+
+pub(super) use marks::Marks;
 
 /// The report of one finished request: the JSON of `--report`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]

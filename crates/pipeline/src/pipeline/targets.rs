@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::{Input, Inputs};
 use super::plan::Plan;
+use super::report::Marks;
 use crate::output::write::Guard;
 use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -125,7 +126,10 @@ fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
         Kind::Picture(NamedBy::Nobody) => {
             (replaced_picture(at), format!("{way_out}; -o {name} or --force replaces it"))
         }
-        Kind::Report => (replaced_json(at), format!("{way_out}; --force replaces it")),
+        Kind::Report => {
+            let replaced = replaced_json(at, "a report", Marks::have_all_stages);
+            (replaced, format!("{way_out}; --force replaces it"))
+        }
         Kind::Picture(NamedBy::Call | NamedBy::Scene) => return None,
     };
     Some(of_call(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))

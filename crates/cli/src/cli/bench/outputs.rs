@@ -99,8 +99,11 @@ impl Outputs {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
             Kind::Csv => replaced_table(real, csv::HEAD),
-            Kind::Json => replaced_json(real),
-            Kind::Plot => replaced_plot(real),
+            // What a baseline can be read from; no run writes one without scenes.
+            Kind::Json => {
+                replaced_json(real, "a file of results", |found: &Results| !found.scenes.is_empty())
+            }
+            Kind::Plot => replaced_plot(real, &plot::AXES),
         };
         let Some(why) = replaced.why_kept() else { return Ok(()) };
         let way_out = format!("name another file with {option} FILE, or --force replaces it");
