@@ -352,6 +352,22 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     desk.expect("schema --once -o a.png", 0);
 }
 
+/// The stacks of so many threads take more than the limit.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_do_not_start_are_said_with_the_way_out() {
+    let desk = Desk::new();
+    let glimt = desk.glimt("");
+    let mut shell = std::process::Command::new("sh");
+    let line = "ulimit -v 2000000; exec \"$0\" ball.toml --once --threads 3000 --progress none";
+    shell.args(["-c", line]).arg(glimt.get_program()).current_dir(desk.0.path());
+    let output = shell.output().expect("it runs");
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    let words = "cannot start 3000 threads: resource temporarily unavailable; use fewer (--threads 1), or raise the limits";
+    assert!(stderr.contains(words) && !stderr.contains("os error"), "{stderr}");
+    assert_eq!(output.status.code(), Some(1));
+}
+
 #[test]
 fn a_dash_is_standard_output_where_that_is_free() {
     let desk = Desk::new();

@@ -14,6 +14,7 @@ use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{NO_SUCH_FILE, text_now};
+use crate::system::threads::not_started;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
 /// How long the end waits for a picture that is being written, after a signal; after a key until a person is told what it waits for.
@@ -31,7 +32,7 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
 }
 
 fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
-    let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
+    let no_thread = |error: std::io::Error| (Exit::FAILED, not_started("a thread", false, &error));
     let mut worker = start().map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {

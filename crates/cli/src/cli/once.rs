@@ -13,6 +13,7 @@ use crate::pipeline::protocol::{Command, Event, Failure, Report, Request, Writin
 use crate::pipeline::settings::{Effective, Overrides};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::system::threads::not_started;
 
 /// How long the end may take after a signal.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -22,7 +23,7 @@ const TICK: Duration = Duration::from_millis(50);
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
     let worker = match start() {
         Ok(worker) => worker,
-        Err(error) => return console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")),
+        Err(error) => return console.fail(Exit::FAILED, &not_started("a thread", false, &error)),
     };
     let remote = worker.remote();
     let ended = match signals::catch(move || remote.send(Command::Cancel)) {

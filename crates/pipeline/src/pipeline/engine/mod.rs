@@ -56,6 +56,7 @@ use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
+use crate::system::threads::not_started;
 use crate::world::{Lookups, World};
 
 /// What an engine works with; tests work with other means.
@@ -472,7 +473,10 @@ impl Engine {
             .thread_name(name)
             .start_handler(begin)
             .build()
-            .map_err(|error| Stop::work(format!("cannot start {threads} threads: {error}")))?;
+            .map_err(|error| match threads {
+                1 => Stop::work(not_started("a thread", false, &error)),
+                _ => Stop::work(not_started(&format!("{threads} threads"), true, &error)),
+            })?;
         Ok(self.pool.insert(Arc::new(pool)).clone())
     }
 
