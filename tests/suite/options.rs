@@ -348,6 +348,15 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         stderr.contains("there is no such scene file") && stderr.contains("did you mean ball.toml?"),
         "{stderr}"
     );
+    for (call, words) in [
+        ("nofolder/x.toml", "the folder nofolder does not exist"),
+        ("./nofolder/deep/x.toml --once", "the folder ./nofolder/deep does not exist"),
+        ("check nofolder/x.toml", "the folder nofolder does not exist"),
+        ("quite-another-name.toml", "`glimt new FILE` writes a scene to start from"),
+    ] {
+        let stderr = desk.expect(call, 2);
+        assert!(stderr.contains("there is no such scene file") && stderr.contains(words), "{call}: {stderr}");
+    }
     desk.write("schema", SCENE);
     desk.expect("schema --once -o a.png", 0);
 }

@@ -21,8 +21,8 @@ use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(order: Order, console: &Console) -> Exit {
-    if let Some(mistyped) = mistyped(&order.scene) {
-        console.diagnostics(&[mistyped]);
+    if let Some(absent) = absent(&order.scene) {
+        console.diagnostics(&[absent]);
         return Exit::WRONG;
     }
     match live(order, console) {
@@ -101,17 +101,12 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// What is said of a scene that is not there while one with nearly its name is; others are waited for.
-fn mistyped(scene: &Path) -> Option<Diagnostic> {
+/// What is said of a scene that is not there from the first; one that goes while it is watched is waited for.
+fn absent(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
     }
-    text_now(scene).err().map(|problem| *problem).filter(has_near_name)
-}
-
-fn has_near_name(problem: &Diagnostic) -> bool {
-    problem.message == NO_SUCH_FILE
-        && problem.help.as_ref().is_some_and(|help| help.starts_with("did you mean"))
+    text_now(scene).err().map(|problem| *problem).filter(|problem| problem.message == NO_SUCH_FILE)
 }
 
 /// What became of pictures.
