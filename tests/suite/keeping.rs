@@ -127,6 +127,39 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
     bench(&format!("{SHORT} {all}"), 0);
 }
 
+/// Only root can try: the program runs as another user.
+#[test]
+fn an_owner_that_cannot_be_kept_is_said() {
+    use std::os::unix::process::CommandExt;
+    let desk = Desk::new();
+    if fs::metadata(desk.0.path()).expect("a folder").uid() != 0 {
+        return eprintln!("skipped: only root can become another user");
+    }
+    // A copy, as another user may not reach where the program is.
+    fs::copy(desk.glimt("").get_program(), desk.path("program")).expect("a copy");
+    fs::set_permissions(desk.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
+    for (name, mode) in [("a.png", 0o666), ("b.png", 0o666)] {
+        desk.write(name, "");
+        fs::set_permissions(desk.path(name), fs::Permissions::from_mode(mode)).expect("permitted");
+    }
+    let run = |line: &str| {
+        let mut process = std::process::Command::new(desk.path("program"));
+        process.current_dir(desk.0.path()).args(line.split_whitespace()).uid(65534).gid(65534);
+        let output = process.output().expect("it runs");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).expect("UTF-8")
+    };
+    let words = "warning: a.png: its owner and its group could not be kept";
+    let stderr = run("ball.toml --once -o a.png");
+    assert!(stderr.contains(words), "{stderr}");
+    assert_eq!(fs::metadata(desk.path("a.png")).expect("a file").uid(), 65534);
+    assert!(!run("ball.toml --once -o a.png").contains("could not be kept"), "it is its own now");
+    let events = run("ball.toml --once -o b.png --progress json");
+    let done = events.lines().last().expect("the end");
+    let done: serde_json::Value = serde_json::from_str(done).expect("JSON");
+    assert_eq!(done["diagnostics"][0]["message"], "b.png: its owner and its group could not be kept");
+}
+
 /// A list as the kernel keeps it (posix_acl_xattr.h): rights of the owner, of user 4321, of the group, of all whom
 /// the mask limits, of others.
 fn access_list(named: u8, group: u8, mask: u8) -> Vec<u8> {

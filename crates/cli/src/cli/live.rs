@@ -162,6 +162,7 @@ impl Writes {
             | Event::Asset { .. }
             | Event::Settings { .. }
             | Event::Warnings { .. }
+            | Event::NotKept { .. }
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }

@@ -90,7 +90,7 @@ fn follow(
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
     let mut unwritten: Vec<String> = Vec::new();
-    let mut idle: Vec<Diagnostic> = Vec::new();
+    let mut of_call: Vec<Diagnostic> = Vec::new();
     loop {
         if is_over() {
             return Exit::FAILED;
@@ -101,8 +101,11 @@ fn follow(
             Err(RecvTimeoutError::Disconnected) => return console.fail(Exit::FAILED, "the worker is gone"),
         };
         match &mut event {
-            Event::Settings { settings, .. } => idle = without_effect(&order.overrides, settings),
-            Event::Done { warnings, .. } => warnings.append(&mut idle),
+            Event::Settings { settings, .. } => of_call = without_effect(&order.overrides, settings),
+            Event::NotKept { message, .. } => {
+                of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
+            }
+            Event::Done { warnings, .. } => warnings.append(&mut of_call),
             Event::Started { .. }
             | Event::Stage { .. }
             | Event::Files { .. }
@@ -149,6 +152,7 @@ fn follow(
             | Event::Settings { .. }
             | Event::Progress { .. }
             | Event::Preview { .. }
+            | Event::NotKept { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
             | Event::Edited { .. }
@@ -158,15 +162,19 @@ fn follow(
     }
 }
 
-/// Warnings about options that were asked for and change nothing. The terminal UI says it in its own way.
-fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
-    let warning = |message: &str, help: &str| Diagnostic {
+/// A warning about the call.
+fn warning(message: &str, help: &str) -> Diagnostic {
+    Diagnostic {
         severity: Severity::Warning,
         message: message.to_owned(),
         path: PathBuf::new(),
         place: None,
         help: Some(help.to_owned()),
-    };
+    }
+}
+
+/// Warnings about options that were asked for and change nothing. The terminal UI says it in its own way.
+fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
         let help = "give the scene's [camera] an `aperture`, such as 0.1";
         warning("--dof on has no effect: the scene's camera is a pinhole", help)

@@ -6,6 +6,8 @@
 mod attributes;
 mod error;
 mod exr;
+#[cfg(target_os = "linux")]
+mod flags;
 mod format;
 mod hdr;
 mod identity;

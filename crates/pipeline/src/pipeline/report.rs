@@ -8,6 +8,7 @@ use super::inputs::Inputs;
 use super::plan::Plan;
 use super::protocol::StageReport;
 use super::settings::Effective;
+use super::sink::Sink;
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
 use super::targets::guarded;
@@ -206,13 +207,14 @@ pub(super) fn write_report(
     plan: &Plan,
     inputs: &Inputs,
     report: &Report,
+    sink: &Sink,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     let Some(path) = &plan.report else { return Ok(()) };
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::file(report).map_err(unwritable)?;
-    guarded(plan, inputs, path, |guard| atomic_until(path, text.as_bytes(), guard, token))
+    guarded(plan, inputs, path, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::inputs::{Input, Inputs};
 use super::plan::Plan;
 use super::report::Marks;
+use super::sink::Sink;
 use crate::output::write::Guard;
 use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -42,7 +43,7 @@ pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs)).collect()
 }
 
-/// Writes a file of the plan, unless it is found at the last moment that it must not be.
+/// Writes a file of the plan, and says what of the one that was there could not be kept; unless it is found at the last moment that it must not be.
 ///
 /// # Errors
 /// Those of writing; [`OutputError::Refused`].
@@ -50,6 +51,7 @@ pub(super) fn guarded<T>(
     plan: &Plan,
     inputs: &Inputs,
     path: &Path,
+    sink: &Sink,
     write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
@@ -63,7 +65,7 @@ pub(super) fn guarded<T>(
     write(&Guard {
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
-        losses: Losses::Allowed,
+        losses: Losses::Told(&|what| sink.not_kept(what)),
     })
 }
 

@@ -133,7 +133,7 @@ impl Outputs {
     ) -> Result<(), Exit> {
         let written = (0..self.files.len()).map(|index| {
             let (_, path, _) = &self.files[index];
-            let written = self.write_one(index, results, token);
+            let written = self.write_one(index, results, said, token);
             let bytes = written.map_err(|why| console.fail(Exit::FAILED, &why))?;
             said.written(path, bytes);
             Ok(())
@@ -142,13 +142,20 @@ impl Outputs {
     }
 
     /// Gives its bytes; the error says why not.
-    fn write_one(&self, index: usize, results: &Results, token: &CancelToken) -> Result<usize, String> {
+    fn write_one(
+        &self,
+        index: usize,
+        results: &Results,
+        said: &Said,
+        token: &CancelToken,
+    ) -> Result<usize, String> {
         let (_, path, kind) = &self.files[index];
         let bytes =
             content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.may_replace(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Allowed };
+        let losses = Losses::Told(&|what| said.warned(&what));
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
         let written = write::atomic_until(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }

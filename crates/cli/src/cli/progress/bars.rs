@@ -77,6 +77,7 @@ impl Reporter for Bars {
             | Event::Preview { .. }
             | Event::Written { .. }
             | Event::WriteFailed { .. }
+            | Event::NotKept { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
             | Event::Edited { .. }

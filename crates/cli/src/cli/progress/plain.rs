@@ -65,6 +65,7 @@ impl Reporter for Plain {
             | Event::Preview { .. }
             | Event::Written { .. }
             | Event::WriteFailed { .. }
+            | Event::NotKept { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
             | Event::Edited { .. }
