@@ -100,28 +100,13 @@ fn follow(
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => return console.fail(Exit::FAILED, "the worker is gone"),
         };
-        match &mut event {
-            Event::Settings { settings, .. } => of_call = without_effect(&order.overrides, settings),
-            Event::NotKept { message, .. } => {
-                of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
-            }
-            Event::Done { warnings, .. } => warnings.append(&mut of_call),
-            Event::Started { .. }
-            | Event::Stage { .. }
-            | Event::Files { .. }
-            | Event::Warnings { .. }
-            | Event::Asset { .. }
-            | Event::Progress { .. }
-            | Event::Preview { .. }
-            | Event::Written { .. }
-            | Event::WriteFailed { .. }
-            | Event::Refused { .. }
-            | Event::WritePostponed { .. }
-            | Event::Edited { .. }
-            | Event::CameraKept { .. }
-            | Event::Picked { .. }
-            | Event::Failed { .. }
-            | Event::Cancelled { .. } => {}
+        // Warnings about the call come with those about the scene.
+        if let Event::Settings { settings, .. } = &event {
+            of_call = without_effect(&order.overrides, settings);
+        } else if let Event::NotKept { message, .. } = &event {
+            of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
+        } else if let Event::Done { warnings, .. } = &mut event {
+            warnings.append(&mut of_call);
         }
         reporter.event(&event);
         match event {
