@@ -61,6 +61,7 @@ pub(crate) fn render(
             | Event::Settings { .. }
             | Event::Written { .. }
             | Event::WriteFailed { .. }
+            | Event::NotKept { .. }
             | Event::WritePostponed { .. }
             | Event::Edited { .. }
             | Event::Warnings { .. }

@@ -267,9 +267,12 @@ fn no_output_is_an_input_or_another_output() {
     for (line, words) in [
         (
             "--csv ball.toml",
-            "there is a file of this name that glimt did not write; name another file with --csv FILE",
+            "the file of this name is not a table that glimt wrote; name another file with --csv FILE",
         ),
-        ("--json ball.toml box.toml", "there is a file of this name that glimt did not write; name another"),
+        (
+            "--json ball.toml box.toml",
+            "the file of this name is not a file of results that glimt wrote; name another",
+        ),
     ] {
         let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
         assert!(stderr.starts_with("error: cannot write ball.toml: ") && stderr.contains(words), "{stderr}");

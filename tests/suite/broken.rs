@@ -508,6 +508,7 @@ fn numbers_up_to_255_get_the_text_that_is_meant() {
     for (kind, key, severity) in [
         ("phong", "diffuse", Severity::Warning),
         ("phong", "specular", Severity::Warning),
+        ("phong", "ambient", Severity::Warning),
         ("mirror", "reflectance", Severity::Error),
         ("glass", "tint", Severity::Error),
     ] {
@@ -519,12 +520,53 @@ fn numbers_up_to_255_get_the_text_that_is_meant() {
         );
         assert!(found.help.as_ref().is_some_and(|help| help.starts_with("write \"#a00f0c\"")), "{found:?}");
     }
+    for (kind, key) in [("phong", "diffuse"), ("mirror", "reflectance")] {
+        let found = of_bytes(scene(kind, key).replace("[160, 15, 12]", "160").as_bytes());
+        assert!(found.help.as_ref().is_some_and(|help| help.starts_with("write \"#a0a0a0\"")), "{found:?}");
+    }
     let text = scene("phong", "emission").replace("[160", "[16");
     assert!(!text.is_empty() && diagnostics_of(&text).is_empty(), "radiance may be any");
     let text = scene("phong", "diffuse").replace("[160, 15, 12]", "[2, 0, 0]");
     let said = diagnostics_of(&text);
     assert!(said.len() == 1 && said[0].message.contains("reflects more light"), "{said:?}");
     assert!(!said[0].place.as_ref().is_some_and(|place| place.label.contains("255")));
+}
+
+/// Each value of a key with its message, its column and its help.
+#[test]
+fn lists_in_other_manners_get_the_list_that_is_meant() {
+    let open = "`[` opened here is not closed";
+    let brackets = "a list stands in brackets: write [0, 3, 3]";
+    let write = Some("write [0, 3, 3]");
+    let close = Some("expected `]`");
+    for (value, message, column, help) in [
+        ("(0, 3, 3)", brackets, 12, None),
+        ("(0 3 3) # where", brackets, 12, None),
+        ("{0, 3, 3}", brackets, 12, None),
+        ("<0; 3; 3>", brackets, 12, None),
+        ("vec3(0, 3, 3)", brackets, 12, None),
+        ("[0; 3; 3]", "commas are missing: write [0, 3, 3]", 13, None),
+        ("[0 3 3", open, 12, write),
+        ("[0, 3, 3", open, 12, write),
+        ("[0, 3, 3) # where", open, 12, write),
+        ("[0, 3, \"3]\"", open, 12, close),
+        ("[0, 3, 3 # ]", open, 12, write),
+        ("[[0, 3], [3, 3", open, 21, Some("write [3, 3]")),
+        ("[[0, 3], [3, 3]", open, 12, close),
+        ("[\n[0, 3],\n[3, 3]", open, 12, close),
+    ] {
+        let camera = "[camera]\nlook_at = [0, 1, 0]\nposition = ";
+        for rest in ["", "\n", "\nfov = 30\n", "\n\n[render]\nwidth = 3\n", "\n[[sphere]]\n"] {
+            let said = diagnostics_of(&format!("{camera}{value}{rest}"));
+            let first = &said[0];
+            let place = first.place.as_ref().expect("a place");
+            let found =
+                (&*first.message, line_and_column(&place.source, place.span.start), first.help.as_deref());
+            assert_eq!(found, (message, (3, column), help), "{value}{rest}: {said:?}");
+            let others = said[1..].iter().filter(|one| one.message != "the scene has no shapes");
+            assert_eq!(others.count(), 0, "{value}{rest}: {said:?}");
+        }
+    }
 }
 
 /// Everything that is said of this text.

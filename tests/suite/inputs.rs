@@ -149,9 +149,9 @@ fn every_kind_of_input_stays() {
         ("camera.txt", "orbiter"),
         ("deep/one.obj", "mesh"),
         // Seen to be no report before the mesh is read.
-        ("deep/materials.json", "glimt did not write"),
-        ("deep/one.mtl", "glimt did not write"),
-        ("deep/wood.ppm", "glimt did not write"),
+        ("deep/materials.json", "is not a report that glimt wrote"),
+        ("deep/one.mtl", "is not a report that glimt wrote"),
+        ("deep/wood.ppm", "is not a report that glimt wrote"),
         // Not there yet, and read as soon as it is.
         ("deep/gone.mtl", "one.obj"),
     ] {

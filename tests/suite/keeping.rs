@@ -8,6 +8,8 @@ use super::desk::Desk;
 
 /// A file of somebody else whose name has the ending of a report.
 const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
+/// What a person may write about a render.
+const BY_HAND: &str = "{\n  \"glimt\": \"0.1.0\",\n  \"scene\": \"a.toml\",\n  \"seconds\": 3.5\n}\n";
 /// A render that would take for ever.
 const ENDLESS: &str = "--once --samples 4000000 --width 4000";
 /// A measurement that would take for ever, but for what it says before.
@@ -19,22 +21,33 @@ const SHORT: &str =
 #[test]
 fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
     let desk = Desk::new();
-    for foreign in [PACKAGE, "[1, 2]", "{}", "{\"glimt\": \"0.1.0\", \"scene\": \"a\"", "text"] {
+    let refused = |foreign: &[u8]| {
         desk.write("package.json", foreign);
         let stderr = desk.expect(&format!("ball.toml {ENDLESS} --report package.json"), 2);
         assert!(
-            stderr
-                .contains("cannot write package.json: there is a file of this name that glimt did not write")
-                && stderr.contains("--force replaces it"),
+            stderr.contains(
+                "cannot write package.json: the file of this name is not a report that glimt wrote"
+            ) && stderr.contains("--force replaces it"),
             "{stderr}"
         );
-        assert_eq!(desk.bytes("package.json"), foreign.as_bytes());
+        assert_eq!(desk.bytes("package.json"), foreign);
+    };
+    for foreign in [PACKAGE, BY_HAND, "[1, 2]", "{}", "{\"glimt\": \"0.1.0\", \"scene\": \"a\"", "text"] {
+        refused(foreign.as_bytes());
     }
+    desk.run(&format!("bench ball.toml {SHORT} --json results.json"));
+    refused(&desk.bytes("results.json"));
     desk.expect("ball.toml --once --report package.json --force", 0);
-    let report: serde_json::Value = serde_json::from_slice(&desk.bytes("package.json")).expect("JSON");
-    // Its own, as it is, with other keys, sorted and in one line, and an empty file are replaced without asking.
-    let older = serde_json::json!({ "glimt": "0.0.1", "scene": "a.toml", "seconds": 1.5, "stages": [] });
-    let all = [report.to_string(), older.to_string(), String::new()];
+    let mut report: serde_json::Value = serde_json::from_slice(&desk.bytes("package.json")).expect("JSON");
+    // Its own, as it is, with the keys of the contract alone, sorted and in one line, and an empty file are replaced
+    // without asking.
+    let as_it_is = report.to_string();
+    let keys = report.as_object_mut().expect("an object");
+    let fixed = ["glimt", "scene", "image", "settings", "stages", "counters", "seconds", "peak_memory_bytes"];
+    keys.retain(|key, _| fixed.contains(&key.as_str()));
+    assert_eq!(keys.len(), fixed.len());
+    keys.insert("glimt".to_owned(), "0.0.1".into());
+    let all = [as_it_is, report.to_string(), String::new()];
     for own in all {
         desk.write("package.json", own);
         desk.expect("ball.toml --once --report package.json", 0);
@@ -65,23 +78,45 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
         assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
         stderr
     };
-    let files = [
-        ("--json", "a.json", PACKAGE),
-        ("--csv", "a.csv", "name,age\nsomebody,3\n"),
-        ("--plot", "a.svg", "<svg width=\"8\" height=\"8\" xmlns=\"http://www.w3.org/2000/svg\"/>\n"),
-    ];
-    for (option, name, foreign) in files {
+    let refused = |option: &str, name: &str, foreign: &str| {
         desk.write(name, foreign);
         let stderr = bench(&format!("{LONG} {option} {name}"), 2);
+        let what = match option {
+            "--json" => "a file of results",
+            "--csv" => "a table",
+            _ => "a plot",
+        };
         let expected = format!(
-            "error: cannot write {name}: there is a file of this name that glimt did not write; \
+            "error: cannot write {name}: the file of this name is not {what} that glimt wrote; \
              name another file with {option} FILE, or --force replaces it\n"
         );
         assert_eq!(stderr, expected);
         assert_eq!(desk.bytes(name), foreign.as_bytes());
+    };
+    desk.expect("ball.toml --once --report report.json", 0);
+    let report = String::from_utf8(desk.bytes("report.json")).expect("UTF-8");
+    let described = "<svg width=\"8\" height=\"8\" xmlns=\"http://www.w3.org/2000/svg\">\n<desc>glimt ";
+    for (option, name, foreign) in [
+        ("--json", "a.json", PACKAGE),
+        ("--json", "a.json", BY_HAND),
+        ("--json", "a.json", &report),
+        ("--json", "a.json", "{ \"glimt\": \"0.1.0\", \"threads\": 2, \"seconds\": 3.5, \"scenes\": [] }"),
+        ("--csv", "a.csv", "name,age\nsomebody,3\n"),
+        ("--plot", "a.svg", "<svg width=\"8\" height=\"8\" xmlns=\"http://www.w3.org/2000/svg\"/>\n"),
+        ("--plot", "a.svg", &format!("{described}in the wind</desc>\n</svg>\n")),
+    ] {
+        refused(option, name, foreign);
     }
     let all = "--json a.json --csv a.csv --plot a.svg";
     bench(&format!("{SHORT} {all} --force"), 0);
+    // The same with a column more, or another end of the line.
+    let table = String::from_utf8(desk.bytes("a.csv")).expect("UTF-8");
+    let (head, lines) = table.split_once("\r\n").expect("a first line");
+    refused("--csv", "b.csv", &format!("{head},note\r\n{lines}"));
+    refused("--csv", "b.csv", &format!("{head}\n{lines}"));
+    // The same with the words of somebody else before glimt's.
+    let plot = String::from_utf8(desk.bytes("a.svg")).expect("UTF-8");
+    refused("--plot", "b.svg", &plot.replacen("<desc>", "<desc>somebody, with </desc>\n<desc>", 1));
     bench(&format!("{SHORT} {all}"), 0);
     // A plot of a version that did not sign it.
     let plot = String::from_utf8(desk.bytes("a.svg")).expect("UTF-8");
@@ -90,6 +125,39 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
     desk.write("a.svg", format!("{start}{end}"));
     desk.write("a.csv", "");
     bench(&format!("{SHORT} {all}"), 0);
+}
+
+/// Only root can try: the program runs as another user.
+#[test]
+fn an_owner_that_cannot_be_kept_is_said() {
+    use std::os::unix::process::CommandExt;
+    let desk = Desk::new();
+    if fs::metadata(desk.0.path()).expect("a folder").uid() != 0 {
+        return eprintln!("skipped: only root can become another user");
+    }
+    // A copy, as another user may not reach where the program is.
+    fs::copy(desk.glimt("").get_program(), desk.path("program")).expect("a copy");
+    fs::set_permissions(desk.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
+    for (name, mode) in [("a.png", 0o666), ("b.png", 0o666)] {
+        desk.write(name, "");
+        fs::set_permissions(desk.path(name), fs::Permissions::from_mode(mode)).expect("permitted");
+    }
+    let run = |line: &str| {
+        let mut process = std::process::Command::new(desk.path("program"));
+        process.current_dir(desk.0.path()).args(line.split_whitespace()).uid(65534).gid(65534);
+        let output = process.output().expect("it runs");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).expect("UTF-8")
+    };
+    let words = "warning: a.png: its owner and its group could not be kept";
+    let stderr = run("ball.toml --once -o a.png");
+    assert!(stderr.contains(words), "{stderr}");
+    assert_eq!(fs::metadata(desk.path("a.png")).expect("a file").uid(), 65534);
+    assert!(!run("ball.toml --once -o a.png").contains("could not be kept"), "it is its own now");
+    let events = run("ball.toml --once -o b.png --progress json");
+    let done = events.lines().last().expect("the end");
+    let done: serde_json::Value = serde_json::from_str(done).expect("JSON");
+    assert_eq!(done["diagnostics"][0]["message"], "b.png: its owner and its group could not be kept");
 }
 
 /// A list as the kernel keeps it (posix_acl_xattr.h): rights of the owner, of user 4321, of the group, of all whom

@@ -348,8 +348,33 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         stderr.contains("there is no such scene file") && stderr.contains("did you mean ball.toml?"),
         "{stderr}"
     );
+    for (call, words) in [
+        ("nofolder/x.toml", "the folder nofolder does not exist"),
+        ("./nofolder/deep/x.toml --once", "the folder ./nofolder/deep does not exist"),
+        ("check nofolder/x.toml", "the folder nofolder does not exist"),
+        ("quite-another-name.toml", "`glimt new FILE` writes a scene to start from"),
+    ] {
+        let stderr = desk.expect(call, 2);
+        assert!(stderr.contains("there is no such scene file") && stderr.contains(words), "{call}: {stderr}");
+    }
     desk.write("schema", SCENE);
     desk.expect("schema --once -o a.png", 0);
+}
+
+/// The stacks of so many threads take more than the limit.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_do_not_start_are_said_with_the_way_out() {
+    let desk = Desk::new();
+    let glimt = desk.glimt("");
+    let mut shell = std::process::Command::new("sh");
+    let line = "ulimit -v 2000000; exec \"$0\" ball.toml --once --threads 3000 --progress none";
+    shell.args(["-c", line]).arg(glimt.get_program()).current_dir(desk.0.path());
+    let output = shell.output().expect("it runs");
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    let words = "cannot start 3000 threads: resource temporarily unavailable; use fewer (--threads 1), or raise the limits";
+    assert!(stderr.contains(words) && !stderr.contains("os error"), "{stderr}");
+    assert_eq!(output.status.code(), Some(1));
 }
 
 #[test]

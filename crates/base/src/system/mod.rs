@@ -1,4 +1,4 @@
-//! What the operating system says, in plain words, what a terminal shows as it is, which files have an end, which threads go first, and what they took.
+//! What the operating system says, in plain words, what a terminal shows as it is, which files have an end, which threads go first, what they took, and why they are not started.
 
 #[allow(unsafe_code)]
 pub mod abort;
@@ -6,6 +6,7 @@ pub mod file;
 pub mod priority;
 pub mod processor;
 pub mod text;
+pub mod threads;
 
 use std::io::{Error, ErrorKind};
 

@@ -22,6 +22,7 @@ use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
+use crate::system::threads::not_started;
 
 /// Between two looks for a signal.
 const TICK: Duration = Duration::from_millis(50);
@@ -43,7 +44,7 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
         .map_err(|error| console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")))?;
     let mut said = Said::new(args.progress, console);
     let (news, work) = begin(order, token.clone())
-        .map_err(|error| console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")))?;
+        .map_err(|error| console.fail(Exit::FAILED, &not_started("a thread", false, &error)))?;
     follow(&news, &mut said);
     let results = work.join().unwrap_or_else(|_| Err(Box::new(broken())));
     said.end();

@@ -2,6 +2,7 @@
 
 mod pictures;
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -15,12 +16,13 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::output::write::{self, Guard};
 use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError};
+use crate::system::threads::not_started;
 use crate::tui::wrapped;
 
 pub(super) fn run(args: &CompareArgs, console: &Console) -> Exit {
     match ThreadPoolBuilder::new().build() {
         Ok(pool) => run_in(&pool, args, console).unwrap_or_else(|exit| exit),
-        Err(error) => console.fail(Exit::FAILED, &format!("cannot start threads: {error}")),
+        Err(error) => console.fail(Exit::FAILED, &not_started("threads", false, &error)),
     }
 }
 
@@ -44,7 +46,8 @@ fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Ex
     }
     if let Some(diff) = diff {
         let written = pool.install(|| diff.write(args, &pair, &measured));
-        written.map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+        let lost = written.map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+        lost.iter().for_each(|what| console.say(&format!("warning: {what}")));
         console.say(&format!("wrote {} ({})", diff.path.display(), diff.shows()));
     }
     Ok(judge(&summary, console))
@@ -105,7 +108,13 @@ impl<'a> Diff<'a> {
         }
     }
 
-    fn write(&self, args: &CompareArgs, pair: &Pair, measured: &Measured) -> Result<(), OutputError> {
+    /// Writes it. Gives what of the file that was there could not be kept.
+    fn write(
+        &self,
+        args: &CompareArgs,
+        pair: &Pair,
+        measured: &Measured,
+    ) -> Result<Option<String>, OutputError> {
         let image: RadianceImage =
             if self.is_float() { compare::absolute(pair) } else { compare::heat(pair, &measured.flip) };
         let note = format!("{}; a: {}, b: {}", self.shows(), args.a.display(), args.b.display());
@@ -115,12 +124,11 @@ impl<'a> Diff<'a> {
         let bytes = output::encode(&image, &options, self.format, &token)?;
         let may_replace = |real: &Path| check_no_input(self.path, real, args);
         let is_kept = |path: &Path| check_no_input(path, path, args).is_err();
-        write::atomic_until(
-            self.path,
-            &bytes,
-            &Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Allowed },
-            &token,
-        )
+        let lost = RefCell::new(None);
+        let losses = Losses::Told(&|what| drop(lost.replace(Some(what))));
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
+        write::atomic_until(self.path, &bytes, &guard, &token)?;
+        Ok(lost.into_inner())
     }
 }
 

@@ -14,14 +14,15 @@ use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{NO_SUCH_FILE, text_now};
+use crate::system::threads::not_started;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
 /// How long the end waits for a picture that is being written, after a signal; after a key until a person is told what it waits for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(order: Order, console: &Console) -> Exit {
-    if let Some(mistyped) = mistyped(&order.scene) {
-        console.diagnostics(&[mistyped]);
+    if let Some(absent) = absent(&order.scene) {
+        console.diagnostics(&[absent]);
         return Exit::WRONG;
     }
     match live(order, console) {
@@ -31,7 +32,7 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
 }
 
 fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
-    let no_thread = |error| (Exit::FAILED, format!("cannot start a thread: {error}"));
+    let no_thread = |error: std::io::Error| (Exit::FAILED, not_started("a thread", false, &error));
     let mut worker = start().map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
@@ -100,17 +101,12 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// What is said of a scene that is not there while one with nearly its name is; others are waited for.
-fn mistyped(scene: &Path) -> Option<Diagnostic> {
+/// What is said of a scene that is not there from the first; one that goes while it is watched is waited for.
+fn absent(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
     }
-    text_now(scene).err().map(|problem| *problem).filter(has_near_name)
-}
-
-fn has_near_name(problem: &Diagnostic) -> bool {
-    problem.message == NO_SUCH_FILE
-        && problem.help.as_ref().is_some_and(|help| help.starts_with("did you mean"))
+    text_now(scene).err().map(|problem| *problem).filter(|problem| problem.message == NO_SUCH_FILE)
 }
 
 /// What became of pictures.
@@ -166,6 +162,7 @@ impl Writes {
             | Event::Asset { .. }
             | Event::Settings { .. }
             | Event::Warnings { .. }
+            | Event::NotKept { .. }
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }

@@ -13,6 +13,7 @@ use crate::pipeline::protocol::{Command, Event, Failure, Report, Request, Writin
 use crate::pipeline::settings::{Effective, Overrides};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::system::threads::not_started;
 
 /// How long the end may take after a signal.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -22,7 +23,7 @@ const TICK: Duration = Duration::from_millis(50);
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
     let worker = match start() {
         Ok(worker) => worker,
-        Err(error) => return console.fail(Exit::FAILED, &format!("cannot start a thread: {error}")),
+        Err(error) => return console.fail(Exit::FAILED, &not_started("a thread", false, &error)),
     };
     let remote = worker.remote();
     let ended = match signals::catch(move || remote.send(Command::Cancel)) {
@@ -89,7 +90,7 @@ fn follow(
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
     let mut unwritten: Vec<String> = Vec::new();
-    let mut idle: Vec<Diagnostic> = Vec::new();
+    let mut of_call: Vec<Diagnostic> = Vec::new();
     loop {
         if is_over() {
             return Exit::FAILED;
@@ -99,25 +100,13 @@ fn follow(
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => return console.fail(Exit::FAILED, "the worker is gone"),
         };
-        match &mut event {
-            Event::Settings { settings, .. } => idle = without_effect(&order.overrides, settings),
-            Event::Done { warnings, .. } => warnings.append(&mut idle),
-            Event::Started { .. }
-            | Event::Stage { .. }
-            | Event::Files { .. }
-            | Event::Warnings { .. }
-            | Event::Asset { .. }
-            | Event::Progress { .. }
-            | Event::Preview { .. }
-            | Event::Written { .. }
-            | Event::WriteFailed { .. }
-            | Event::Refused { .. }
-            | Event::WritePostponed { .. }
-            | Event::Edited { .. }
-            | Event::CameraKept { .. }
-            | Event::Picked { .. }
-            | Event::Failed { .. }
-            | Event::Cancelled { .. } => {}
+        // Warnings about the call come with those about the scene.
+        if let Event::Settings { settings, .. } = &event {
+            of_call = without_effect(&order.overrides, settings);
+        } else if let Event::NotKept { message, .. } = &event {
+            of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
+        } else if let Event::Done { warnings, .. } = &mut event {
+            warnings.append(&mut of_call);
         }
         reporter.event(&event);
         match event {
@@ -148,6 +137,7 @@ fn follow(
             | Event::Settings { .. }
             | Event::Progress { .. }
             | Event::Preview { .. }
+            | Event::NotKept { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
             | Event::Edited { .. }
@@ -157,15 +147,19 @@ fn follow(
     }
 }
 
-/// Warnings about options that were asked for and change nothing. The terminal UI says it in its own way.
-fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
-    let warning = |message: &str, help: &str| Diagnostic {
+/// A warning about the call.
+fn warning(message: &str, help: &str) -> Diagnostic {
+    Diagnostic {
         severity: Severity::Warning,
         message: message.to_owned(),
         path: PathBuf::new(),
         place: None,
         help: Some(help.to_owned()),
-    };
+    }
+}
+
+/// Warnings about options that were asked for and change nothing. The terminal UI says it in its own way.
+fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
         let help = "give the scene's [camera] an `aperture`, such as 0.1";
         warning("--dof on has no effect: the scene's camera is a pinhole", help)

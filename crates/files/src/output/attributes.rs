@@ -9,6 +9,9 @@ use std::path::Path;
 
 use xattr::FileExt;
 
+#[cfg(target_os = "linux")]
+use super::flags::Flags;
+
 /// The access list of POSIX.1e, as Linux keeps it (acl(5)).
 const ACCESS_LIST: &str = "system.posix_acl_access";
 /// Attributes that belong to the old bytes, or that the system writes by itself.
@@ -21,10 +24,10 @@ const OWNER: u32 = 0o700;
 const NOT_GROUP: u32 = 0o707;
 
 /// Whether a file may be replaced if something that it has besides its bytes cannot be kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Losses {
-    /// It may; the new file never gives anybody more rights.
-    Allowed,
+#[derive(Clone, Copy)]
+pub enum Losses<'a> {
+    /// It may, and a sentence says what was lost; the new file never gives anybody more rights.
+    Told(&'a dyn Fn(String)),
     /// It may not.
     Refused,
 }
@@ -35,6 +38,8 @@ pub(super) struct Attributes {
     uid: u32,
     gid: u32,
     mode: u32,
+    #[cfg(target_os = "linux")]
+    flags: Flags,
     /// Names and values; the access list comes last, as it may take rights away.
     named: Vec<(OsString, io::Result<Vec<u8>>)>,
 }
@@ -52,12 +57,24 @@ impl Attributes {
     pub(super) fn of(path: &Path, metadata: &fs::Metadata) -> Self {
         let mut named = named(path);
         named.sort_by_key(|(name, _)| name == ACCESS_LIST);
-        Self { uid: metadata.uid(), gid: metadata.gid(), mode: metadata.mode() & 0o7777, named }
+        Self {
+            uid: metadata.uid(),
+            gid: metadata.gid(),
+            mode: metadata.mode() & 0o7777,
+            #[cfg(target_os = "linux")]
+            flags: Flags::of(path),
+            named,
+        }
     }
 
     /// Gives them to a new file that only its owner can read so far, all but the permissions.
     pub(super) fn carry_over(&self, new: &File) -> Carried {
         let mut carried = Carried { lost: Vec::new(), mode: self.mode };
+        // While the new file is this user's own.
+        #[cfg(target_os = "linux")]
+        if !self.flags.carry_over(new) {
+            carried.lost.push("its flags (chattr)".to_owned());
+        }
         self.carry_owner(new, &mut carried);
         self.carry_named(new, &mut carried);
         carried
@@ -149,7 +166,18 @@ mod tests {
         let new = tempfile::tempfile().expect("a file");
         let found = new.metadata().expect("a file");
         let named = vec![(OsString::from(name), Ok(b"value".to_vec()))];
-        (Attributes { uid: found.uid(), gid: found.gid(), mode, named }, new)
+        #[cfg(target_os = "linux")]
+        let flags = Flags::of(Path::new("/nowhere"));
+        let (uid, gid) = (found.uid(), found.gid());
+        let attributes = Attributes {
+            uid,
+            gid,
+            mode,
+            #[cfg(target_os = "linux")]
+            flags,
+            named,
+        };
+        (attributes, new)
     }
 
     #[test]

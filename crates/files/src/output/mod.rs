@@ -6,6 +6,8 @@
 mod attributes;
 mod error;
 mod exr;
+#[cfg(target_os = "linux")]
+mod flags;
 mod format;
 mod hdr;
 mod identity;
@@ -15,6 +17,7 @@ mod origin;
 mod place;
 mod png;
 mod ppm;
+mod protection;
 mod stoppable;
 mod temporary;
 pub mod write;

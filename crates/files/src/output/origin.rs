@@ -1,12 +1,12 @@
-//! Whether glimt wrote the file that a write would replace: the content says so, whatever the name ends in.
+//! Whether glimt wrote the file that a write would replace: the content says so, whatever the name ends in. A kind of file
+//! replaces its own kind alone.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 use memchr::memmem;
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde::de::DeserializeOwned;
 
 use super::place::{self, Place, Target};
 use super::{PROGRAM, SOFTWARE};
@@ -21,21 +21,21 @@ const PLOT_BYTES: u64 = 64 << 20;
 pub enum Replaced {
     /// Nothing, or what may be replaced.
     Own,
-    /// What somebody else may want to keep.
-    Foreign,
+    /// What somebody else may want to keep, and what glimt would write there: "a report".
+    Foreign(&'static str),
     /// A file that cannot be read.
     Unreadable(io::Error),
 }
 
 impl Replaced {
-    fn of(file: Option<io::Result<File>>, is_own: impl Fn(File) -> bool) -> Self {
+    fn of(file: Option<io::Result<File>>, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         match file {
             None => Self::Own,
             Some(Ok(file)) => {
                 if is_own(file) {
                     Self::Own
                 } else {
-                    Self::Foreign
+                    Self::Foreign(kind)
                 }
             }
             Some(Err(error)) => Self::Unreadable(error),
@@ -43,16 +43,16 @@ impl Replaced {
     }
 
     /// As [`Self::of`], for texts: an empty file may be replaced too.
-    fn of_text(path: &Path, is_own: impl Fn(File) -> bool) -> Self {
+    fn of_text(path: &Path, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         let is_empty = |file: &File| file.metadata().is_ok_and(|found| found.len() == 0);
-        Self::of(replaced(path), |file| is_empty(&file) || is_own(file))
+        Self::of(replaced(path), kind, |file| is_empty(&file) || is_own(file))
     }
 
     /// Why the file is not replaced; `None` if it may be.
     pub fn why_kept(&self) -> Option<String> {
         match self {
             Self::Own => None,
-            Self::Foreign => Some("there is a file of this name that glimt did not write".to_owned()),
+            Self::Foreign(kind) => Some(format!("the file of this name is not {kind} that glimt wrote")),
             Self::Unreadable(error) => {
                 Some(format!("the file of this name cannot be read: {}", crate::system::in_words(error)))
             }
@@ -62,32 +62,45 @@ impl Replaced {
 
 /// Whether a picture may be replaced: a PNG whose text chunk names glimt.
 pub fn replaced_picture(path: &Path) -> Replaced {
-    Replaced::of(replaced(path), is_own_picture)
+    Replaced::of(replaced(path), "a picture", is_own_picture)
 }
 
-/// Whether a file of JSON may be replaced: a report, the results of `bench`, an empty file.
-pub fn replaced_json(path: &Path) -> Replaced {
-    Replaced::of_text(path, is_own_json)
+/// Whether a file of JSON may be replaced: one that is `T` as a whole and passes the test, or an empty file.
+pub fn replaced_json<T: DeserializeOwned>(
+    path: &Path,
+    kind: &'static str,
+    is_own: impl Fn(&T) -> bool,
+) -> Replaced {
+    Replaced::of_text(path, kind, |file| {
+        let mut reader = BufReader::new(file);
+        // Large files of somebody else are not read to their end for nothing.
+        let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
+        is_object && serde_json::from_reader(reader).is_ok_and(|value| is_own(&value))
+    })
 }
 
-/// Whether a table may be replaced: one with this first line, or an empty file.
+/// Whether a table may be replaced: one with this first line, given with its end, or an empty file.
 pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
-    Replaced::of_text(path, |file| {
+    Replaced::of_text(path, "a table", |file| {
         let mut start = Vec::new();
         let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
         is_read && start == first_line.as_bytes()
     })
 }
 
-/// Whether a plot may be replaced: one that is [`signed`], one of an older version, or an empty file.
-pub fn replaced_plot(path: &Path) -> Replaced {
-    Replaced::of_text(path, is_own_plot)
+/// Whether a plot may be replaced: one with these texts that is [`signed`] or of a version that did not sign, or an empty
+/// file.
+pub fn replaced_plot(path: &Path, texts: &[&str]) -> Replaced {
+    Replaced::of_text(path, "a plot", |file| is_own_plot(file, texts))
 }
+
+/// The signature's start, which follows an SVG's first tag.
+const SIGNATURE: &str = "\n<desc>";
 
 /// A plot that says which program drew it.
 pub fn signed(svg: &str) -> String {
     match svg.split_once('>') {
-        Some((start, rest)) => format!("{start}>\n<desc>{SOFTWARE}</desc>{rest}"),
+        Some((start, rest)) => format!("{start}>{SIGNATURE}{SOFTWARE}</desc>{rest}"),
         None => svg.to_owned(),
     }
 }
@@ -115,32 +128,15 @@ fn is_program(software: &str) -> bool {
     software.split_once(' ').is_some_and(|(name, _)| name == PROGRAM)
 }
 
-/// What reports and results have in common, in every version.
-#[derive(Deserialize)]
-struct OwnJson {
-    #[serde(rename = "glimt")]
-    _version: String,
-    #[serde(rename = "seconds")]
-    _seconds: f64,
-    #[serde(rename = "scene", alias = "scenes")]
-    _scenes: IgnoredAny,
-}
-
-fn is_own_json(file: File) -> bool {
-    let mut reader = BufReader::new(file);
-    // Large files of somebody else are not read to their end for nothing.
-    let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
-    is_object && serde_json::from_reader::<_, OwnJson>(reader).is_ok()
-}
-
-fn is_own_plot(file: File) -> bool {
-    let mut text = Vec::new();
-    if file.take(PLOT_BYTES).read_to_end(&mut text).is_err() || !text.starts_with(b"<svg ") {
+fn is_own_plot(file: File, texts: &[&str]) -> bool {
+    let mut svg = Vec::new();
+    if file.take(PLOT_BYTES).read_to_end(&mut svg).is_err() || !svg.starts_with(b"<svg ") {
         return false;
     }
-    let has = |part: &str| memmem::find(&text, part.as_bytes()).is_some();
-    // Older versions left the names of the axes alone.
-    has(&format!("<desc>{PROGRAM} ")) || (has("\nseconds of rendering\n") && has("\nrelMSE\n"))
+    let has = |part: &str| memmem::find(&svg, part.as_bytes()).is_some();
+    let signature = format!(">{SIGNATURE}{PROGRAM} ");
+    let is_signed = memmem::find(&svg, b">").is_some_and(|end| svg[end..].starts_with(signature.as_bytes()));
+    (is_signed || !has("<desc>")) && texts.iter().all(|text| has(&format!("\n{text}\n")))
 }
 
 #[cfg(test)]
@@ -153,9 +149,9 @@ mod tests {
         let path = folder.path().join("a.png");
         assert!(matches!(replaced_picture(&path), Replaced::Own), "there is none");
         std::fs::write(&path, "a picture").expect("written");
-        assert!(matches!(replaced_picture(&path), Replaced::Foreign));
+        assert!(matches!(replaced_picture(&path), Replaced::Foreign("a picture")));
         let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
-        let replaced = Replaced::of(denied(), |_| true);
+        let replaced = Replaced::of(denied(), "a picture", |_| true);
         assert!(
             matches!(replaced, Replaced::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
         );
@@ -168,8 +164,8 @@ mod tests {
         };
         assert_eq!(why(nix::libc::EACCES), "the file of this name cannot be read: permission denied");
         assert_eq!(why(nix::libc::EMFILE), "the file of this name cannot be read: too many open files");
-        let foreign = Replaced::Foreign.why_kept();
-        assert_eq!(foreign.as_deref(), Some("there is a file of this name that glimt did not write"));
+        let foreign = Replaced::Foreign("a report").why_kept();
+        assert_eq!(foreign.as_deref(), Some("the file of this name is not a report that glimt wrote"));
         assert_eq!(Replaced::Own.why_kept(), None);
     }
 }

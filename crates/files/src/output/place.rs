@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::unistd::{AccessFlags, access};
 
+use super::protection::{self, Flag};
 use super::{OutputError, temporary};
 
 /// As many links as Linux follows.
@@ -41,7 +42,7 @@ impl Target {
 /// Finds the place and whether it can be written, as far as can be told without writing.
 pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
-        return Err(lacks_photonsory(path));
+        return Err(is_a_directory(path));
     }
     match follow(path).map_err(|error| OutputError::file(path, error))? {
         (target, None) => new_file(path, target),
@@ -95,26 +96,40 @@ fn new_file(path: &Path, target: PathBuf) -> Result<Place, OutputError> {
 fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<Place, OutputError> {
     let kind = metadata.file_type();
     if kind.is_dir() {
-        return Err(lacks_photonsory(path));
+        return Err(is_a_directory(path));
     }
     if kind.is_block_device() || kind.is_socket() {
         let what = if kind.is_socket() { "a socket" } else { "a block device" };
         let why = format!("it is {what}");
         return Err(OutputError::Target { path: path.to_owned(), why, way_out: "name a file" });
     }
-    // Also of a file, although its directory decides whether it can be replaced: it may be protected on purpose.
-    may_write(path, &target, AccessFlags::W_OK)?;
     if !kind.is_file() {
+        may_write(path, &target, AccessFlags::W_OK)?;
         return Ok(Place::InPlace(target));
     }
-    check_directory(path, directory_of(&target))?;
+    unflagged(path, "it", &target)?;
+    // Also of a file, although its directory decides whether it can be replaced: it may be protected on purpose.
+    may_write(path, &target, AccessFlags::W_OK)?;
+    let directory = check_directory(path, directory_of(&target))?;
+    if protection::is_kept_for_owner(&directory, &metadata) {
+        let directory = directory_of(&target).display();
+        return Err(OutputError::Target {
+            path: path.to_owned(),
+            why: format!(
+                "it belongs to another user, and in the sticky directory {directory} only its owner may replace it"
+            ),
+            way_out: "choose another name or place",
+        });
+    }
     Ok(Place::File(Target { path: target, existing: Some(metadata) }))
 }
 
-fn check_directory(path: &Path, directory: &Path) -> Result<(), OutputError> {
+fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputError> {
     match fs::metadata(directory) {
         Ok(metadata) if metadata.is_dir() => {
-            may_write(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)
+            unflagged(path, &format!("the directory {}", directory.display()), directory)?;
+            may_write(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)?;
+            Ok(metadata)
         }
         Ok(_) => Err(OutputError::file(path, io::Error::from(Errno::ENOTDIR))),
         Err(error) if error.kind() == ErrorKind::NotFound => Err(OutputError::Target {
@@ -126,11 +141,18 @@ fn check_directory(path: &Path, directory: &Path) -> Result<(), OutputError> {
     }
 }
 
+/// That no flag keeps the file or directory from being changed: the new file could not be given its name, nor be removed.
+fn unflagged(path: &Path, called: &str, what: &Path) -> Result<(), OutputError> {
+    let Some(flag) = Flag::of(what) else { return Ok(()) };
+    let why = format!("{called} is {}", flag.words());
+    Err(OutputError::Target { path: path.to_owned(), why, way_out: flag.way_out() })
+}
+
 fn may_write(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputError> {
     access(what, how).map_err(|errno| OutputError::file(path, errno))
 }
 
-fn lacks_photonsory(path: &Path) -> OutputError {
+fn is_a_directory(path: &Path) -> OutputError {
     let why = "it is a directory".to_owned();
     OutputError::Target { path: path.to_owned(), why, way_out: "name a file in it" }
 }

@@ -277,7 +277,7 @@ fn what_a_format_cannot_hold_is_said() {
 }
 
 const NOTHING_KEPT: write::Guard<'_> =
-    write::Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Allowed };
+    write::Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Told(&|_| ()) };
 
 #[test]
 fn what_is_cancelled_is_neither_encoded_nor_written() {
@@ -323,7 +323,7 @@ fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
     use nix::unistd::{Gid, Uid, geteuid, setfsgid, setfsuid};
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
     if !geteuid().is_root() {
-        return;
+        return eprintln!("skipped: only root can become another user");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let permit = |path: &Path, mode| {
@@ -333,8 +333,11 @@ fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, "old").expect("written");
     permit(&path, 0o4664);
-    let write = |losses| {
+    let told = std::sync::Mutex::new(Vec::new());
+    let write = |is_refused: bool| {
         let as_nobody = || {
+            let tell = |what| told.lock().expect("no panic").push(what);
+            let losses = if is_refused { Losses::Refused } else { Losses::Told(&tell) };
             let guard = write::Guard { losses, ..NOTHING_KEPT };
             setfsgid(Gid::from_raw(65534));
             setfsuid(Uid::from_raw(65534));
@@ -348,11 +351,14 @@ fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
                 .expect("no panic")
         })
     };
-    let refused = write(Losses::Refused).expect_err("its owner is root").to_string();
+    let refused = write(true).expect_err("its owner is root").to_string();
     assert!(refused.contains("its owner and its group cannot be kept"), "{refused}");
     assert_eq!(std::fs::read(&path).expect("read"), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
-    write(Losses::Allowed).expect("written");
+    assert!(told.lock().expect("no panic").is_empty());
+    write(false).expect("written");
+    let expected = format!("{}: its owner and its group could not be kept", path.display());
+    assert_eq!(*told.lock().expect("no panic"), [expected]);
     let found = std::fs::metadata(&path).expect("a file");
     assert_eq!((found.uid(), found.mode() & 0o7777), (65534, 0o644));
 }

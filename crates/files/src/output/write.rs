@@ -22,8 +22,8 @@ use crate::control::CancelToken;
 pub const STDOUT: &str = "/dev/stdout";
 
 /// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At
-/// any moment, whatever ends the process, the file is the old one or the new one. Its permissions, its access list and
-/// its attributes stay, as does its owner if this process may give files away; a link stays and what it points to is replaced. Temporary files of killed writers in the same directory are removed.
+/// any moment, whatever ends the process, the file is the old one or the new one. Its permissions, its access list, its
+/// attributes and its flags stay, as does its owner if this process may give files away; a link stays and what it points to is replaced. Temporary files of killed writers in the same directory are removed.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
@@ -31,7 +31,7 @@ pub const STDOUT: &str = "/dev/stdout";
 /// Names the path, what the system said and the way out; the old file is untouched then, and no temporary file is
 /// left.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Allowed };
+    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Told(&|_| ()) };
     atomic_until(path, bytes, &guard, &CancelToken::new())
 }
 
@@ -42,7 +42,7 @@ pub struct Guard<'a> {
     /// Whether the new file may take the place of this one, there or not; or whether it may be written to in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
     /// Whether a file whose owner, access list or attributes cannot be kept may be replaced.
-    pub losses: Losses,
+    pub losses: Losses<'a>,
 }
 
 /// [`atomic`] that can be stopped as long as the new file is not whole, and that a guard watches.
@@ -60,12 +60,22 @@ pub fn atomic_until(
     match place::find(path)? {
         Place::File(target) => {
             let (new, carried) = beside(&target, guard).map_err(named)?;
-            if let Some(carried) = carried.as_ref().filter(|_| guard.losses == Losses::Refused) {
-                nothing_lost(path, carried)?;
+            let lost = carried.as_ref().map_or(&[][..], |carried| &carried.lost);
+            if let (Losses::Refused, false) = (guard.losses, lost.is_empty()) {
+                let why = format!("{} cannot be kept", lost.join(" and "));
+                return Err(OutputError::Target {
+                    path: path.to_owned(),
+                    why,
+                    way_out: "change a copy of it",
+                });
             }
             stoppable::or_cancelled(fill(&new, bytes, carried.as_ref(), token), named)?;
             (guard.may_replace)(&target.path)?;
-            new.rename_to(&target.path).and_then(|()| sync_directory(target.directory())).map_err(named)
+            new.rename_to(&target.path).and_then(|()| sync_directory(target.directory())).map_err(named)?;
+            if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {
+                tell(format!("{}: {} could not be kept", path.display(), lost.join(" and ")));
+            }
+            Ok(())
         }
         Place::InPlace(place) => {
             (guard.may_replace)(&place)?;
@@ -96,14 +106,6 @@ fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<C
     let old = target.existing.as_ref().map(|existing| Attributes::of(&target.path, existing));
     let carried = old.map(|old| old.carry_over(&new.file));
     Ok((new, carried))
-}
-
-fn nothing_lost(path: &Path, carried: &Carried) -> Result<(), OutputError> {
-    if carried.lost.is_empty() {
-        return Ok(());
-    }
-    let why = format!("{} cannot be kept", carried.lost.join(" and "));
-    Err(OutputError::Target { path: path.to_owned(), why, way_out: "change a copy of it" })
 }
 
 fn fill(new: &Temporary, bytes: &[u8], carried: Option<&Carried>, token: &CancelToken) -> io::Result<()> {

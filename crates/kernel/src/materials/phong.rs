@@ -46,6 +46,22 @@ impl Phong {
             ambient: self.ambient.as_ref().map_or(diffuse, |ambient| ambient.at(at, lookups)),
         }
     }
+
+    /// ka alone, looked up.
+    pub fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.ambient.as_ref().unwrap_or(&self.diffuse).at(at, lookups)
+    }
+
+    /// White in place of its textures.
+    pub fn bleached(&self) -> PhongBsdf {
+        let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
+        PhongBsdf {
+            diffuse: bleached(&self.diffuse),
+            specular: bleached(&self.specular),
+            shininess: self.shininess,
+            ambient: bleached(self.ambient.as_ref().unwrap_or(&self.diffuse)),
+        }
+    }
 }
 
 impl Phong {

@@ -171,6 +171,13 @@ pub enum Event {
         /// Which file, and why.
         message: String,
     },
+    /// A file was written, and what the one that was there had besides its bytes could not be kept.
+    NotKept {
+        /// Of which request.
+        generation: u64,
+        /// Which file, and what of it.
+        message: String,
+    },
     /// No file is written as long as one of them must not be: it is an input, another of them, or something that a person
     /// did not mean to lose. A render under way goes on.
     Refused {

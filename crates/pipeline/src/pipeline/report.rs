@@ -1,11 +1,14 @@
 //! The report of a finished request, and its file.
 
+mod marks;
+
 use std::path::{Path, PathBuf};
 
 use super::inputs::Inputs;
 use super::plan::Plan;
 use super::protocol::StageReport;
 use super::settings::Effective;
+use super::sink::Sink;
 use super::stages::canvas::Canvas;
 use super::stages::films::Films;
 use super::targets::guarded;
@@ -15,6 +18,8 @@ use crate::integrators::{RayCounters, picks};
 use crate::lights::LightTree;
 use crate::output::{OutputError, json, write::atomic_until};
 use crate::world::World;
+
+pub(super) use marks::Marks;
 
 /// The report of one finished request: the JSON of `--report`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -202,13 +207,14 @@ pub(super) fn write_report(
     plan: &Plan,
     inputs: &Inputs,
     report: &Report,
+    sink: &Sink,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     let Some(path) = &plan.report else { return Ok(()) };
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::file(report).map_err(unwritable)?;
-    guarded(plan, inputs, path, |guard| atomic_until(path, text.as_bytes(), guard, token))
+    guarded(plan, inputs, path, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {

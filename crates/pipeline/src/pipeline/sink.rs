@@ -46,6 +46,10 @@ impl Sink {
         self.send(Event::WriteFailed { generation: self.generation, message });
     }
 
+    pub(super) fn not_kept(&self, message: String) {
+        self.send(Event::NotKept { generation: self.generation, message });
+    }
+
     pub(super) fn refused(&self, conflicts: Vec<Diagnostic>) {
         self.send(Event::Refused { generation: self.generation, conflicts });
     }

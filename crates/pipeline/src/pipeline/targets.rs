@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::{Input, Inputs};
 use super::plan::Plan;
+use super::report::Marks;
+use super::sink::Sink;
 use crate::output::write::Guard;
 use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -41,7 +43,7 @@ pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs)).collect()
 }
 
-/// Writes a file of the plan, unless it is found at the last moment that it must not be.
+/// Writes a file of the plan, and says what of the one that was there could not be kept; unless it is found at the last moment that it must not be.
 ///
 /// # Errors
 /// Those of writing; [`OutputError::Refused`].
@@ -49,6 +51,7 @@ pub(super) fn guarded<T>(
     plan: &Plan,
     inputs: &Inputs,
     path: &Path,
+    sink: &Sink,
     write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
@@ -62,7 +65,7 @@ pub(super) fn guarded<T>(
     write(&Guard {
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
-        losses: Losses::Allowed,
+        losses: Losses::Told(&|what| sink.not_kept(what)),
     })
 }
 
@@ -125,7 +128,10 @@ fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
         Kind::Picture(NamedBy::Nobody) => {
             (replaced_picture(at), format!("{way_out}; -o {name} or --force replaces it"))
         }
-        Kind::Report => (replaced_json(at), format!("{way_out}; --force replaces it")),
+        Kind::Report => {
+            let replaced = replaced_json(at, "a report", Marks::have_all_stages);
+            (replaced, format!("{way_out}; --force replaces it"))
+        }
         Kind::Picture(NamedBy::Call | NamedBy::Scene) => return None,
     };
     Some(of_call(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))

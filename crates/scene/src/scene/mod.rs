@@ -8,6 +8,7 @@ pub mod description;
 pub mod diagnostic;
 mod document;
 mod edit;
+mod facing;
 pub mod fingerprint;
 pub mod nearest;
 mod read;
@@ -23,6 +24,7 @@ use std::sync::Arc;
 pub use changes::changes;
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
+pub use facing::MeshBounds;
 pub use source::Source;
 
 /// Scene files over this size, in bytes, are refused.
@@ -84,6 +86,23 @@ impl Loaded {
     /// The camera of a text with what the call sets, if both can be read.
     pub fn camera_of(text: &str, sets: &[String]) -> Option<Camera> {
         document::camera_of(&Source::with_sets(text.into(), sets).ok()?)
+    }
+
+    /// A warning for each light that shines away from everything, where that shows only by the meshes: once they are loaded. Their
+    /// bounds, one for each of [`Scene::mesh_files`], are asked for if there are such lights.
+    pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Diagnostic> {
+        if self.scene.mesh_files.is_empty() {
+            return Vec::new();
+        }
+        let warning = |span| {
+            let help = Some(facing::HELP.to_owned());
+            let mut warning = self.diagnostic_at(span, Severity::Warning, facing::MESSAGE, help);
+            if let Some(place) = &mut warning.place {
+                place.label = facing::LABEL.to_owned();
+            }
+            warning
+        };
+        facing::away(&self.scene, bounds).into_iter().map(warning).collect()
     }
 
     /// The line of the file, from 1, in which something begins.

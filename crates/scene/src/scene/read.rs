@@ -108,10 +108,14 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
         return ("this is a symbolic link to a file that does not exist".to_owned(), None);
     }
     if error.kind() == io::ErrorKind::NotFound {
-        let help = neighbour(path, may_be_scene)
-            .map(|near| format!("did you mean {}?", visible(&near.to_string_lossy())));
-        let start = || "`glimt new FILE` writes a scene to start from".to_owned();
-        return (NO_SUCH_FILE.to_owned(), Some(help.unwrap_or_else(start)));
+        let shown = |path: &Path| visible(&path.to_string_lossy()).into_owned();
+        let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+        let help = match (missing, neighbour(path, may_be_scene)) {
+            (Some(folder), _) => format!("the folder {} does not exist", shown(folder)),
+            (None, Some(near)) => format!("did you mean {}?", shown(&near)),
+            (None, None) => "`glimt new FILE` writes a scene to start from".to_owned(),
+        };
+        return (NO_SUCH_FILE.to_owned(), Some(help));
     }
     (format!("cannot read the scene file: {}", in_words(error)), None)
 }

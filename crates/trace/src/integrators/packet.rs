@@ -203,7 +203,7 @@ impl Loops for Meeting<'_> {
             left &= !of;
             let Some((material, phong)) = shot.plain_phong(id) else { continue };
             let Some(specular) = phong.specular.constant() else { continue };
-            let texture = phong.diffuse.texture().filter(|_| are_lit);
+            let texture = phong.diffuse.texture().filter(|_| are_lit && measure.is_colored());
             match &world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
                     if !surface.fill(shape, rows, &hits, of) {
@@ -224,7 +224,7 @@ impl Loops for Meeting<'_> {
                     PhongRow { diffuse, specular, shininess: phong.shininess }
                 }
                 None => {
-                    let Vec3 { x, y, z } = phong.diffuse.constant().unwrap_or(Vec3::ZERO);
+                    let Vec3 { x, y, z } = phong.diffuse.constant().unwrap_or(Vec3::ONE);
                     let diffuse = [[x; PACKET], [y; PACKET], [z; PACKET]];
                     PhongRow { diffuse, specular, shininess: phong.shininess }
                 }

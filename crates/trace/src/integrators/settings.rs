@@ -4,6 +4,7 @@ use super::{FirstHit, Measure, PhotonSettings, Shown, View};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::{Integrator, Render};
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use crate::world::Lookups;
 
 /// How a world is rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,11 +39,36 @@ impl RenderSettings {
         let shows = match self.view.shown() {
             Shown::FirstHit(number) => number == FirstHit::Photons,
             Shown::Light(Measure::ArrivingShare) => false,
-            Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Film(_) | Shown::Bounds => {
-                self.render.max_depth > 1
-            }
+            Shown::Light(Measure::Radiance(parts)) => parts.are_reflected() && self.render.max_depth > 1,
+            Shown::Light(Measure::Work) | Shown::Film(_) | Shown::Bounds => self.render.max_depth > 1,
         };
         shows && self.heeded().photons.is_some()
+    }
+
+    /// The textures that pictures by these settings look up.
+    pub fn lookups(&self) -> Lookups {
+        match self.view.shown() {
+            Shown::FirstHit(FirstHit::Normal) => Lookups { normals: true, ..Lookups::NONE },
+            Shown::FirstHit(FirstHit::Albedo) => Lookups { diffuse: true, ..Lookups::NONE },
+            // Photons come by way of all surfaces.
+            Shown::FirstHit(FirstHit::Photons) if self.gathers() => Lookups::ALL,
+            Shown::FirstHit(FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons) => {
+                Lookups::NONE
+            }
+            // What surfaces reflect does not count; where they face and what lights send does.
+            Shown::Light(Measure::ArrivingShare) => {
+                Lookups { diffuse: false, specular: false, ambient: false, ..Lookups::ALL }
+            }
+            Shown::Light(Measure::Radiance(parts)) if !parts.are_reflected() => {
+                // Mirrors and glass, by which such parts are seen too, have no normal maps.
+                let ambient = parts.ambient && self.heeded().render.ambient != Vec3::ZERO;
+                Lookups { ambient, lights: parts.emitted, ..Lookups::NONE }
+            }
+            // Boxes are drawn over the picture.
+            Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Bounds | Shown::Film(_) => {
+                Lookups::ALL
+            }
+        }
     }
 
     /// A place in the picture, in pixels from its top left corner, as the camera takes it: from its middle to the right

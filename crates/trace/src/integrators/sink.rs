@@ -63,9 +63,14 @@ impl Sink<'_> {
     /// Whether anything is taken of what lamps send.
     pub fn takes_reflected(&self) -> bool {
         match self.measure {
-            Measure::Radiance(parts) => parts.diffuse || parts.specular,
+            Measure::Radiance(parts) => parts.are_reflected(),
             Measure::ArrivingShare | Measure::Work => true,
         }
+    }
+
+    /// Whether anything is taken of what Phong surfaces reflect of ambient light.
+    pub fn takes_ambient(&self) -> bool {
+        self.parts().ambient
     }
 
     /// What lamps send to the eye by the vertices of the slots from one on, which the eye sees itself.

@@ -2,7 +2,6 @@
 
 use crate::choice;
 use crate::film::Quantity;
-use crate::world::Lookups;
 
 choice! {
     /// What a picture shows.
@@ -75,23 +74,6 @@ impl View {
 }
 
 impl View {
-    /// The textures that a picture of it looks up.
-    pub fn lookups(self) -> Lookups {
-        match self.shown() {
-            Shown::FirstHit(FirstHit::Normal) => Lookups { normals: true, ..Lookups::NONE },
-            Shown::FirstHit(FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv) => Lookups::NONE,
-            // What surfaces reflect does not count; where they face and what lights send does.
-            Shown::Light(Measure::ArrivingShare) => Lookups { colors: false, ..Lookups::ALL },
-            // Boxes are drawn over the picture; photons come by way of all surfaces.
-            Shown::Light(Measure::Radiance(_) | Measure::Work)
-            | Shown::FirstHit(FirstHit::Albedo | FirstHit::Photons)
-            | Shown::Bounds
-            | Shown::Film(_) => Lookups::ALL,
-        }
-    }
-}
-
-impl View {
     /// The view whose samples it shows.
     pub fn sampled(self) -> Self {
         match self.shown() {
@@ -147,6 +129,14 @@ impl Measure {
     /// All radiance.
     pub const ALL: Self = Self::Radiance(Parts::ALL);
 
+    /// Whether the colours of surfaces count in what lamps send.
+    pub fn is_colored(self) -> bool {
+        match self {
+            Self::Radiance(_) | Self::Work => true,
+            Self::ArrivingShare => false,
+        }
+    }
+
     /// How light may come to the first diffuse or glossy surface.
     pub fn ways(self) -> Ways {
         match self {
@@ -190,6 +180,11 @@ impl Ways {
 }
 
 impl Parts {
+    /// Whether anything is taken of what lamps send.
+    pub fn are_reflected(self) -> bool {
+        self.diffuse || self.specular
+    }
+
     /// All of it.
     pub const ALL: Self =
         Self { emitted: true, ambient: true, diffuse: true, specular: true, ways: Ways::ALL };

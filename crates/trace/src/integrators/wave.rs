@@ -341,12 +341,22 @@ impl Wave<'_, '_> {
     }
 
     fn shade_phong(&mut self, path: &PathRay, vertex: &Vertex<'_>, phong: &Phong) {
-        let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+        let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.shot.settings.render.ambient;
-        if ambient != Vec3::ZERO {
+        let takes_ambient = ambient != Vec3::ZERO && self.sink.takes_ambient();
+        // No more textures are looked up than the picture shows.
+        if !self.sink.takes_reflected() {
+            if takes_ambient {
+                let reflectance = phong.ambient_at(at, lookups);
+                self.sink.add(path.slot, Part::Ambient, path.throughput * ambient * reflectance);
+            }
+            return;
+        }
+        let bsdf = if self.sink.measure.is_colored() { phong.at(at, lookups) } else { phong.bleached() };
+        if takes_ambient {
             self.sink.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);
         }
-        if bsdf.is_black() || !self.sink.takes_reflected() {
+        if bsdf.is_black() {
             return;
         }
         let shading = vertex.shading(self.counters);

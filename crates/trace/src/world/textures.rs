@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::math::Vec3;
-use crate::scene::description::{Encoding, Scene, TextureFilter, TextureUse};
+use crate::scene::description::{Encoding, Scene, TextureFilter, TextureRole, TextureUse};
 
 /// An image file, and how its numbers are read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -53,24 +53,32 @@ impl NeededTexture {
 /// What a picture looks up in textures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lookups {
-    /// Colours of surfaces.
-    pub colors: bool,
+    /// Diffuse reflectance.
+    pub diffuse: bool,
+    /// Glossy reflectance.
+    pub specular: bool,
+    /// What Phong surfaces reflect of ambient light.
+    pub ambient: bool,
     /// Pictures on lights, and the map of the environment.
     pub lights: bool,
-    /// Normal maps.
+    /// Normal maps; Phong surfaces alone have them.
     pub normals: bool,
 }
 
 impl Lookups {
     /// Everything.
-    pub const ALL: Self = Self { colors: true, lights: true, normals: true };
+    pub const ALL: Self = Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true };
     /// Nothing.
-    pub const NONE: Self = Self { colors: false, lights: false, normals: false };
+    pub const NONE: Self =
+        Self { diffuse: false, specular: false, ambient: false, lights: false, normals: false };
 
-    fn has(self, used: TextureUse, is_emission: bool) -> bool {
-        match used {
-            TextureUse::Color => self.colors || (self.lights && is_emission),
-            TextureUse::Normal => self.normals,
+    fn has(self, role: TextureRole) -> bool {
+        match role {
+            TextureRole::Diffuse => self.diffuse,
+            TextureRole::Specular => self.specular,
+            TextureRole::Ambient => self.ambient,
+            TextureRole::Emission => self.lights,
+            TextureRole::NormalMap => self.normals,
         }
     }
 }
@@ -89,11 +97,10 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
     };
     let (used_materials, own_materials) = in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
-        let is_emission = |texture| material.emits() && material.emission.texture == Some(texture);
         let textures = material.textures().into_iter();
-        for (texture, used) in textures.filter(|(texture, used)| lookups.has(*used, is_emission(*texture))) {
+        for (texture, role) in textures.filter(|(_, role)| lookups.has(*role)) {
             add(NeededTexture {
-                source: declared_source(scene, texture, used),
+                source: declared_source(scene, texture, role.texture_use()),
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
@@ -181,11 +188,12 @@ pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
 
 fn file_textures(material: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (&Path, TextureUse)> {
     let all = [
-        (&material.diffuse_texture, TextureUse::Color, false),
-        (&material.specular_texture, TextureUse::Color, false),
-        (&material.emission_texture, TextureUse::Color, true),
-        (&material.normal_texture, TextureUse::Normal, false),
+        (&material.diffuse_texture, TextureRole::Diffuse),
+        (&material.diffuse_texture, TextureRole::Ambient),
+        (&material.specular_texture, TextureRole::Specular),
+        (&material.emission_texture, TextureRole::Emission),
+        (&material.normal_texture, TextureRole::NormalMap),
     ];
-    let looked_up = all.into_iter().filter(move |(_, used, is_emission)| lookups.has(*used, *is_emission));
-    looked_up.filter_map(|(path, used, _)| Some((path.as_deref()?, used)))
+    let looked_up = all.into_iter().filter(move |(_, role)| lookups.has(*role));
+    looked_up.filter_map(|(path, role)| Some((path.as_deref()?, role.texture_use())))
 }

@@ -3,6 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
+use super::AXES;
 use super::axes::{Axis, plain, power};
 use crate::bench::results::{MethodResult, SceneResult, Step, Verdict};
 use crate::bench::slope::Slope;
@@ -48,8 +49,8 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Fai
         .axis_style(GREY)
         .label_style(("sans-serif", 14))
         .axis_desc_style(("sans-serif", 16))
-        .x_desc("seconds of rendering")
-        .y_desc("relMSE")
+        .x_desc(AXES[0])
+        .y_desc(AXES[1])
         .x_label_formatter(&|mark| plain(*mark))
         .y_label_formatter(&|mark| power(*mark))
         .draw()?;

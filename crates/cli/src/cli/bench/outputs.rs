@@ -99,8 +99,11 @@ impl Outputs {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
             Kind::Csv => replaced_table(real, csv::HEAD),
-            Kind::Json => replaced_json(real),
-            Kind::Plot => replaced_plot(real),
+            // What a baseline can be read from; no run writes one without scenes.
+            Kind::Json => {
+                replaced_json(real, "a file of results", |found: &Results| !found.scenes.is_empty())
+            }
+            Kind::Plot => replaced_plot(real, &plot::AXES),
         };
         let Some(why) = replaced.why_kept() else { return Ok(()) };
         let way_out = format!("name another file with {option} FILE, or --force replaces it");
@@ -130,7 +133,7 @@ impl Outputs {
     ) -> Result<(), Exit> {
         let written = (0..self.files.len()).map(|index| {
             let (_, path, _) = &self.files[index];
-            let written = self.write_one(index, results, token);
+            let written = self.write_one(index, results, said, token);
             let bytes = written.map_err(|why| console.fail(Exit::FAILED, &why))?;
             said.written(path, bytes);
             Ok(())
@@ -139,13 +142,20 @@ impl Outputs {
     }
 
     /// Gives its bytes; the error says why not.
-    fn write_one(&self, index: usize, results: &Results, token: &CancelToken) -> Result<usize, String> {
+    fn write_one(
+        &self,
+        index: usize,
+        results: &Results,
+        said: &Said,
+        token: &CancelToken,
+    ) -> Result<usize, String> {
         let (_, path, kind) = &self.files[index];
         let bytes =
             content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.may_replace(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Allowed };
+        let losses = Losses::Told(&|what| said.warned(&what));
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
         let written = write::atomic_until(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }

@@ -155,6 +155,15 @@ impl Said {
         }
     }
 
+    /// What is said of a file that was written.
+    pub(super) fn warned(&self, message: &str) {
+        if self.is_for_people() {
+            self.console.say(&format!("warning: {message}"));
+        } else {
+            json_line(&json!({ "event": "warnings", "messages": [message] }));
+        }
+    }
+
     pub(super) fn written(&self, path: &Path, bytes: usize) {
         match self.way {
             Way::Bar(..) | Way::Plain => self.console.say(&format!("wrote {}", path.display())),

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
 use super::{Reporter, seconds};
-use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, Status};
+use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, StageReport, Status};
 use crate::scene::sanitize::visible;
 
 /// Columns that the bar keeps at least.
@@ -29,6 +29,15 @@ impl Bars {
         let all = MultiProgress::new();
         let stage = all.add(ProgressBar::new_spinner().with_style(style("{spinner} {msg}")));
         Self { all, stage, assets: HashMap::new(), render: None, time }
+    }
+
+    fn stage(&mut self, stage: &StageReport) {
+        if stage.status == Status::Running {
+            self.stage.set_message(stage.name.name());
+            self.stage.tick();
+        } else if stage.name == Stage::Accel {
+            self.assets.drain().for_each(|(_, bar)| bar.finish_and_clear());
+        }
     }
 
     fn asset(&mut self, progress: &AssetProgress) {
@@ -59,32 +68,12 @@ impl Bars {
 
 impl Reporter for Bars {
     fn event(&mut self, event: &Event) {
-        match event {
-            Event::Stage { stage, .. } if stage.status == Status::Running => {
-                self.stage.set_message(stage.name.name());
-                self.stage.tick();
-            }
-            Event::Stage { stage, .. } if stage.name == Stage::Accel => {
-                self.assets.drain().for_each(|(_, bar)| bar.finish_and_clear());
-            }
-            Event::Asset { progress, .. } => self.asset(progress),
-            Event::Progress { progress, .. } => self.progress(progress),
-            Event::Started { .. }
-            | Event::Stage { .. }
-            | Event::Files { .. }
-            | Event::Warnings { .. }
-            | Event::Settings { .. }
-            | Event::Preview { .. }
-            | Event::Written { .. }
-            | Event::WriteFailed { .. }
-            | Event::Refused { .. }
-            | Event::WritePostponed { .. }
-            | Event::Edited { .. }
-            | Event::CameraKept { .. }
-            | Event::Picked { .. }
-            | Event::Done { .. }
-            | Event::Failed { .. }
-            | Event::Cancelled { .. } => {}
+        if let Event::Stage { stage, .. } = event {
+            self.stage(stage);
+        } else if let Event::Asset { progress, .. } = event {
+            self.asset(progress);
+        } else if let Event::Progress { progress, .. } = event {
+            self.progress(progress);
         }
     }
 

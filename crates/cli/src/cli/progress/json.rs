@@ -84,6 +84,8 @@ fn value(event: &Event) -> Option<Value> {
         | Event::Warnings { .. }
         | Event::Settings { .. }
         | Event::Preview { .. }
+        // Among the diagnostics at the end.
+        | Event::NotKept { .. }
         | Event::Refused { .. }
         | Event::WritePostponed { .. }
         | Event::Edited { .. }

@@ -48,31 +48,16 @@ impl Plain {
 
 impl Reporter for Plain {
     fn event(&mut self, event: &Event) {
-        match event {
-            Event::Stage { stage, .. } if stage.status != Status::Running => {
-                self.console.say(&stage_line(stage));
-            }
-            Event::Asset { progress, .. } if progress.done == progress.total => {
-                self.console.say(&format!("{:<8} {} 100%", "loaded", progress.name));
-            }
-            Event::Progress { progress, .. } => self.progress(progress),
-            Event::Started { .. }
-            | Event::Stage { .. }
-            | Event::Files { .. }
-            | Event::Warnings { .. }
-            | Event::Asset { .. }
-            | Event::Settings { .. }
-            | Event::Preview { .. }
-            | Event::Written { .. }
-            | Event::WriteFailed { .. }
-            | Event::Refused { .. }
-            | Event::WritePostponed { .. }
-            | Event::Edited { .. }
-            | Event::CameraKept { .. }
-            | Event::Picked { .. }
-            | Event::Done { .. }
-            | Event::Failed { .. }
-            | Event::Cancelled { .. } => {}
+        if let Event::Stage { stage, .. } = event
+            && stage.status != Status::Running
+        {
+            self.console.say(&stage_line(stage));
+        } else if let Event::Asset { progress, .. } = event
+            && progress.done == progress.total
+        {
+            self.console.say(&format!("{:<8} {} 100%", "loaded", progress.name));
+        } else if let Event::Progress { progress, .. } = event {
+            self.progress(progress);
         }
     }
 }

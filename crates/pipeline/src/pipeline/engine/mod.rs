@@ -27,7 +27,7 @@ use super::pace::Stopwatch;
 use super::plan::{Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
 use super::report::{Finished, report};
-use super::settings::{Overrides, View};
+use super::settings::Overrides;
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::canvas::Canvas;
@@ -56,7 +56,8 @@ use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::world::World;
+use crate::system::threads::not_started;
+use crate::world::{Lookups, World};
 
 /// What an engine works with; tests work with other means.
 #[derive(Clone, Copy)]
@@ -335,8 +336,8 @@ impl Engine {
         }
         let pool = self.pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool };
-        let view = plan.settings.view;
-        let (meshes, textures, needed) = self.load(&parsed, view, findings, table, &reading)?;
+        let lookups = plan.settings.lookups();
+        let (meshes, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;
@@ -386,7 +387,7 @@ impl Engine {
     fn load(
         &mut self,
         parsed: &Parsed,
-        view: View,
+        lookups: Lookups,
         findings: &mut Findings,
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
@@ -394,7 +395,7 @@ impl Engine {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, reading))?;
-        let needed = needed(loaded, &found, view, cache);
+        let needed = needed(loaded, &found, lookups, cache);
         let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
         if findings.errors.is_empty() {
@@ -472,7 +473,10 @@ impl Engine {
             .thread_name(name)
             .start_handler(begin)
             .build()
-            .map_err(|error| Stop::work(format!("cannot start {threads} threads: {error}")))?;
+            .map_err(|error| match threads {
+                1 => Stop::work(not_started("a thread", false, &error)),
+                _ => Stop::work(not_started(&format!("{threads} threads"), true, &error)),
+            })?;
         Ok(self.pool.insert(Arc::new(pool)).clone())
     }
 
@@ -499,7 +503,7 @@ impl Engine {
             let reading = Reading { sink, token: &token, contents, pool: &pool };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
-            let mut wanted = needed(loaded, &found, View::Beauty, &self.textures);
+            let mut wanted = needed(loaded, &found, Lookups::ALL, &self.textures);
             add_declared(loaded, &mut wanted.textures);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             let overrides = Overrides::default();

@@ -77,7 +77,7 @@ impl Engine {
         token: &CancelToken,
     ) {
         let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
-        if let Err(error) = write_report(plan, &self.inputs, report, token) {
+        if let Err(error) = write_report(plan, &self.inputs, report, sink, token) {
             let is_cancelled = matches!(error, OutputError::Cancelled(_));
             sink.write_failed(if is_cancelled {
                 format!("the report is not written: {error}")

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::{Engine, Meanwhile};
 use crate::pipeline::plan::plan;
 use crate::pipeline::protocol::Request;
-use crate::pipeline::settings::View;
 use crate::pipeline::sink::Sink;
 use crate::pipeline::stages::meshes::Meshes;
 use crate::pipeline::stages::parse::Parsed;
@@ -13,6 +12,7 @@ use crate::pipeline::stages::textures::{Needed, Textures, needed, textures};
 use crate::pipeline::stages::{Findings, Reading, Stop};
 use crate::pipeline::table::StageTable;
 use crate::pipeline::watch::content::Snapshot;
+use crate::world::Lookups;
 
 /// A scene with all files that its picture needs.
 #[derive(Clone)]
@@ -50,7 +50,7 @@ impl Engine {
         let pool = self.pool(plan.threads)?;
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = Reading { sink, token: meanwhile.token, contents: &snapshot, pool: &pool };
-        let good = self.with_textures(good, plan.settings.view, &reading)?;
+        let good = self.with_textures(good, plan.settings.lookups(), &reading)?;
         // Make it ready: all that did not change is kept from before.
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: true };
         let ready = self.build(&request, &good, plan, &mut table, &reading)?;
@@ -64,10 +64,10 @@ impl Engine {
         Ok(())
     }
 
-    /// Loads what this view looks up, where the scene was read for another one.
-    fn with_textures(&mut self, good: Good, view: View, reading: &Reading<'_>) -> Result<Good, Stop> {
+    /// Loads what this picture looks up, where the scene was read for another one.
+    fn with_textures(&mut self, good: Good, lookups: Lookups, reading: &Reading<'_>) -> Result<Good, Stop> {
         let loaded = &good.parsed.loaded;
-        let needed = needed(loaded, &good.meshes, view, &self.textures);
+        let needed = needed(loaded, &good.meshes, lookups, &self.textures);
         let is_there = |one| good.needed.textures.contains(one);
         if needed.textures.iter().all(is_there) {
             return Ok(good);

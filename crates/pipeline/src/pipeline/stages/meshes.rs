@@ -1,7 +1,7 @@
 //! Mesh files, several at once, each read only when its content changed.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::SystemTime;
 
 use rayon::prelude::*;
@@ -12,9 +12,10 @@ use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
-use crate::scene::Loaded;
+use crate::math::Vec3;
 use crate::scene::description::{Located, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::{Loaded, MeshBounds};
 
 /// A mesh file with the files that it names.
 #[derive(Debug)]
@@ -23,6 +24,23 @@ pub(in crate::pipeline) struct KeptMesh {
     /// All contents that the mesh was made of.
     pub(in crate::pipeline) key: Key,
     companions: Vec<FileRead>,
+    /// Those of the mesh, once they were asked for.
+    bounds: OnceLock<MeshBounds>,
+}
+
+impl KeptMesh {
+    fn new(mesh: Arc<LoadedMesh>, key: Key, companions: Vec<FileRead>) -> Self {
+        Self { mesh, key, companions, bounds: OnceLock::new() }
+    }
+
+    fn bounds(&self) -> MeshBounds {
+        *self.bounds.get_or_init(|| {
+            let mesh = &self.mesh.mesh;
+            let first = *mesh.positions.first()?;
+            let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
+            Some(mesh.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + mesh.origin))
+        })
+    }
 }
 
 /// One for each of the scene's mesh files; those that failed are empty.
@@ -84,7 +102,7 @@ pub(in crate::pipeline) fn meshes(
                 counts.failed += 1;
                 findings.asset_error(loaded, file.span.clone(), &error);
                 let key = file_key(&file.value, content);
-                Arc::new(KeptMesh { mesh: Arc::default(), key, companions: Vec::new() })
+                Arc::new(KeptMesh::new(Arc::default(), key, Vec::new()))
             }
         };
         meshes.push(mesh);
@@ -99,6 +117,10 @@ pub(in crate::pipeline) fn meshes(
             let help = "add a line such as `material = \"name\"`";
             findings.error(loaded, object.span.clone(), message, help);
         }
+    }
+    if counts.failed == 0 {
+        let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
+        findings.warnings.extend(loaded.lights_facing_away(bounds));
     }
     Ok(loaded_and_kept(meshes, counts))
 }
@@ -138,7 +160,7 @@ fn one(
             for file in &companions {
                 file.content.add_to(key.path(&file.path));
             }
-            Ok((Arc::new(KeptMesh { mesh: Arc::new(mesh), key: key.finish(), companions }), false))
+            Ok((Arc::new(KeptMesh::new(Arc::new(mesh), key.finish(), companions)), false))
         }
         Err(error) => Err(error),
     };
@@ -293,6 +315,43 @@ mod tests {
         let own = "[[mesh]]\nfile = \"a.obj\"\n";
         let given = format!("[materials.red]\n{own}material = \"red\"\n");
         assert_eq!([said(own), said(&given), said(&format!("{given}{own}"))], [1, 0, 1]);
+    }
+
+    #[test]
+    fn a_light_that_shines_away_from_every_mesh_is_said() {
+        let mut desk = Desk::new();
+        let mut said = |lamp: &str, place: &str| {
+            let lamp =
+                format!("[materials.lamp]\nemission = [5, 5, 5]\n[[quad]]\nmaterial = \"lamp\"\n{lamp}");
+            let tables = format!("{lamp}\n[[mesh]]\nfile = \"a.obj\"\n{place}\n");
+            let snapshot = desk.snapshot();
+            let warnings = desk.find(&tables, &snapshot).1.warnings;
+            for warning in &warnings {
+                let place = warning.place.as_ref().expect("a place");
+                assert!(warning.message.contains("shines away") && place.label == "all shapes are behind it");
+                assert!(tables[place.span.start..].starts_with("[[quad]]"), "{warning:?}");
+            }
+            warnings.len()
+        };
+        // The triangle is from y = 0 to y = 1, the camera at y = 0.
+        let above_up = "corner = [-1, 2, -1]\nu = [0, 0, 2]\nv = [2, 0, 0]";
+        let above_down = "corner = [-1, 2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
+        let below_down = "corner = [-1, -2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
+        for (lamp, place, count) in [
+            (above_up, "", 1),
+            (above_down, "", 0),
+            (below_down, "", 1),
+            (above_up, "translate = [0, 3, 0]", 0),
+            (above_up, "scale = [1, 4, 1]", 0),
+            // Lying on its back, and upside down.
+            (above_up, "scale = [1, 4, 1]\nrotate = [90, 0, 0]", 1),
+            (below_down, "rotate = [180, 0, 0]", 1),
+            (below_down, "rotate = [180, 0, 0]\ntranslate = [0, -1.5, 0]", 0),
+            // What the camera sees is meant.
+            (above_down, "translate = [0, 3, 0]", 0),
+        ] {
+            assert_eq!(said(lamp, place), count, "{lamp}\n{place}");
+        }
     }
 
     #[test]

@@ -14,7 +14,6 @@ use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
 use crate::assets::image::{ImageEncoding, ImageLimits, load, mipmaps, size};
 use crate::control::{Cancelled, Progress};
-use crate::integrators::View;
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
@@ -91,22 +90,22 @@ pub(in crate::pipeline) struct Needed {
     pub(in crate::pipeline) left_out: usize,
 }
 
-/// The textures that visible materials of this scene look up in a view. Those of the other views stay where all of them
+/// The textures that visible materials of this scene look up in a picture. Those of other pictures stay where all of them
 /// were loaded before: lights and trees over them then stay too.
 pub(in crate::pipeline) fn needed(
     loaded: &Loaded,
     meshes: &Meshes,
-    view: View,
+    lookups: Lookups,
     cache: &TextureCache,
 ) -> Needed {
     let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
     let all = textures_needed(&loaded.scene, &meshes, Lookups::ALL);
-    let of_view = textures_needed(&loaded.scene, &meshes, view.lookups());
-    let left_out = all.len() - of_view.len();
+    let of_picture = textures_needed(&loaded.scene, &meshes, lookups);
+    let left_out = all.len() - of_picture.len();
     if left_out == 0 || cache.has_all(&all) {
         return Needed { textures: all, left_out: 0 };
     }
-    Needed { textures: of_view, left_out }
+    Needed { textures: of_picture, left_out }
 }
 
 /// One image with all who ask for it.

@@ -179,7 +179,7 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &Canvas, to: Destination<'_>, w
 fn write_one(
     image: &RadianceImage,
     canvas: &Canvas,
-    Destination { plan, inputs, .. }: Destination<'_>,
+    Destination { plan, inputs, sink, .. }: Destination<'_>,
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
@@ -190,7 +190,7 @@ fn write_one(
     let bit_depth = BitDepth::try_from(plan.bit_depth)?;
     let options = EncodeOptions { tone, bit_depth, metadata, mean_luminance_error };
     let bytes = output::encode(image, &options, Format::of(path)?, token)?;
-    guarded(plan, inputs, path, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
+    guarded(plan, inputs, path, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
 

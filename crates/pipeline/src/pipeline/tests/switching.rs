@@ -60,13 +60,27 @@ fn of_several_pictures_only_the_one_that_was_saved_is_read() {
     }
 }
 
-/// The textures stage, and the texels that were loaded, of a view of a scene that was not seen before.
-fn textures_of(scene: &str, view: View) -> (char, String, u64) {
+/// A lamp with two texels of bumps, three of light and four of a highlight; the ball has one.
+const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
+    [textures.gloss]\nfile = \"gloss.ppm\"\n\
+    [materials.lamp]\nspecular = { texture = \"gloss\" }\nemission = { texture = \"glow\" }\nnormal_map = \"bumps\"\n\
+    [[quad]]\nmaterial = \"lamp\"\n";
+
+const AMBIENT: &str = "\nambient = [0.1, 0.1, 0.1]";
+
+/// A bench with the files of [`BUMPY`], and a view.
+fn bumpy(scene: &str, view: View) -> Bench {
     let mut bench = Bench::new(scene);
     bench.write("bumps.ppm", "P6\n2 1\n255\n\x7f\x7f\x7f\x7f\x7f\x7f");
     bench.write("glow.ppm", "P6\n3 1\n255\nabcabcabc");
+    bench.write("gloss.ppm", "P6\n4 1\n255\nabcabcabcabc");
     bench.overrides.view = Some(view);
-    let report = bench.done().0;
+    bench
+}
+
+/// The textures stage, and the texels that were loaded, of a view of a scene that was not seen before.
+fn textures_of(scene: &str, view: View) -> (char, String, u64) {
+    let report = bumpy(scene, view).done().0;
     let stage = &report.stages[Stage::Textures as usize];
     let status = statuses(&report).chars().nth(Stage::Textures as usize).expect("a stage");
     (status, stage.why.clone(), report.counters.texels_loaded)
@@ -74,38 +88,77 @@ fn textures_of(scene: &str, view: View) -> (char, String, u64) {
 
 #[test]
 fn a_view_loads_the_textures_that_it_shows() {
-    let other = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
-                 [materials.lamp]\nemission = { texture = \"glow\" }\nnormal_map = \"bumps\"\n\
-                 [[quad]]\nmaterial = \"lamp\"\n";
-    let bumpy = format!("{SCENE}{other}");
+    let bumpy = &format!("{SCENE}{BUMPY}");
+    let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
     let said = |status, why: &str, texels| (status, why.to_owned(), texels);
-    for view in [View::Depth, View::Uv, View::Barycentric] {
-        assert_eq!(textures_of(&bumpy, view), said('s', "the view shows no texture", 0), "{view:?}");
+    let nothing = said('s', "the view shows no texture", 0);
+    // No photons are sent, and no ambient light is reflected.
+    for view in [View::Depth, View::Uv, View::Barycentric, View::Photons, View::Ambient] {
+        assert_eq!(textures_of(bumpy, view), nothing, "{view:?}");
     }
-    assert_eq!(textures_of(SCENE, View::Normal), said('s', "the view shows no texture", 0));
-    assert_eq!(textures_of(&bumpy, View::Normal), said('d', "1 loaded, 2 not shown", 2));
+    for view in [View::Normal, View::Shadow, View::Emission] {
+        assert_eq!(textures_of(SCENE, view), nothing, "{view:?}");
+    }
+    assert_eq!(textures_of(bumpy, View::Normal), said('d', "1 loaded, 3 not shown", 2));
+    assert_eq!(textures_of(bumpy, View::Albedo), said('d', "1 loaded, 3 not shown", 1));
     // What lamps send is a part of what arrives, what surfaces reflect is not.
-    assert_eq!(textures_of(SCENE, View::Shadow), said('s', "the view shows no texture", 0));
-    assert_eq!(textures_of(&bumpy, View::Shadow), said('d', "2 loaded, 1 not shown", 5));
-    // The boxes are drawn over the picture.
-    for view in [View::Beauty, View::Albedo, View::Bounds, View::Cost] {
-        assert_eq!(textures_of(&bumpy, view), said('d', "3 loaded", 6), "{view:?}");
+    assert_eq!(textures_of(bumpy, View::Shadow), said('d', "2 loaded, 2 not shown", 5));
+    assert_eq!(textures_of(bumpy, View::Emission), said('d', "1 loaded, 3 not shown", 3));
+    assert_eq!(textures_of(&ambient(bumpy), View::Ambient), said('d', "1 loaded, 3 not shown", 1));
+    // The boxes are drawn over the picture, and the colour of a lobe says how often it is sampled.
+    for view in [View::Beauty, View::Diffuse, View::Specular, View::Bounds, View::Cost, View::Error] {
+        assert_eq!(textures_of(bumpy, view), said('d', "4 loaded", 10), "{view:?}");
+    }
+    let photons = &format!("{bumpy}[photons]\nenabled = true\ncount = 100\n");
+    assert_eq!(textures_of(photons, View::Photons), said('d', "4 loaded", 10));
+    for view in [View::Emission, View::Albedo] {
+        assert_eq!(textures_of(photons, view), textures_of(bumpy, view), "{view:?}");
     }
 }
 
 #[test]
+fn a_view_looks_up_no_texture_that_it_does_not_load() {
+    let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
+    for (view, scene) in [
+        (View::Shadow, SCENE.to_owned()),
+        (View::Emission, SCENE.to_owned()),
+        (View::Emission, ambient(SCENE)),
+        (View::Ambient, SCENE.to_owned()),
+        (View::Photons, SCENE.to_owned()),
+    ] {
+        let mut bench = Bench::new(&scene);
+        bench.overrides.view = Some(view);
+        let counters = bench.done().0.counters;
+        assert_eq!((counters.texels_loaded, counters.texture_lookups), (0, 0), "{view:?}");
+    }
+    let mut bench = Bench::new(&ambient(SCENE));
+    bench.overrides.view = Some(View::Ambient);
+    let counters = bench.done().0.counters;
+    assert!(counters.texels_loaded == 1 && counters.texture_lookups > 0, "{counters:?}");
+}
+
+#[test]
 fn a_view_without_textures_shows_what_it_would_with_them() {
-    for view in [View::Normal, View::Depth, View::Uv, View::Shadow] {
-        let mut bench = Bench::new(SCENE);
-        bench.overrides.view = Some(view);
-        bench.done();
-        let without = bench.picture();
-        // All that the picture showed stays loaded, so that lights and trees over them do too.
-        let mut bench = Bench::new(SCENE);
-        bench.done();
-        bench.overrides.view = Some(view);
-        let report = bench.done().0;
-        assert_eq!(statuses(&report).chars().nth(Stage::Textures as usize), Some('r'), "{view:?}");
-        assert_eq!(bench.picture(), without, "{view:?}");
+    let bumpy_scene = format!("{SCENE}{BUMPY}").replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
+    for view in
+        [View::Normal, View::Depth, View::Uv, View::Shadow, View::Albedo, View::Ambient, View::Emission]
+    {
+        for scene in [SCENE, &bumpy_scene] {
+            // A black texel reflects nothing; what arrives there is shown all the same.
+            let bench = |view| {
+                let bench = bumpy(scene, view);
+                bench.write("skin.ppm", "P6\n1 1\n255\n\0\0\0");
+                bench
+            };
+            let mut without = bench(view);
+            without.done();
+            // All that the picture showed stays loaded, so that lights and trees over them do too.
+            let mut with = bench(View::Beauty);
+            with.done();
+            with.overrides.view = Some(view);
+            let report = with.done().0;
+            assert_eq!(statuses(&report).chars().nth(Stage::Textures as usize), Some('r'), "{view:?}");
+            assert_eq!(with.picture(), without.picture(), "{view:?}");
+        }
     }
 }

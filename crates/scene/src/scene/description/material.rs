@@ -107,6 +107,31 @@ pub enum TextureUse {
     Normal,
 }
 
+/// What a texture is to a material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureRole {
+    /// kd.
+    Diffuse,
+    /// ks.
+    Specular,
+    /// ka.
+    Ambient,
+    /// Radiance.
+    Emission,
+    /// What bends its normals.
+    NormalMap,
+}
+
+impl TextureRole {
+    /// What its numbers are.
+    pub fn texture_use(self) -> TextureUse {
+        match self {
+            Self::Diffuse | Self::Specular | Self::Ambient | Self::Emission => TextureUse::Color,
+            Self::NormalMap => TextureUse::Normal,
+        }
+    }
+}
+
 /// What a material does with light that arrives.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MaterialKind {
@@ -151,19 +176,22 @@ impl Material {
         self.emission.scale != Vec3::ZERO
     }
 
-    /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with what for.
-    pub fn textures(&self) -> Vec<(usize, TextureUse)> {
+    /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with its role; one may
+    /// have several.
+    pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map } = self;
-        let colors: [Option<&ColorSource>; 3] = match kind {
-            MaterialKind::Phong { diffuse, specular, shininess: _, ambient } => {
-                [Some(diffuse), Some(specular), ambient.as_ref()]
-            }
-            MaterialKind::Mirror { reflectance: _ } | MaterialKind::Glass { ior: _, tint: _ } => [None; 3],
+        let colors = match kind {
+            MaterialKind::Phong { diffuse, specular, shininess: _, ambient } => vec![
+                (diffuse, TextureRole::Diffuse),
+                (specular, TextureRole::Specular),
+                (ambient.as_ref().unwrap_or(diffuse), TextureRole::Ambient),
+            ],
+            MaterialKind::Mirror { reflectance: _ } | MaterialKind::Glass { ior: _, tint: _ } => Vec::new(),
         };
-        let shown = emission.texture.filter(|_| self.emits());
-        let colors = colors.into_iter().flatten().filter_map(ColorSource::texture).chain(shown);
-        let normals = normal_map.iter().map(|map| (map.texture, TextureUse::Normal));
-        colors.map(|index| (index, TextureUse::Color)).chain(normals).collect()
+        let colors = colors.into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
+        let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
+        let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
+        colors.chain(shown).chain(normals).collect()
     }
 }
 

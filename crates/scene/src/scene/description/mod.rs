@@ -16,7 +16,7 @@ pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
 pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
     ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,
-    TextureUse, Wrap,
+    TextureRole, TextureUse, Wrap,
 };
 pub use render::{Accel, Integrator, MOST_SCATTERINGS, PixelFilter, Render, Shadows, Tonemap};
 pub use shape::{Lowered, Mesh, Object, Shape};

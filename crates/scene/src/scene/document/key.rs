@@ -6,8 +6,6 @@ mod file;
 
 use std::ops::{Range, RangeInclusive};
 
-pub(super) use self::color::bytes_for_parts;
-
 use super::super::nearest::meant;
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};

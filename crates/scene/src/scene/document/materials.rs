@@ -2,7 +2,7 @@
 
 use super::super::description::{ColorSource, EmissionSource, Material, MaterialKind, NormalMap};
 use super::context::Issue;
-use super::key::{Key, bytes_for_parts};
+use super::key::Key;
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
@@ -82,29 +82,27 @@ fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
 
 fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
     let (diffuse_key, specular_key) = (table.optional("diffuse"), table.optional("specular"));
+    let ambient_key = table.optional("ambient");
     let (diffuse, specular) =
         (diffuse_key.color_or_texture(textures), specular_key.color_or_texture(textures));
     let is_wrong = |key: &Key<'_>, color: &Option<ColorSource>| key.is_given() && color.is_none();
     let untold = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
     let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
     let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
-    let bytes =
-        [&diffuse_key, &specular_key].into_iter().filter_map(|key| Some((key.span()?, key.of_bytes()?)));
-    let bytes: Vec<_> = bytes.collect();
-    for (span, color) in &bytes {
-        let issue = Issue::warning(span.clone(), "this material reflects more light than falls on it");
-        table.context.report(bytes_for_parts(issue, color));
-    }
-    if !untold && bytes.is_empty() {
+    let are_bytes = [&diffuse_key, &specular_key, &ambient_key]
+        .map(|key| key.is_of_bytes(|span| Issue::warning(span, TOO_MUCH_REFLECTED)));
+    if !untold && are_bytes == [false; 3] {
         warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
     }
     MaterialKind::Phong {
         diffuse,
         specular,
         shininess: table.optional("shininess").number32(Limits::Between(0.0, 1e6)).unwrap_or(32.0),
-        ambient: table.optional("ambient").color_or_texture(textures),
+        ambient: ambient_key.color_or_texture(textures),
     }
 }
+
+const TOO_MUCH_REFLECTED: &str = "this material reflects more light than falls on it";
 
 /// Warns about a material that reflects more light than falls on it.
 fn warn_about_gain(kd_key: &Key<'_>, ks_key: &Key<'_>, kd: &ColorSource, ks: &ColorSource) {
@@ -117,7 +115,7 @@ fn warn_about_gain(kd_key: &Key<'_>, ks_key: &Key<'_>, kd: &ColorSource, ks: &Co
     let most = sum.max_element();
     let Some(span) = ks_key.span().or(kd_key.span()).filter(|_| most > 1.0 + 1e-5) else { return };
     let channel = ["red", "green", "blue"][sum.max_position()];
-    let issue = Issue::warning(span, "this material reflects more light than falls on it")
+    let issue = Issue::warning(span, TOO_MUCH_REFLECTED)
         .label(format!("diffuse + specular is {:.3} in {channel}", most))
         .help("keep `diffuse` + `specular` at or below 1 in every channel");
     kd_key.context.report(issue);

@@ -4,7 +4,6 @@
 mod camera;
 mod context;
 mod environment;
-mod facing;
 mod key;
 mod lights;
 mod limits;
@@ -23,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use super::description::{Camera, Environment, Integrator, Light, Scene};
 use super::source::Source;
-use super::{MAX_FILE_BYTES, Outcome, Setting, toml};
+use super::{MAX_FILE_BYTES, Outcome, Setting, facing, toml};
 use crate::math::Vec3;
 use context::{Context, Issue};
 use table::Table;
@@ -138,7 +137,13 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
         warn_about_darkness(root.context, &scene);
-        facing::warn_about_lights(root.context, &scene);
+        // Where a mesh is, is not known before it is loaded.
+        if scene.mesh_files.is_empty() {
+            for span in facing::away(&scene, Vec::new) {
+                root.context
+                    .report(Issue::warning(span, facing::MESSAGE).label(facing::LABEL).help(facing::HELP));
+            }
+        }
         environment::warn_about_background(root, &scene);
     }
     Some(scene)

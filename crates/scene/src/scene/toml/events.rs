@@ -39,20 +39,8 @@ impl<'s> Events<'_, 's> {
                     self.header();
                 }
                 EventKind::SimpleKey => self.key_value(event),
-                EventKind::StdTableClose
-                | EventKind::ArrayTableClose
-                | EventKind::InlineTableOpen
-                | EventKind::InlineTableClose
-                | EventKind::ArrayOpen
-                | EventKind::ArrayClose
-                | EventKind::KeySep
-                | EventKind::KeyValSep
-                | EventKind::Scalar
-                | EventKind::ValueSep
-                | EventKind::Whitespace
-                | EventKind::Comment
-                | EventKind::Newline
-                | EventKind::Error => {}
+                // Space, and what the text breaks off with.
+                _ => {}
             }
         }
     }
@@ -83,20 +71,7 @@ impl<'s> Events<'_, 's> {
                     return;
                 }
                 EventKind::SimpleKey => (header.path, header.key) = self.key(event),
-                EventKind::StdTableOpen
-                | EventKind::ArrayTableOpen
-                | EventKind::InlineTableOpen
-                | EventKind::InlineTableClose
-                | EventKind::ArrayOpen
-                | EventKind::ArrayClose
-                | EventKind::KeySep
-                | EventKind::KeyValSep
-                | EventKind::Scalar
-                | EventKind::ValueSep
-                | EventKind::Whitespace
-                | EventKind::Comment
-                | EventKind::Newline
-                | EventKind::Error => {}
+                _ => {}
             }
         }
         self.assembly.open = Some(header);
@@ -128,33 +103,16 @@ impl<'s> Events<'_, 's> {
         let mut parts = 1;
         while self.has_separator() {
             while let Some(event) = self.next() {
-                match event.kind() {
-                    EventKind::SimpleKey => {
-                        if parts < DEEPEST {
-                            let name = self.name(last);
-                            path.push(name);
-                        }
-                        parts += 1;
-                        last = event;
-                        break;
-                    }
-                    EventKind::StdTableOpen
-                    | EventKind::StdTableClose
-                    | EventKind::ArrayTableOpen
-                    | EventKind::ArrayTableClose
-                    | EventKind::InlineTableOpen
-                    | EventKind::InlineTableClose
-                    | EventKind::ArrayOpen
-                    | EventKind::ArrayClose
-                    | EventKind::KeySep
-                    | EventKind::KeyValSep
-                    | EventKind::Scalar
-                    | EventKind::ValueSep
-                    | EventKind::Whitespace
-                    | EventKind::Comment
-                    | EventKind::Newline
-                    | EventKind::Error => {}
+                if event.kind() != EventKind::SimpleKey {
+                    continue;
                 }
+                if parts < DEEPEST {
+                    let name = self.name(last);
+                    path.push(name);
+                }
+                parts += 1;
+                last = event;
+                break;
             }
         }
         if parts > DEEPEST {
@@ -189,20 +147,7 @@ impl<'s> Events<'_, 's> {
             EventKind::InlineTableOpen => Some(self.inline_table(event)),
             EventKind::ArrayOpen => Some(self.array(event)),
             EventKind::Scalar => Some(self.scalar(event)),
-            EventKind::StdTableOpen
-            | EventKind::StdTableClose
-            | EventKind::ArrayTableOpen
-            | EventKind::ArrayTableClose
-            | EventKind::InlineTableClose
-            | EventKind::ArrayClose
-            | EventKind::SimpleKey
-            | EventKind::KeySep
-            | EventKind::KeyValSep
-            | EventKind::ValueSep
-            | EventKind::Whitespace
-            | EventKind::Comment
-            | EventKind::Newline
-            | EventKind::Error => None,
+            _ => None,
         }
     }
 

@@ -6,6 +6,7 @@
 //! knows what a scene is. Documents with errors are read as far as they can be understood.
 
 mod assembly;
+mod brackets;
 mod error;
 mod events;
 mod expression;
@@ -16,6 +17,7 @@ mod tree;
 use assembly::Assembly;
 use expression::Expressions;
 
+pub(super) use brackets::{Bracket, brackets, last_open};
 pub(super) use error::SyntaxError;
 pub(super) use set::{Layout, NoPlace, Why};
 pub(super) use tree::{Document, Entries, Item, KeyValue, Value};

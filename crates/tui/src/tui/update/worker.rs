@@ -59,6 +59,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             say(state, format!("error: {}", visible(&message)));
             state.write_failed = Some(Unwritten { why: message, generation: state.generation });
         }
+        Event::NotKept { message, .. } => say(state, format!("warning: {}", visible(&message))),
         Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::Edited { what, .. } => state.history.describe_edit(what),
         Event::WritePostponed { .. } => {
@@ -86,6 +87,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Preview { generation }
         | Event::Written { generation, .. }
         | Event::WriteFailed { generation, .. }
+        | Event::NotKept { generation, .. }
         | Event::Refused { generation, .. }
         | Event::WritePostponed { generation }
         | Event::Edited { generation, .. }

@@ -1,5 +1,7 @@
 //! Colours, and colours or textures.
 
+use std::ops::Range;
+
 use csscolorparser::NAMED_COLORS;
 
 use super::super::super::description::{ColorSource, EmissionSource};
@@ -80,6 +82,11 @@ impl Key<'_> {
 
     fn color_of(&self, limits: Limits, expected: &str) -> Option<DVec3> {
         let value = self.value?;
+        if let Limits::Between(..) = limits
+            && self.is_of_bytes(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
+        {
+            return None;
+        }
         match value.item() {
             Item::String(text) => return self.written_color(text).map(Vec3::as_dvec3),
             Item::Integer { .. } | Item::Float(_) => {
@@ -88,15 +95,6 @@ impl Key<'_> {
             Item::Boolean(_) | Item::Datetime | Item::Array(_) | Item::Table(_) => {}
         }
         if value.array().is_some_and(|array| array.len() == 3) {
-            if let Limits::Between(..) = limits
-                && let Some(color) = self.of_bytes()
-            {
-                self.context.report(bytes_for_parts(
-                    Issue::error(value.span(), format!("`{}` must be {COLOR}", self.name)),
-                    &color,
-                ));
-                return None;
-            }
             let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
             return Some(DVec3::from_array(rgb));
         }
@@ -104,8 +102,17 @@ impl Key<'_> {
         None
     }
 
-    /// The text `#rrggbb` for three whole numbers up to 255 of which one is too large for a part of the light.
-    pub(in super::super) fn of_bytes(&self) -> Option<String> {
+    /// Whether its value is numbers from 0 to 255 in place of parts of the light; then reports this issue of its place, with
+    /// the text that is meant.
+    pub(in super::super) fn is_of_bytes(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
+        let (Some(span), Some(color)) = (self.span(), self.of_bytes()) else { return false };
+        let help = format!("write \"{color}\"; parts of the light go from 0 to 1");
+        self.context.report(issue(span).label("this looks like 0–255").help(help));
+        true
+    }
+
+    /// The text `#rrggbb` for one or three whole numbers up to 255 of which one is too large for a part of the light.
+    fn of_bytes(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.item() {
             Item::Integer { digits, radix } => u8::try_from(whole(digits, radix)?).ok(),
             Item::String(_)
@@ -115,7 +122,11 @@ impl Key<'_> {
             | Item::Array(_)
             | Item::Table(_) => None,
         };
-        let bytes: Vec<u8> = self.value?.array()?.iter().map(byte).collect::<Option<_>>()?;
+        let value = self.value?;
+        let bytes: Vec<u8> = match value.array() {
+            Some(array) => array.iter().map(byte).collect::<Option<_>>()?,
+            None => vec![byte(value)?; 3],
+        };
         let is_meant = bytes.len() == 3 && bytes.iter().any(|byte| *byte >= LEAST_BYTE);
         is_meant.then(|| bytes.iter().fold("#".to_owned(), |text, byte| format!("{text}{byte:02x}")))
     }
@@ -140,11 +151,6 @@ impl Key<'_> {
         self.context.report(issue);
         None
     }
-}
-
-/// Says which text means the numbers from 0 to 255.
-pub(in super::super) fn bytes_for_parts(issue: Issue, color: &str) -> Issue {
-    issue.label("this looks like 0–255").help(format!("write \"{color}\"; parts of the light go from 0 to 1"))
 }
 
 /// The names of colours, in small letters (CSS Color Module Level 4, 6.1).

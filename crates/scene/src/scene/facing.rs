@@ -1,35 +1,52 @@
 //! Lights that shine away from everything.
 
-use super::super::description::{Camera, Object, Scene, Shape};
-use super::context::{Context, Issue};
+use std::ops::Range;
+
+use super::description::{Camera, Mesh, Object, Scene, Shape};
 use crate::math::DVec3;
+use crate::math::transform::Transform;
+
+/// What is said of such a light, beneath its place, and as the way out.
+pub(super) const MESSAGE: &str = "this light shines away from everything";
+pub(super) const LABEL: &str = "all shapes are behind it";
+pub(super) const HELP: &str = "swap `u` and `v`: its front is along u × v";
+
+/// The least and the greatest coordinates of a mesh file; `None` if it has no vertices.
+pub type MeshBounds = Option<[DVec3; 2]>;
 
 /// What is in front of a light counts from this part of what is behind it on: a ceiling just above it does not.
 const LEAST: f64 = 0.02;
 
-/// Warns about quads that send light where nothing is, while all that could be lit is behind them.
-pub(super) fn warn_about_lights(context: &Context<'_>, scene: &Scene) {
-    // Where a mesh is, is not known before it is loaded.
-    if scene.objects.iter().any(|object| object.shape.mesh().is_some()) {
-        return;
-    }
+/// The quads that send light where nothing is, while all that could be lit is behind them. The bounds of the scene's mesh
+/// files are asked for if there are such lights.
+pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Range<usize>> {
     let emits = |object: &Object| object.material.is_some_and(|index| scene.materials[index].emits());
-    for (number, object) in scene.objects.iter().enumerate().filter(|(_, object)| emits(object)) {
-        let Shape::Quad { corner, u, v } = object.shape else { continue };
-        let Some(front) = u.cross(v).try_normalize() else { continue };
+    let quad = |object: &Object| {
+        let Shape::Quad { corner, u, v } = object.shape else { return None };
+        let front = u.cross(v).try_normalize()?;
+        emits(object).then_some((corner, front))
+    };
+    let lights: Vec<_> = scene
+        .objects
+        .iter()
+        .enumerate()
+        .filter_map(|(number, object)| Some((number, quad(object)?)))
+        .collect();
+    if lights.is_empty() {
+        return Vec::new();
+    }
+    let bounds = bounds();
+    let is_away = |number: usize, corner: DVec3, front: DVec3| {
         let others = scene.objects.iter().enumerate().filter(|(other, _)| *other != number);
         let reach = |direction: DVec3| {
-            let of = |object: &Object| furthest(&object.shape, direction) - direction.dot(corner);
+            let of = |object: &Object| furthest(&object.shape, &bounds, direction) - direction.dot(corner);
             others.clone().map(|(_, object)| of(object)).fold(0.0, f64::max)
         };
         let (ahead, behind) = (reach(front), reach(-front));
-        if behind > 0.0 && ahead <= LEAST * behind && !sees(&scene.camera, corner, front) {
-            let issue = Issue::warning(object.span.clone(), "this light shines away from everything")
-                .label("all shapes are behind it")
-                .help("swap `u` and `v`: its front is along u × v");
-            context.report(issue);
-        }
-    }
+        behind > 0.0 && ahead <= LEAST * behind && !sees(&scene.camera, corner, front)
+    };
+    let away = lights.into_iter().filter(|(number, (corner, front))| is_away(*number, *corner, *front));
+    away.map(|(number, _)| scene.objects[number].span.clone()).collect()
 }
 
 /// Whether the camera is in front of a light; one in a file may be.
@@ -41,7 +58,7 @@ fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
 }
 
 /// How far a shape reaches in a direction of length 1, or a little further than that.
-fn furthest(shape: &Shape, direction: DVec3) -> f64 {
+fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
     let along = |place: DVec3| direction.dot(place);
     let most = |places: &[DVec3]| places.iter().copied().map(along).fold(f64::NEG_INFINITY, f64::max);
     // The part of a circle's radius around an axis that lies along the direction.
@@ -66,6 +83,19 @@ fn furthest(shape: &Shape, direction: DVec3) -> f64 {
             most(&[base + direction * round(tip - base, radius), tip])
         }
         Shape::Torus { center, axis, radius, tube } => along(center) + round(axis, radius) + tube,
-        Shape::Mesh(_) => f64::INFINITY,
+        Shape::Mesh(ref mesh) => {
+            let bounds = bounds.get(mesh.file).copied().flatten();
+            bounds.map_or(f64::NEG_INFINITY, |bounds| most(&corners(mesh, bounds)))
+        }
     }
+}
+
+/// The corners of a mesh's box where the scene has it.
+fn corners(mesh: &Mesh, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
+    let &Mesh { scale, rotate, translate, .. } = mesh;
+    let place = Transform::scale_rotate_translate(scale, rotate, translate);
+    std::array::from_fn(|number| {
+        let far = DVec3::new((number & 1) as f64, (number >> 1 & 1) as f64, (number >> 2) as f64);
+        place.point(least + (greatest - least) * far)
+    })
 }

@@ -1,0 +1,34 @@
+//! Threads that the system does not start.
+
+use std::fmt::Display;
+use std::io::Error;
+
+use super::in_words;
+
+/// Why `what` could not be started, with the way out: what refuses threads is a limit on memory, for their stacks, or on their number.
+pub fn not_started(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
+    let why = in_words(&Error::other(error.to_string()));
+    let fewer = if is_number_chosen { "use fewer (--threads 1), or " } else { "" };
+    format!(
+        "cannot start {what}: {why}; {fewer}raise the limits on memory and on processes (ulimit -v, ulimit -u)"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_out_is_said() {
+        let error = Error::from_raw_os_error(nix::libc::EAGAIN);
+        let limits = "raise the limits on memory and on processes (ulimit -v, ulimit -u)";
+        assert_eq!(
+            not_started("2 threads", true, &error),
+            format!(
+                "cannot start 2 threads: resource temporarily unavailable; use fewer (--threads 1), or {limits}"
+            )
+        );
+        let alone = format!("cannot start a thread: resource temporarily unavailable; {limits}");
+        assert_eq!(not_started("a thread", false, &error), alone);
+    }
+}

@@ -1,0 +1,199 @@
+//! What keeps a file from being replaced where its permissions allow it: flags of chattr(1), sticky directories. rename(2)
+//! asks for them only after the new file was written.
+
+use std::fs::Metadata;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use nix::unistd::{Uid, geteuid};
+
+/// The mode bit by which only owners may replace what is in a directory.
+const STICKY: u32 = 0o1000;
+
+/// A flag that keeps even root from replacing a file, or the files of a directory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Flag {
+    /// `chattr +a`
+    AppendOnly,
+    /// `chattr +i`
+    Immutable,
+}
+
+impl Flag {
+    /// The flag of a file or a directory; `None` if it has neither, or if its file system does not tell.
+    #[cfg(target_os = "linux")]
+    pub(super) fn of(path: &Path) -> Option<Self> {
+        use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
+        let found = statx(CWD, path, AtFlags::empty(), StatxFlags::empty()).ok()?.stx_attributes;
+        if found.contains(StatxAttributes::IMMUTABLE) {
+            Some(Self::Immutable)
+        } else {
+            found.contains(StatxAttributes::APPEND).then_some(Self::AppendOnly)
+        }
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    pub(super) fn of(_: &Path) -> Option<Self> {
+        None
+    }
+
+    /// The flag in words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::AppendOnly => "append-only (chattr +a)",
+            Self::Immutable => "immutable (chattr +i)",
+        }
+    }
+
+    /// How to be rid of it.
+    pub(super) fn way_out(self) -> &'static str {
+        match self {
+            Self::AppendOnly => "take the flag away (chattr -a) or choose another place",
+            Self::Immutable => "take the flag away (chattr -i) or choose another place",
+        }
+    }
+}
+
+/// Whether a sticky directory keeps this process from replacing a file in it: neither is its own, and it may not act for
+/// their owners.
+pub(super) fn is_kept_for_owner(directory: &Metadata, file: &Metadata) -> bool {
+    let user = geteuid();
+    let is_own = |found: &Metadata| Uid::from_raw(found.uid()) == user;
+    directory.mode() & STICKY != 0 && !is_own(directory) && !is_own(file) && !acts_for_owners(user)
+}
+
+/// Whether this thread may do what only owners may.
+#[cfg(target_os = "linux")]
+fn acts_for_owners(user: Uid) -> bool {
+    use rustix::thread::{CapabilitySet, capabilities};
+    capabilities(None)
+        .map_or(user.is_root(), |capabilities| capabilities.effective.contains(CapabilitySet::FOWNER))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn acts_for_owners(user: Uid) -> bool {
+    user.is_root()
+}
+
+#[cfg(target_os = "linux")]
+#[cfg(test)]
+mod tests {
+    use std::fs::{self, File, Permissions};
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    use std::path::PathBuf;
+
+    use rustix::fs::{IFlags, ioctl_getflags, ioctl_setflags};
+
+    use super::super::{check_target, write};
+
+    /// A file or directory with a flag, which it loses at the end of the test.
+    struct Flagged(PathBuf);
+
+    impl Flagged {
+        /// `None` where flags cannot be had: another user than root, a file system without them.
+        fn new(path: PathBuf, flag: IFlags) -> Option<Self> {
+            let set = change(&path, |flags| flags | flag);
+            if let Err(error) = &set {
+                eprintln!("skipped: {} takes no flags: {error}", path.display());
+            }
+            set.is_ok().then(|| Self(path))
+        }
+    }
+
+    impl Drop for Flagged {
+        fn drop(&mut self) {
+            let cleared = change(&self.0, |flags| flags - IFlags::APPEND - IFlags::IMMUTABLE);
+            cleared.expect("flags that were set can be cleared");
+        }
+    }
+
+    fn change(path: &std::path::Path, to: impl Fn(IFlags) -> IFlags) -> rustix::io::Result<()> {
+        let file = File::open(path).expect("it is there");
+        ioctl_setflags(&file, to(ioctl_getflags(&file)?))
+    }
+
+    fn refused(path: &std::path::Path) -> String {
+        let before = check_target(path).expect_err("refused before the work").to_string();
+        let after = write::atomic(path, b"new").expect_err("refused at the end").to_string();
+        assert_eq!(before, after);
+        after
+    }
+
+    #[test]
+    fn flags_of_the_file_and_its_directory_are_found_before_the_work_and_nothing_is_left() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let directory = folder.path().join("kept");
+        let (old, new) = (directory.join("old.png"), directory.join("new.png"));
+        let link = folder.path().join("link.png");
+        fs::create_dir(&directory).expect("a directory");
+        fs::write(&old, "old").expect("written");
+        symlink(&old, &link).expect("a link");
+        let of_directory = format!("the directory {}", directory.display());
+        for (flagged, called, flag, words, way_out) in [
+            (&old, "it", IFlags::APPEND, "append-only (chattr +a)", "(chattr -a)"),
+            (&old, "it", IFlags::IMMUTABLE, "immutable (chattr +i)", "(chattr -i)"),
+            (&directory, &*of_directory, IFlags::APPEND, "append-only (chattr +a)", "(chattr -a)"),
+            (&directory, &*of_directory, IFlags::IMMUTABLE, "immutable (chattr +i)", "(chattr -i)"),
+        ] {
+            let Some(_flagged) = Flagged::new(flagged.clone(), flag) else { return };
+            let targets = if flagged == &old { vec![&old, &link] } else { vec![&old, &link, &new] };
+            for path in targets {
+                let expected = format!(
+                    "cannot write {}: {called} is {words}; take the flag away {way_out} or choose another place",
+                    path.display()
+                );
+                assert_eq!(refused(path), expected);
+            }
+            assert_eq!(fs::read_dir(&directory).expect("a directory").count(), 1, "{words}: {called}");
+            assert_eq!(fs::read(&old).expect("read"), b"old");
+        }
+        write::atomic(&link, b"new").expect("without flags it is replaced");
+        assert_eq!(fs::read(&old).expect("read"), b"new");
+    }
+
+    /// Only root can try: a thread of its own becomes another user.
+    #[test]
+    fn a_sticky_directory_keeps_files_for_their_owners() {
+        use rustix::thread::{set_thread_res_gid, set_thread_res_uid};
+        const NOBODY: u32 = 65534;
+        let folder = tempfile::tempdir().expect("a folder");
+        let [other, own] = ["other.png", "own.png"].map(|name| folder.path().join(name));
+        for path in [&other, &own] {
+            fs::write(path, "old").expect("written");
+            fs::set_permissions(path, Permissions::from_mode(0o666)).expect("permitted");
+        }
+        if std::os::unix::fs::chown(&own, Some(NOBODY), Some(NOBODY)).is_err() {
+            eprintln!("skipped: files of another user need root");
+            return;
+        }
+        let permit = |mode| {
+            fs::set_permissions(folder.path(), Permissions::from_mode(mode)).expect("permitted");
+        };
+        let as_nobody = |work: &(dyn Fn() + Sync)| {
+            let become_nobody = || {
+                let (user, group) = (rustix::fs::Uid::from_raw(NOBODY), rustix::fs::Gid::from_raw(NOBODY));
+                set_thread_res_gid(group, group, group).expect("another group");
+                set_thread_res_uid(user, user, user).expect("another user");
+                work();
+            };
+            std::thread::scope(|scope| scope.spawn(become_nobody).join().expect("no panic"));
+        };
+        permit(0o1777);
+        as_nobody(&|| {
+            let expected = format!(
+                "cannot write {}: it belongs to another user, and in the sticky directory {} only its owner may \
+                 replace it; choose another name or place",
+                other.display(),
+                folder.path().display()
+            );
+            assert_eq!(refused(&other), expected);
+            write::atomic(&own, b"new").expect("its own file");
+            write::atomic(&folder.path().join("new.png"), b"new").expect("a new file");
+        });
+        assert_eq!(fs::read(&other).expect("read"), b"old");
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 3);
+        write::atomic(&own, b"root's").expect("root acts for owners");
+        permit(0o777);
+        as_nobody(&|| write::atomic(&other, b"new").expect("it is not sticky"));
+    }
+}

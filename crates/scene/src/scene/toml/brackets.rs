@@ -1,0 +1,93 @@
+//! The square brackets of lists, as they stand in a text that may be broken.
+
+use toml_parser::Source;
+use toml_parser::lexer::TokenKind;
+
+/// A bracket of a list; those of headers, texts and comments are none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) struct Bracket {
+    /// Its byte in the text.
+    pub(in super::super) at: usize,
+    /// Whether it is `[`.
+    pub(in super::super) opens: bool,
+}
+
+/// The brackets of a text that begins with an expression, in its order.
+pub(in super::super) fn brackets(text: &str) -> Vec<Bracket> {
+    let mut brackets = Vec::new();
+    let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);
+    for token in Source::new(text).lex() {
+        match token.kind() {
+            TokenKind::Newline => (is_line_start, is_header) = (true, false),
+            TokenKind::Whitespace => {}
+            TokenKind::LeftSquareBracket | TokenKind::RightSquareBracket => {
+                let opens = token.kind() == TokenKind::LeftSquareBracket;
+                is_header |= opens && is_line_start && depth == 0;
+                if !is_header {
+                    depth = if opens { depth + 1 } else { depth.saturating_sub(1) };
+                    brackets.push(Bracket { at: token.span().start(), opens });
+                }
+                is_line_start = false;
+            }
+            TokenKind::Dot
+            | TokenKind::Equals
+            | TokenKind::Comma
+            | TokenKind::LeftCurlyBracket
+            | TokenKind::RightCurlyBracket
+            | TokenKind::Comment
+            | TokenKind::LiteralString
+            | TokenKind::BasicString
+            | TokenKind::MlLiteralString
+            | TokenKind::MlBasicString
+            | TokenKind::Atom
+            | TokenKind::Eof => is_line_start = false,
+        }
+    }
+    brackets
+}
+
+/// The last of the brackets that is open after them.
+pub(in super::super) fn last_open(brackets: &[Bracket]) -> Option<usize> {
+    let mut closed = 0_usize;
+    for bracket in brackets.iter().rev() {
+        match (bracket.opens, closed) {
+            (true, 0) => return Some(bracket.at),
+            (true, _) => closed -= 1,
+            (false, _) => closed += 1,
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn brackets_of_headers_texts_and_comments_do_not_count() {
+        let open = |text: &str| last_open(&brackets(text));
+        for closed in [
+            "",
+            "[a]\n[[b]]\n",
+            "a = [1, [2]]",
+            "a = \"[\" # [\n",
+            "a = \'\'\'[\n[\'\'\'",
+            "[a\n",
+            "  [[a]\nb = []",
+        ] {
+            assert_eq!(open(closed), None, "{closed}");
+        }
+        for (text, at) in [
+            ("a = [", 4),
+            ("a = [1, \"2]\"", 4),
+            ("a = [1 # ]\n", 4),
+            ("a = [[1, 2], [3", 13),
+            ("a = [[1, 2], [3]", 4),
+            ("a = [\n[1, 2]\n", 4),
+            ("[a\nb = [1", 7),
+            ("a = [1\n[b]\nc = [2]\n", 4),
+        ] {
+            assert_eq!(open(text), Some(at), "{text}");
+        }
+    }
+}
