@@ -99,12 +99,12 @@ fn the_estimate_of_the_error_is_right_over_many_seeds() {
                 films.iter().map(|film| film.relative_error().expect("an estimate") / truth).collect();
             eprintln!("{name}, {samples} samples, {truth:.1e}: {ratios:.2?}");
             let rms = (ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / count).sqrt();
-            // Many samples of a small room fall faster than the steps before tell: the estimate is careful there.
-            let most = if samples > 256 { 2.0 } else { 1.35 };
+            // In so small a room the last doubling may gain more than those before foretell.
+            let most = if samples > 256 { 1.5 } else { 1.35 };
             assert!((0.9..=most).contains(&rms), "{name}, {samples} samples: {rms:.2}");
-            // One small picture knows little of the rate at which its noise falls.
-            let is_near = |ratio: &f64| (0.4..=2.5).contains(ratio);
-            assert!(ratios.iter().all(is_near), "{name}, {samples} samples");
+            let outside = |least, most| ratios.iter().filter(move |ratio| !(least..=most).contains(*ratio));
+            assert!(outside(0.5, 2.0).count() <= 2, "{name}, {samples} samples");
+            assert_eq!(outside(0.5, 2.1).next(), None, "{name}, {samples} samples");
         }
     }
 }

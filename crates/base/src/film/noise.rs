@@ -151,6 +151,22 @@ impl Steps {
         Some(fall).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
+    /// The relative spread to expect of the sum of the steps to 2 to the power of `level` samples over these halves of all cells: 1 where
+    /// a single pixel decides it, less the more pixels share it. Cells that have fewer samples do not count.
+    fn spread(&self, level: usize, halves: &[usize]) -> f64 {
+        let Some(cells) = level.checked_sub(1).and_then(|index| self.levels.get(index)) else { return 1.0 };
+        let sums = cells.iter().flat_map(|cell| halves.iter().map(|half| cell[*half]));
+        let (sum, squares) =
+            sums.fold((0.0, 0.0), |(sum, squares), cell| (sum + cell.outer, squares + cell.outer_squares));
+        if sum > 0.0 { squares.sqrt() / sum } else { 0.0 }
+    }
+
+    /// How far a fall is trusted, from 0 to 1.
+    fn trust(&self, level: usize, halves: &[usize]) -> f64 {
+        let spread = self.spread(level, halves);
+        1.0 / (1.0 + DOUBT * spread * spread)
+    }
+
     /// How many times smaller the variance got by the doubling to 2 to the power of `level` samples, over these halves of all cells;
     /// `None` if that is not known. Cells that have fewer samples do not count.
     fn fall(&self, level: usize, halves: &[usize]) -> Option<f64> {
@@ -190,6 +206,9 @@ const CHANCE_FALL: f64 = 2.3;
 /// what is left falls slower.
 const LASTING: f64 = 0.65;
 
+/// How much less is believed of a fall that few pixels decide, by the square of its [`Steps::spread`].
+const DOUBT: f64 = 2.0;
+
 /// The part of the fall by two steps together that is believed.
 const CAREFUL: f64 = 0.8;
 
@@ -220,7 +239,7 @@ impl Convergence {
 
     /// How many times smaller twice as many samples as 2 to the power of `level` make the variance, in these halves of a tile.
     pub(super) fn rate(self, steps: &Steps, level: usize, halves: &[usize]) -> f64 {
-        rate_after(self.fall(steps, level, halves))
+        rate_after(self.fall(steps, level, halves), steps.trust(level, halves))
     }
 
     /// The variance of means of `count` samples of one half of a cell, summed over its pixels, and the rate at which it falls.
@@ -239,7 +258,7 @@ impl Convergence {
         let StepPair { last, before } = steps.pair(level, (cell, half), is_relative)?;
         let fall = self.fall(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
-        let rate = rate_after(fall);
+        let rate = rate_after(fall, steps.trust(level, &[half]));
         let by_two = pixel_variance(step, count, rate);
         let variance = match self.by_four(steps, level, (cell, half), is_relative) {
             Some(four) => (by_two * pixel_variance(four, count, 2.0)).sqrt(),
@@ -256,7 +275,8 @@ impl Convergence {
             Self::Stratified => {
                 let [last, before, ..] = steps.last_four(level, at, is_relative)?;
                 let fall = steps.fourfold_fall(level, at.1).unwrap_or(FOURFOLD_RATE);
-                let lasting = FOURFOLD_LASTING * (fall - FOURFOLD_CHANCE).max(0.0);
+                let lasting =
+                    FOURFOLD_LASTING * (fall - FOURFOLD_CHANCE).max(0.0) * steps.trust(level, &[at.1]);
                 let rate = (FOURFOLD_RATE + lasting).min(FOURFOLD_MOST);
                 Some((last + before) / (rate - 1.0))
             }
@@ -264,9 +284,9 @@ impl Convergence {
     }
 }
 
-/// The rate that is expected after a fall.
-fn rate_after(fall: f64) -> f64 {
-    INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0)
+/// The rate that is expected after a fall that is trusted so far.
+fn rate_after(fall: f64, trust: f64) -> f64 {
+    INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 
 /// The variance of a mean of `count` ≥ 2 samples by the squared step to the last power of two of them, and the rate at which it falls.
@@ -415,11 +435,7 @@ impl Film {
     /// the more pixels share it. Cells that have fewer samples than others do not count.
     pub fn tile_spread(&self, tile: usize, half: usize) -> f64 {
         let tile = self.tile(tile);
-        let Some(cells) = tile.steps.levels.last() else { return 1.0 };
-        let sums = cells.iter().map(|halves| halves[half]);
-        let (sum, squares) =
-            sums.fold((0.0, 0.0), |(sum, squares), cell| (sum + cell.outer, squares + cell.outer_squares));
-        if sum > 0.0 { squares.sqrt() / sum } else { 0.0 }
+        tile.steps.spread(tile.steps.levels.len(), &[half])
     }
 
     /// The noise in one half of all cells of a tile; none as in [`Film::half_noise`].
