@@ -98,17 +98,19 @@ mod tests {
     #[test]
     fn one_percent_too_dark_is_found_where_relmse_hides_it() {
         const SEEDS: u32 = 40;
-        let mut off = Vec::new();
+        let (mut off, mut missed) = (Vec::new(), 0);
         for seed in 1..=SEEDS {
             let mut next = unit(seed.into());
             let references = references(&mut next);
             let pictures: Vec<_> = (0..3).map(|_| picture(&mut next, -0.01, 0.2, 0.0)).collect();
             let found = brightness(&references, &pictures, true).expect("enough seeds");
-            assert!(found.is_biased(), "{seed}: {found:?}");
+            missed += u32::from(!found.is_biased());
             off.push((found.value + 0.01) / found.error);
             let by_relmse = bias(&references, &pictures).expect("enough seeds");
             assert!(!by_relmse.is_found(), "{seed}: or this test tells nothing");
         }
+        // One percent is 4.7 standard errors here and 3.3 are asked for: 8 % are missed, 3.3 of 40, by chance up to 8.
+        assert!(missed <= 8, "{missed}");
         // In standard errors: as often above as below, and as large as they say.
         let count = f64::from(SEEDS);
         let mean = off.iter().sum::<f64>() / count;
