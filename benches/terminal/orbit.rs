@@ -52,7 +52,7 @@ fn hold(terminal: &Watched, time: Duration) -> Result<(), Box<dyn Error>> {
     let mut presses = 0;
     while begin.elapsed() < time {
         // The first and the last swing are halves: the scene's own camera is in the middle.
-        let is_right = (presses + SWING / 2) / SWING % 2 == 0;
+        let is_right = ((presses + SWING / 2) / SWING).is_multiple_of(2);
         terminal.press(if is_right { "l" } else { "h" })?;
         presses += 1;
         thread::sleep((begin + REPEAT * presses).saturating_duration_since(Instant::now()));
