@@ -433,12 +433,18 @@ impl State {
         /// More are not worth their bytes.
         const MOST: u32 = 10;
         /// Pixels of the whole window: summing, developing and encoding those of its picture takes some 45 bytes each.
-        const MOST_PIXELS: f32 = 2_000_000.0;
+        const MOST_PIXELS: f32 = 2_400_000.0;
+        /// The same for sixels, which themselves take as much again.
+        const MOST_IN_SIXELS: f32 = 1_600_000.0;
         match self.preview {
-            PreviewKind::Pixels(_) => {
+            PreviewKind::Pixels(protocol) => {
+                let most = match protocol {
+                    Protocol::Sixel => MOST_IN_SIXELS,
+                    Protocol::Kitty | Protocol::Iterm => MOST_PIXELS,
+                };
                 let window = &self.window;
                 let squares = f32::from(window.columns) * f32::from(window.rows) * window.cell_aspect;
-                let affordable = (MOST_PIXELS / squares.max(1.0)).sqrt() as u32;
+                let affordable = (most / squares.max(1.0)).sqrt() as u32;
                 u32::from(window.cell_pixels.0).min(affordable).clamp(1, MOST)
             }
             kind => kind.grid().map_or(1, Grid::columns),

@@ -106,3 +106,26 @@ fn sixels_have_the_size_of_their_cells_and_their_colours() {
     assert!(bytes.ends_with("-\x1b\\\x1b8"));
     assert_eq!(bytes.matches('-').count(), 8, "48 rows are 8 bands");
 }
+
+#[test]
+fn pictures_of_other_sizes_fill_the_cells_in_sixels() {
+    let color = |x: u32, y: u32| [(60 * x) as u8, (80 * y) as u8, 255 * ((x + y) % 2) as u8];
+    // 64 × 48 pixels in the window: of a picture's 4 × 3 pixels each becomes 16 × 16, of 640 × 480 each 10 × 10 become one.
+    for (width, height) in [(4, 3), (640, 480)] {
+        let pixels = (0..width * height).map(|i| color(i % width * 4 / width, i / width * 3 / height));
+        let mut placed = placement(0, 0);
+        placed.picture = Arc::new(Picture { width, height, pixels: pixels.collect() });
+        let mut images = Images::new(Protocol::Sixel, false);
+        images.aim(Some(placed), true);
+        let mut screen = PixelScreen::default();
+        screen.take(all(&mut images).as_bytes());
+        let shown = screen.shown().expect("a picture");
+        assert_eq!((shown.width, shown.height), (64, 48));
+        for (i, pixel) in (0..).zip(&shown.pixels) {
+            let expected = color(i % 64 / 16, i / 64 / 16);
+            // Levels of sixels are percents.
+            let off = pixel.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
+            assert!(off <= Some(2), "{width}×{height}, pixel {i}: {pixel:?} {expected:?}");
+        }
+    }
+}

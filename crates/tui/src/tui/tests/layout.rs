@@ -261,17 +261,19 @@ fn hints_wrap_at_the_width_of_the_panel() {
 
 #[test]
 fn a_picture_in_pixels_takes_no_more_memory_in_a_huge_terminal() {
-    let of = |columns, rows, cell_pixels| {
-        let kind = PreviewKind::Pixels(Protocol::Kitty);
+    let by = |protocol, columns, rows, cell_pixels| {
+        let kind = PreviewKind::Pixels(protocol);
         let mut state = state_with(columns, rows, kind, ColorDepth::TrueColor, Overrides::default());
         state.window.cell_pixels = cell_pixels;
         state.pixels_across()
     };
-    assert_eq!(of(80, 24, (8, 16)), 8, "pixel for pixel");
-    assert_eq!(of(200, 60, (20, 40)), 10, "fine enough");
-    for (columns, rows) in [(480, 130), (1000, 500), (4000, 2000), (u16::MAX, u16::MAX)] {
-        let across = of(columns, rows, (10, 20));
-        let pixels = u64::from(columns) * u64::from(rows) * 2 * u64::from(across * across);
-        assert!(across == 1 || pixels <= 2_000_000, "{columns}×{rows}: {across}");
+    for (protocol, fine, most) in [(Protocol::Kitty, 10, 2_400_000), (Protocol::Sixel, 8, 1_600_000)] {
+        assert_eq!(by(protocol, 80, 24, (8, 16)), 8, "pixel for pixel");
+        assert_eq!(by(protocol, 200, 60, (20, 40)), fine, "fine enough");
+        for (columns, rows) in [(480, 130), (1000, 500), (4000, 2000), (u16::MAX, u16::MAX)] {
+            let across = by(protocol, columns, rows, (10, 20));
+            let pixels = u64::from(columns) * u64::from(rows) * 2 * u64::from(across * across);
+            assert!(across == 1 || pixels <= most, "{protocol:?} {columns}×{rows}: {across}");
+        }
     }
 }
