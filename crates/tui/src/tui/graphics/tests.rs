@@ -109,7 +109,8 @@ fn sixels_have_the_size_of_their_cells_and_their_colours() {
 
 #[test]
 fn pictures_of_other_sizes_fill_the_cells_in_sixels() {
-    let color = |x: u32, y: u32| [(60 * x) as u8, (80 * y) as u8, 255 * ((x + y) % 2) as u8];
+    // Levels that are not mixed: of 63.
+    let color = |x: u32, y: u32| [(85 * x) as u8, (85 * y) as u8, 255 * ((x + y) % 2) as u8];
     // 64 × 48 pixels in the window: of a picture's 4 × 3 pixels each becomes 16 × 16, of 640 × 480 each 10 × 10 become one.
     for (width, height) in [(4, 3), (640, 480)] {
         let pixels = (0..width * height).map(|i| color(i % width * 4 / width, i / width * 3 / height));
