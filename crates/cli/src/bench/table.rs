@@ -113,7 +113,7 @@ fn verdict(method: &MethodResult) -> String {
     let percent = |share: f64| format!("{:.0} % of the error", share * 100.0);
     match method.verdict {
         Verdict::Unknown => "too few seeds to tell a bias".to_owned(),
-        Verdict::NoneFound { bound } => format!("no bias found: it is below {}{at}", error(bound)),
+        Verdict::NoneFound { bound } => format!("no bias found by relMSE: it is below {}{at}", error(bound)),
         Verdict::Falls { size, share } => {
             format!("a bias that falls with the samples: {}, {}{at}", error(size), percent(share))
         }
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(lines[4], "path           1     10 ms    2.00e-1   1.80e-1   2.20e-1    2.00e-3");
         assert_eq!(lines[13], "path: set-up 3.0 ms, slope −1.00 ± 0.00");
         assert_eq!(lines[14], "  relMSE 1e-2 in 200 ms, 1e-3 in about 2.00 s, 1e-4 in about 20.0 s");
-        assert_eq!(lines[15], "  no bias found: it is below 1.00e-8 at 64 samples");
+        assert_eq!(lines[15], "  no bias found by relMSE: it is below 1.00e-8 at 64 samples");
         assert_eq!(lines[16], "  mean luminance: 1.00 % ± 0.10 % below the references, by chance");
         assert!(
             lines[18].starts_with("  BIAS: 1.00e-2, 97 % of the error at 64 samples, last slope −0.0"),
