@@ -79,6 +79,8 @@ fn each_digit_chooses_its_view_while_the_list_is_open() {
         // Together, so that the list is not gone by itself in between.
         terminal.press(&format!("v{digit}"));
         terminal.wait_for(&format!("▸{digit} {view}"));
+        // Closes the list, which covers the line of keys.
+        terminal.press("\r");
         wait_for_view(&terminal, view);
     }
     terminal.wait("a whole picture of it", |screen| {

@@ -26,7 +26,7 @@ fn until_first_are_sent(bench: &Bench) {
 
 #[test]
 fn orders_are_heard_while_the_first_photons_are_sent() {
-    let mut bench = Bench::new(&wrapped(4_000_000));
+    let mut bench = Bench::new(&wrapped(1_500_000));
     let of = bench.send();
     until_first_are_sent(&bench);
     // Held, the photons arrive nowhere: nobody waits for their end.
