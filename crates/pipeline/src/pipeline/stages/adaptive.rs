@@ -13,6 +13,9 @@ pub(super) const LEAST: u32 = 16;
 /// The part of the noise asked for that is aimed at: what is measured low by chance stops early.
 const AIM: f64 = 0.85;
 
+/// The part of the noise asked for from which it is told to be missed: beyond what chance does to what is measured.
+const TOO_MUCH: f64 = 1.5;
+
 /// How many times smaller the variance gets from two to four samples and from four to eight, where nothing tells it: of half of the tiles
 /// of the bundled scenes more, of the others less.
 const EARLY_FALL: f64 = 4.0;
@@ -76,6 +79,25 @@ impl Goals {
             self.decide(&noise, done, samples, &aim);
         }
         self.foresee(&noise, done, samples, &aim);
+    }
+
+    /// Tiles that have all samples which they are to have, and more noise than [`TOO_MUCH`] times the error asked for: what is in few
+    /// pixels of one half alone does not hold that half up. And the noise of the worst of them.
+    pub(super) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
+        let aim = Aim { error, brightness: self.brightness?, convergence: film.convergence() };
+        let noise = film.of_tiles(|tile| {
+            let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
+            let halves = || [0, 1].map(|half| film.tile_noise(tile, half)).into_iter().flatten();
+            let count = halves().count() as f64;
+            let all =
+                halves().fold((0.0, 0.0), |(v, m), one| (v + one.variance / count, m + one.mean / count));
+            let whole = halves().next().map(|half| HalfNoise { variance: all.0, mean: all.1, ..half });
+            let mut cells = self.decided.iter().skip(CELLS * tile).take(CELLS);
+            whole.filter(|_| cells.all(is_decided)).map(|noise| aim.relative(&noise))
+        });
+        let too_much = || noise.iter().flatten().filter(|noise| **noise > TOO_MUCH * error);
+        let worst = too_much().copied().max_by(f64::total_cmp)?;
+        Some((too_much().count(), worst))
     }
 
     /// Whether a half in a tile has no goal yet, and has now so many samples.
@@ -278,6 +300,18 @@ mod tests {
         assert_eq!(goals.of(0, 1), 16, "the other half has no noise");
         assert_eq!(goals.of(0, 0), u32::MAX);
         assert!((64..1000).contains(&goals.expected(0, 0)), "{}", goals.expected(0, 0));
+    }
+
+    #[test]
+    fn noise_that_one_half_alone_has_is_told_where_it_stays() {
+        let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
+        let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        assert_eq!(goals.missed(&rough, 0.01), None, "the first half goes on");
+        let clean = judged([(1.0, 0.0); 2], 16, 0.01);
+        assert_eq!(clean.missed(&film([(1.0, 0.0); 2], 16), 0.01), None);
+        // A standard error of √(1/12/16), in one of two halves.
+        let Some((tiles, worst)) = clean.missed(&rough, 0.01) else { panic!("nothing is told") };
+        assert!(tiles == 1 && (worst / 0.051 - 1.0).abs() < 0.3, "{tiles} {worst}");
     }
 
     #[test]

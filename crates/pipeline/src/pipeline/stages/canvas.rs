@@ -198,6 +198,11 @@ impl Canvas {
         self.goals.judge(&self.film, &self.done, samples, error);
     }
 
+    /// Tiles whose samples ended before their noise was below the error asked for, and the noise of the worst.
+    pub(super) fn missed(&self, error: f64) -> Option<(usize, f64)> {
+        self.goals.missed(&self.film, error)
+    }
+
     /// Pixels times samples that there are.
     pub(super) fn units(&self) -> u64 {
         self.units_of(|tile, half| self.done[tile][half])

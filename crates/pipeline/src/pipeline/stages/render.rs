@@ -101,7 +101,10 @@ pub(in crate::pipeline) fn render(
             Staged::done(rays, "the time was up")
         }
         (false, _) if canvas.goals.are_below(wanted) => {
-            Staged::done(rays, format!("the noise of some tiles is below {error}"))
+            let missed = canvas.missed(error.into()).map_or_else(String::new, |(tiles, worst)| {
+                format!("; of {tiles}, where few pixels have it, it is up to {worst:.2}")
+            });
+            Staged::done(rays, format!("the noise of some tiles is below {error}{missed}"))
         }
         (false, 0) => Staged::done(rays, ""),
         (false, _) => Staged::done(rays, format!("went on after {had} samples")),
