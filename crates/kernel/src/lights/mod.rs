@@ -31,7 +31,7 @@ pub use environment::Environment;
 pub use pattern::{Chart, Patch, Pattern};
 pub use point::PointLight;
 pub use row::{LightRow, SourceRow};
-pub use set::{Lights, Picks, Samples};
+pub use set::{Lights, Picks, Receivers, Samples, Selection};
 pub use sky::SkyMap;
 pub use spot::SpotLight;
 pub use tree::{Cut, LightBounds, LightTree, Lobe, Pick, Receiver};
@@ -171,6 +171,14 @@ impl Light {
         match self {
             Self::Point(_) | Self::Spot(_) | Self::Directional(_) | Self::Environment(_) => None,
             Self::Area(light) => light.pattern.as_deref(),
+        }
+    }
+
+    /// Whether it comes from beyond the scene.
+    pub fn is_beyond(&self) -> bool {
+        match self {
+            Self::Directional(_) | Self::Environment(_) => true,
+            Self::Point(_) | Self::Spot(_) | Self::Area(_) => false,
         }
     }
 

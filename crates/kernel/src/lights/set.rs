@@ -1,6 +1,7 @@
 //! All lights of a scene, and which of them a hit is on.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 use super::emitter::{Emitter, Part};
 use super::tree::{Cut, LightTree, MOST_WITHOUT, Receiver};
@@ -18,7 +19,30 @@ pub struct Lights {
     /// The same of light from all around.
     environment: Option<(u32, Environment)>,
     /// Over all of them, where they are many.
-    tree: Option<LightTree>,
+    tree: Option<Arc<LightTree>>,
+    /// Over those that are in the scene, where these are more than paths sample.
+    tree_of_lamps: Option<Arc<LightTree>>,
+}
+
+/// What the samples of lights at a vertex are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Receivers {
+    /// All that is seen of the light.
+    Eye,
+    /// A vertex of a path, which has other noise as well.
+    Paths,
+}
+
+/// From which lights vertices pick some.
+#[derive(Clone, Copy, Debug)]
+pub struct Selection<'a> {
+    /// Over the lights that are picked from.
+    pub tree: &'a LightTree,
+    /// How.
+    pub picks: Picks,
+    /// Whether light from beyond the scene is not in the tree, and is sampled at every vertex: what the scene hides of it, its bounds
+    /// do not tell.
+    pub leaves_beyond: bool,
 }
 
 /// How vertices pick lights, where not all of them are sampled.
@@ -34,8 +58,8 @@ impl Picks {
     /// Where all that is seen of the light are these: as good as a look at each of a thousand lights.
     pub const BY_EYE: Self = Self { count: MOST_WITHOUT as u32, nodes: Cut::MOST };
 
-    /// Of paths, which have other noise as well.
-    pub const BY_PATHS: Self = Self { count: 4, nodes: 8 };
+    /// Of paths, which have other noise as well: more rays cost more than they bring.
+    pub const BY_PATHS: Self = Self { count: 1, nodes: 8 };
 
     /// What points pick from.
     #[inline(always)]
@@ -45,13 +69,19 @@ impl Picks {
 }
 
 /// How often a vertex samples lights, for each time that it is asked to.
-pub struct Samples<'a>(Option<(Picks, Cut<'a>)>);
+pub struct Samples<'a>(Option<(Selection<'a>, Cut<'a>)>);
 
 impl Samples<'_> {
     /// How often it is expected to sample the light of this number.
     #[inline]
     pub fn of(&self, number: u32) -> f32 {
-        self.0.as_ref().map_or(1.0, |(picks, cut)| picks.count as f32 * cut.probability(number))
+        self.0.as_ref().map_or(1.0, |(selection, cut)| {
+            if selection.leaves_beyond && !selection.tree.has(number) {
+                1.0
+            } else {
+                selection.picks.count as f32 * cut.probability(number)
+            }
+        })
     }
 }
 
@@ -80,25 +110,47 @@ impl Lights {
                 Light::Area(light) => lights.note(number, light),
             }
         }
-        let bounds = || all.iter().map(Light::bounds).collect::<Vec<_>>();
-        let tree = if count(&all) > MOST_WITHOUT { LightTree::new(&bounds(), token)? } else { None };
-        Ok(Self { all, tree, ..lights })
+        let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Cancelled> {
+            if count(all.iter().filter(taken)) <= most {
+                return Ok(None);
+            }
+            let bounds = all.iter().map(|light| light.bounds().filter(|_| taken(&light)));
+            Ok(LightTree::new(&bounds.collect::<Vec<_>>(), token)?.map(Arc::new))
+        };
+        lights.tree = tree_over(&|_| true, MOST_WITHOUT)?;
+        lights.tree_of_lamps = match &lights.tree {
+            Some(tree) if all.iter().all(|light| !light.is_beyond()) => Some(tree.clone()),
+            Some(_) | None => tree_over(&|light| !light.is_beyond(), Self::MOST_BY_PATHS)?,
+        };
+        Ok(Self { all, ..lights })
     }
 
-    /// The tree that vertices pick lights from; none where they sample all of them.
-    pub fn tree(&self) -> Option<&LightTree> {
-        self.tree.as_ref()
+    /// So many lamps are all sampled by the vertices of a path; of more, some are picked. Measured in rooms of 1 to 32 lamps.
+    const MOST_BY_PATHS: usize = 8;
+
+    /// What vertices pick lights from; none where they sample all of them.
+    pub fn selection(&self, receivers: Receivers) -> Option<Selection<'_>> {
+        match receivers {
+            Receivers::Eye => {
+                let selection = |tree| Selection { tree, picks: Picks::BY_EYE, leaves_beyond: false };
+                self.tree.as_deref().map(selection)
+            }
+            Receivers::Paths => {
+                let selection = |tree| Selection { tree, picks: Picks::BY_PATHS, leaves_beyond: true };
+                self.tree_of_lamps.as_deref().map(selection)
+            }
+        }
     }
 
     /// How often a vertex that picks in this way samples lights, at a point of a surface with this normal, if nothing else is known
     /// of that.
     #[inline]
-    pub fn samples_at(&self, picks: Picks, point: Vec3, normal: Vec3) -> Samples<'_> {
+    pub fn samples_at(&self, receivers: Receivers, point: Vec3, normal: Vec3) -> Samples<'_> {
         // What is not picked from is not moved: a cut is large.
-        let Some(tree) = &self.tree else { return Samples(None) };
-        let mut cut = picks.cut(tree);
+        let Some(selection) = self.selection(receivers) else { return Samples(None) };
+        let mut cut = selection.picks.cut(selection.tree);
         cut.go_to(&Receiver::plain(point, normal));
-        Samples(Some((picks, cut)))
+        Samples(Some((selection, cut)))
     }
 
     /// Bytes that trees over lights and over the triangles of lights hold.
@@ -113,7 +165,9 @@ impl Lights {
             | Light::Environment(_)
             | Light::Area(_) => 0,
         };
-        self.tree().map_or(0, LightTree::memory_bytes) + self.all.iter().map(of_mesh).sum::<usize>()
+        let mut trees: Vec<_> = [&self.tree, &self.tree_of_lamps].into_iter().flatten().collect();
+        trees.dedup_by(|a, b| Arc::ptr_eq(a, b));
+        trees.iter().map(|tree| tree.memory_bytes()).chain(self.all.iter().map(of_mesh)).sum()
     }
 
     fn note(&mut self, number: u32, light: &AreaLight) {
@@ -225,11 +279,11 @@ impl Lights {
 }
 
 /// How many lights these are where all that one object is counts as one.
-fn count(lights: &[Light]) -> usize {
+fn count<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| match light {
         Light::Area(light) => Some(light.object),
         Light::Point(_) | Light::Spot(_) | Light::Directional(_) | Light::Environment(_) => None,
     };
-    let objects: HashSet<u32> = lights.iter().filter_map(object).collect();
-    objects.len() + lights.iter().filter(|light| object(light).is_none()).count()
+    let objects: HashSet<u32> = lights.clone().filter_map(object).collect();
+    objects.len() + lights.filter(|light| object(light).is_none()).count()
 }

@@ -14,8 +14,8 @@ use super::stages::films::Films;
 use super::targets::guarded;
 use crate::control::CancelToken;
 use crate::film::stretch::Stretch;
-use crate::integrators::{RayCounters, picks};
-use crate::lights::LightTree;
+use crate::integrators::{RayCounters, receivers};
+
 use crate::output::{OutputError, json, write::atomic_until};
 use crate::world::World;
 
@@ -237,17 +237,19 @@ fn image(finished: &Finished<'_>) -> ImageReport {
 
 fn lights(finished: &Finished<'_>) -> LightsReport {
     let lights = &finished.world.lights;
-    let render = &finished.plan.settings.render;
-    let samples = u64::from(render.shadow_samples);
-    let (sampled, picks) = match lights.tree() {
-        Some(_) => (LightsSampled::Picked, samples * u64::from(picks(render.integrator).count)),
+    let settings = &finished.plan.settings;
+    let samples = u64::from(settings.render.shadow_samples);
+    let are_gathered = settings.gathers() && finished.photons.is_some_and(|photons| photons.emitted > 0);
+    let selection = lights.selection(receivers(settings, are_gathered));
+    let (sampled, picks) = match selection {
+        Some(selection) => (LightsSampled::Picked, samples * u64::from(selection.picks.count)),
         None => (LightsSampled::All, 0),
     };
     LightsReport {
         count: lights.len() as u64,
         sampled,
         picks,
-        tree_nodes: lights.tree().map_or(0, LightTree::node_count) as u64,
+        tree_nodes: selection.map_or(0, |selection| selection.tree.node_count()) as u64,
         memory_bytes: lights.memory_bytes() as u64,
     }
 }

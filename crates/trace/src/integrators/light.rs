@@ -7,7 +7,7 @@ use super::shot::Shot;
 use super::view::Measure;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{LightRow, Middle, Pattern, Source, SourceRow};
+use crate::lights::{Light, LightRow, Middle, Pattern, Source, SourceRow};
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
@@ -94,10 +94,19 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
 
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Sums {
+        let mut sums = Sums::NOTHING;
+        self.add_all(|_| true, &mut sums, folds);
+        sums
+    }
+}
+
+impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
+    /// Add what each light of a kind sends.
+    #[inline(always)]
+    pub(super) fn add_all(&self, takes: impl Fn(&Light) -> bool, sums: &mut Sums, folds: impl Folds) {
         let render = &self.shot.settings.render;
         let mut sampler = None;
-        let mut sums = Sums::NOTHING;
-        for (number, light) in self.shot.world.lights.iter() {
+        for (number, light) in self.shot.world.lights.iter().filter(|(_, light)| takes(light)) {
             if WEIGHED && self.shot.leaves_sky && light.is_from_all_around() {
                 continue;
             }
@@ -112,7 +121,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
                 let (values, active) = self.values(&samples, 1.0, folds);
-                self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting), folds);
+                self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
             } else {
                 let count = render.shadow_samples;
                 if sampler.is_none() {
@@ -138,18 +147,15 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
                         let others = self.others.to_each(count);
                         values = self.others.left(self.row, &samples, values, (&of_light, others));
                     }
-                    self.add(&samples, &values, active, &mut sums, waits.then_some(&mut waiting), folds);
+                    self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
                 }
             }
             if waiting.active != 0 {
-                self.add_waiting(light.middle(), &waiting, &mut sums, folds);
+                self.add_waiting(light.middle(), &waiting, sums, folds);
             }
         }
-        sums
     }
-}
 
-impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// What glass around the vertices leaves of samples on the way.
     #[cold]
     #[inline(never)]

@@ -162,7 +162,7 @@ impl LitQueue {
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
         let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
-        let together = if shot.world.lights.tree().is_some() { ROWS } else { 1 };
+        let together = if shot.world.lights.selection(shot.receivers()).is_some() { ROWS } else { 1 };
         // Hard shadows are by light samples alone.
         let by_paths =
             onward.is_some() && (shot.photons.is_none() || shot.settings.render.shadows == Shadows::Soft);
@@ -230,14 +230,14 @@ impl LitQueue {
         let (instructions, used) = (shot.world.geometry.instructions(), asked.used);
         let plain = Lighting::<false> { shot, row, used, measure, others, media };
         let weighed = Lighting::<true> { shot, row, used, measure, others, media };
-        let sums = match (others, shot.world.lights.tree()) {
+        let sums = match (others, shot.world.lights.selection(shot.receivers())) {
             (Others::Nothing, None) => instructions.run(plain),
-            (Others::Nothing, Some(tree)) => {
-                instructions.run(Picking { lighting: plain, tree, number, pool: &mut pool })
+            (Others::Nothing, Some(selection)) => {
+                instructions.run(Picking { lighting: plain, selection, number, pool: &mut pool })
             }
             (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
-            (Others::Paths | Others::Lobes(_), Some(tree)) => {
-                instructions.run(Picking { lighting: weighed, tree, number, pool: &mut pool })
+            (Others::Paths | Others::Lobes(_), Some(selection)) => {
+                instructions.run(Picking { lighting: weighed, selection, number, pool: &mut pool })
             }
         };
         self.pool = pool;

@@ -5,13 +5,12 @@ use super::beside::weight;
 use super::cone::Cone;
 use super::lit_row::{LitRow, Response};
 use super::medium::Medium;
-use super::picking::picks;
 use super::queues::{History, PathRay};
 use super::shot::Shot;
 use super::specular::SCATTERED;
 use crate::geometry::rows::lanes;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::{Met, Picks, Source};
+use crate::lights::{Met, Source};
 use crate::materials::TexturePoint;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
@@ -168,11 +167,6 @@ impl Loops for Scattering<'_> {
 }
 
 impl Shot<'_> {
-    /// How vertices pick lights.
-    pub fn picks(&self) -> Picks {
-        picks(self.settings.render.integrator)
-    }
-
     /// What a path counts that meets a lamp, of which a light sample might have come.
     pub fn lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let density = path.history.density;
@@ -224,7 +218,7 @@ impl Shot<'_> {
         if !lights.are_beyond() {
             return Vec3::ZERO;
         }
-        let samples = lights.samples_at(self.picks(), ray.origin, normal);
+        let samples = lights.samples_at(self.receivers(), ray.origin, normal);
         lights.beyond_with(sky, ray.direction, |number, density| share(density * samples.of(number)))
     }
 
@@ -236,7 +230,7 @@ impl Shot<'_> {
         let lights = &self.world.lights;
         lights.of_hit(hit.object, primitive).map_or(0.0, |(number, light)| {
             light.pdf(ray.origin, normal, &met)
-                * lights.samples_at(self.picks(), ray.origin, normal).of(number)
+                * lights.samples_at(self.receivers(), ray.origin, normal).of(number)
         })
     }
 

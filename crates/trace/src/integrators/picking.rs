@@ -6,28 +6,20 @@ use super::light::{Lighting, Sums, add_where};
 use super::pool::Pool;
 use super::view::Measure;
 use crate::geometry::rows::lanes;
-use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver};
+use crate::lights::{Light, LightRow, LightTree, Lobe, Middle, Receiver, Selection};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
-use crate::scene::description::{Integrator, Shadows};
+use crate::scene::description::Shadows;
 use crate::world::Loops;
 
 /// Lights the vertices of a row by lights that they pick.
 pub(super) struct Picking<'a, const WEIGHED: bool> {
     pub(super) lighting: Lighting<'a, WEIGHED>,
-    pub(super) tree: &'a LightTree,
+    pub(super) selection: Selection<'a>,
     /// The number of the row, and what takes its rays.
     pub(super) number: u32,
     pub(super) pool: &'a mut Pool,
-}
-
-/// How vertices pick lights, where these are too many for all of them to be sampled.
-pub fn picks(integrator: Integrator) -> Picks {
-    match integrator {
-        Integrator::Whitted => Picks::BY_EYE,
-        Integrator::Path => Picks::BY_PATHS,
-    }
 }
 
 /// A pick of each vertex of a row. Those of one sample are in the order of the tree: so rows of rays go to places that are close
@@ -50,14 +42,18 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
 
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Sums {
-        let Self { lighting, tree, number, pool } = self;
-        let (sampler, mut sums) = (lighting.row.sampler(lighting.shot), Sums::NOTHING);
+        let Self { lighting, selection, number, pool } = self;
+        let sampler = lighting.row.sampler(lighting.shot);
+        let mut sums = Sums::NOTHING;
+        if selection.leaves_beyond {
+            lighting.add_all(Light::is_beyond, &mut sums, folds);
+        }
         let samples = lighting.shot.settings.render.shadow_samples;
-        let each = lighting.shot.picks().count;
+        let (each, tree) = (selection.picks.count, selection.tree);
         // Where there are many, rays of one row of picks go to one place as well.
         let mut pool = (samples <= TOGETHER).then_some(pool);
         for first in (0..samples).step_by(TOGETHER as usize) {
-            let picks = lighting.picks(tree, &sampler, first..(first + TOGETHER).min(samples));
+            let picks = lighting.picks(selection, &sampler, first..(first + TOGETHER).min(samples));
             for (k, pick) in (first * each..).zip(&picks) {
                 let mut taking = Taking { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
                 lighting.add_pick(pick, &sampler, (k, samples * each), &mut taking, folds);
@@ -111,8 +107,13 @@ const DIGITS: f64 = 1.0 / (1 << 24) as f64;
 impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// The picks of the vertices for some samples.
     #[inline(always)]
-    fn picks(&self, tree: &LightTree, sampler: &SamplerRow<LANES>, samples: Range<u32>) -> Vec<PickRow> {
-        let (row, way) = (self.row, self.shot.picks());
+    fn picks(
+        &self,
+        Selection { tree, picks: way, .. }: Selection<'_>,
+        sampler: &SamplerRow<LANES>,
+        samples: Range<u32>,
+    ) -> Vec<PickRow> {
+        let row = self.row;
         let count = self.shot.settings.render.shadow_samples * way.count;
         let group = way.count as usize;
         let (first, end) = (samples.start * way.count, samples.end * way.count);

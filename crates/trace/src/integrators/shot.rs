@@ -8,7 +8,7 @@ use super::photons::PhotonMaps;
 use super::view::Measure;
 use crate::control::CancelToken;
 use crate::film::{Part, Pixels};
-use crate::lights::Environment;
+use crate::lights::{Environment, Receivers};
 use crate::sampling::PixelSampler;
 use crate::scene::description::{Integrator, Shadows};
 use crate::world::{PACKET, World};
@@ -54,10 +54,14 @@ impl<'a> Shot<'a> {
             && settings.view.shown().measure() != Measure::ArrivingShare
             && render.shadows == Shadows::Soft
             && render.shadow_samples == 1
-            && render.clamp == 0.0
-            && world.lights.tree().is_none();
-        let lobes_find_sky = is_even && world.lights.tree().is_none();
+            && render.clamp == 0.0;
+        let lobes_find_sky = is_even && world.lights.selection(Receivers::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, photons: None, leaves_sky, lobes_find_sky }
+    }
+
+    /// What the samples of lights at its vertices are for.
+    pub fn receivers(&self) -> Receivers {
+        receivers(self.settings, self.photons.is_some())
     }
 
     /// The random numbers of a slot.
@@ -65,6 +69,13 @@ impl<'a> Shot<'a> {
         let (x, y, sample) = self.block.place(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
+}
+
+/// What samples of lights are for, where photons are gathered or not: the share of it that arrives is asked of all light.
+pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> Receivers {
+    let goes_on = are_gathered || settings.render.integrator == Integrator::Path;
+    let is_share = settings.view.shown().measure() == Measure::ArrivingShare;
+    if goes_on && !is_share { Receivers::Paths } else { Receivers::Eye }
 }
 
 /// The samples of a tile. A slot is the place of a sample among them: all of the first pixel, all of the next.

@@ -100,6 +100,12 @@ impl LightTree {
         }
     }
 
+    /// Whether a light is in it.
+    #[inline(always)]
+    pub fn has(&self, light: u32) -> bool {
+        self.places[light as usize] != NOWHERE
+    }
+
     /// The place of a light in the order of the tree, in which those that are close together follow one another.
     #[inline(always)]
     pub fn place_of(&self, light: u32) -> u32 {

@@ -6,7 +6,7 @@ use super::super::cache::Memo;
 use super::textures::Textures;
 use super::{Staged, keys};
 use crate::control::{CancelToken, Cancelled};
-use crate::lights::{Lights, SkyMap};
+use crate::lights::{Lights, Receivers, SkyMap};
 use crate::scene::description::{Scene, TextureUse};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Geometry, TextureSource};
@@ -36,18 +36,20 @@ pub(in crate::pipeline) fn lights(
         0 => Staged::skipped(lights, "the scene has no light"),
         1 => Staged::done(lights, "1 light"),
         count => {
-            let tree = lights.tree().map_or_else(String::new, |_| picked(&lights));
-            Staged::done(lights, format!("{count} lights{tree}"))
+            let are_picked = |receivers| lights.selection(receivers).is_some();
+            let picked = match (are_picked(Receivers::Eye), are_picked(Receivers::Paths)) {
+                (true, _) => picked("some are picked", &lights),
+                (false, true) => picked("paths pick some", &lights),
+                (false, false) => String::new(),
+            };
+            Staged::done(lights, format!("{count} lights{picked}"))
         }
     })
 }
 
 /// What is said of lights that are too many to look at all of them.
-fn picked(lights: &Lights) -> String {
-    format!(
-        ", of which some are picked at a time; their tree has {} kB",
-        lights.memory_bytes().div_ceil(1000)
-    )
+fn picked(by_whom: &str, lights: &Lights) -> String {
+    format!(", of which {by_whom} at a time; their tree has {} kB", lights.memory_bytes().div_ceil(1000))
 }
 
 /// The images that lamps by materials of the scene file have on them.
