@@ -171,7 +171,7 @@ impl Share {
             for (x, across) in across.iter().enumerate() {
                 let index = y as usize * rect.width as usize + x;
                 let place = (index, rect.width as usize);
-                let Some(mean) = tile.value(quantity, film.convergence(), place) else { continue };
+                let Some(mean) = tile.value(quantity, place) else { continue };
                 for (row, row_weight) in down.clone() {
                     let line = &mut sums[(row - self.y) as usize * self.width as usize..];
                     for &(column, column_weight) in across {

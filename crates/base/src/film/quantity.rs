@@ -21,21 +21,16 @@ const REACH: usize = 2;
 
 impl Tile {
     /// A number of the pixel of an index in a tile of so many columns; none where it has no sample.
-    pub(super) fn value(
-        &self,
-        quantity: Quantity,
-        convergence: Convergence,
-        (index, columns): (usize, usize),
-    ) -> Option<DVec3> {
+    pub(super) fn value(&self, quantity: Quantity, (index, columns): (usize, usize)) -> Option<DVec3> {
         match quantity {
             Quantity::Radiance => self.mean(index),
             Quantity::Samples => (self.count(index) > 0).then(|| DVec3::splat(f64::from(self.count(index)))),
-            Quantity::Error => self.error(convergence, index, columns).map(DVec3::splat),
+            Quantity::Error => self.error(index, columns).map(DVec3::splat),
         }
     }
 
     /// Standard error of a pixel; 0 for a single sample, of which nothing is known.
-    fn error(&self, convergence: Convergence, index: usize, columns: usize) -> Option<f64> {
+    fn error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);
         let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
@@ -50,7 +45,7 @@ impl Tile {
             }
         }
         let variance = if count > 1 && pixels > 0 {
-            let rate = convergence.rate(&self.steps, count.ilog2() as usize, &[0, 1]);
+            let rate = Convergence::rate(&self.steps, count.ilog2() as usize, &[0, 1]);
             pixel_variance(sum / f64::from(pixels), count, rate)
         } else {
             0.0

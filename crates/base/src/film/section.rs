@@ -18,7 +18,7 @@ impl Film {
                 for x in part.x..part.x + part.width {
                     let columns = place.width as usize;
                     let at = (y - place.y) as usize * columns + (x - place.x) as usize;
-                    let value = tile.value(quantity, self.convergence(), (at, columns));
+                    let value = tile.value(quantity, (at, columns));
                     if let Some(value) = value {
                         image.pixels[index_in(rect, x, y)] = value.as_vec3();
                     }

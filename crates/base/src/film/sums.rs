@@ -329,7 +329,7 @@ impl Film {
                 let line = &mut image.pixels[start..][..rect.width as usize];
                 for (x, pixel) in line.iter_mut().enumerate() {
                     let columns = rect.width as usize;
-                    let value = tile.value(quantity, self.convergence, (row as usize * columns + x, columns));
+                    let value = tile.value(quantity, (row as usize * columns + x, columns));
                     *pixel = value.map_or(Vec3::ZERO, DVec3::as_vec3);
                 }
             }
@@ -348,7 +348,7 @@ impl Film {
         let place = (down % TILE_SIZE, right % TILE_SIZE);
         let columns = tile_rect(self.crop, index).width as usize;
         let index_in_tile = place.0 as usize * columns + place.1 as usize;
-        let value = lock(&self.tiles[index]).value(quantity, self.convergence, (index_in_tile, columns));
+        let value = lock(&self.tiles[index]).value(quantity, (index_in_tile, columns));
         value.map(DVec3::as_vec3)
     }
 

@@ -234,7 +234,7 @@ impl Way {
     /// By how many times smaller the variances of tiles got by their last doubling.
     fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
-        if convergence == Convergence::Independent {
+        if convergence == Convergence::Photons {
             return Self {
                 samples,
                 doublings,
@@ -359,7 +359,7 @@ mod tests {
         assert!(near(of(&[4.0]).samples_to(0.5, 1.0, None), 128.0));
         assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
         assert!(near(of(&[1.0]).samples_to(0.25, 1.0, None), 16.0 * 64.0));
-        assert!(near(Way::of(Convergence::Independent, vec![9.0], 4).samples_to(0.25, 1.0, Some(9.0)), 64.0));
+        assert!(near(Way::of(Convergence::Photons, vec![9.0], 4).samples_to(0.25, 1.0, Some(9.0)), 64.0));
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub(in crate::pipeline) fn render(
     films.select(key, |kept| !rendering.force && kept.has_at_most(wanted));
     if films.current().is_none() {
         let convergence = match rendering.photons.is_some_and(PhotonStore::are_sent) {
-            true => Convergence::Independent,
+            true => Convergence::Photons,
             false => Convergence::Stratified,
         };
         let canvas = || Canvas::new(key, rendering.plan, rendering.most_film_bytes, convergence);
