@@ -20,6 +20,7 @@ pub mod surface_rows;
 pub mod torus;
 pub mod triangle;
 pub mod watertight;
+pub mod watertight_rows;
 
 pub use aabb::Aabb;
 pub use ray::{Ray, RayF64};

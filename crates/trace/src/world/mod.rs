@@ -5,6 +5,7 @@ mod assemble;
 pub mod camera;
 pub mod contact;
 mod emitters;
+mod few;
 pub mod geometry;
 mod lower;
 mod mesh_instance;

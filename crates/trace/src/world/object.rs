@@ -46,6 +46,7 @@ impl Object {
     ) {
         match self {
             Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found, folds),
+            Self::Mesh(mesh) if mesh.has_few() => mesh.closest_of_few(rows, met, ends, found, folds),
             Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
         }
     }
@@ -63,6 +64,7 @@ impl Object {
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
+            Self::Mesh(mesh) if mesh.has_few() => return mesh.any_of_few(rows, met, ends, except, folds),
             Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
         let mut found = HitRows::none();

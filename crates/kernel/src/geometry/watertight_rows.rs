@@ -1,0 +1,305 @@
+//! The watertight test of mesh triangles against the rays of a packet, which may go any way: with the operations of
+//! [`ShearedRay::intersect`] in their order, so that the bits are the same.
+
+use super::rows::{Ends, HitRows, PACKET, RayRows, lanes};
+use super::watertight::{ILL_CONDITIONED, ShearedRay};
+use crate::math::Vec3;
+use crate::math::float::gamma;
+use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, Truths, take, take_u32};
+
+/// The rays of a packet, made ready for some triangles.
+pub struct ShearedRows<'a> {
+    rays: &'a RayRows,
+    /// Whether the longest axis of a ray is x, and whether it is y.
+    longest: [Truths; 2],
+    /// Whether a ray goes down its longest axis: its other axes are swapped then. Edge functions are negated by that, and nothing else.
+    is_down: Truths,
+    /// Of the axes after the longest one.
+    shear: Lanes3,
+}
+
+/// What the rays of a packet hit of one triangle.
+struct Hits {
+    hit: Truths,
+    /// What the scalar test has to decide.
+    doubtful: Truths,
+    t: Lanes,
+    u: Lanes,
+    v: Lanes,
+}
+
+impl<'a> ShearedRows<'a> {
+    /// Prepare them.
+    #[inline(always)]
+    pub fn new(rays: &'a RayRows) -> Self {
+        let (mut longest, mut is_down) = ([[0; PACKET]; 2], [0; PACKET]);
+        let mut shear = [[0.0; PACKET]; 3];
+        for i in 0..PACKET {
+            let [x, y, z] = [rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]];
+            let [size_x, size_y, size_z] = [x.abs(), y.abs(), z.abs()];
+            let is_x = (size_x > size_y) & (size_x > size_z);
+            let is_y = !(size_x > size_y) & (size_y > size_z);
+            let along = if is_x {
+                x
+            } else if is_y {
+                y
+            } else {
+                z
+            };
+            let first = if is_x {
+                y
+            } else if is_y {
+                z
+            } else {
+                x
+            };
+            let second = if is_x {
+                z
+            } else if is_y {
+                x
+            } else {
+                y
+            };
+            let scale = 1.0 / along;
+            longest[0][i] = if is_x { TRUE } else { 0 };
+            longest[1][i] = if is_y { TRUE } else { 0 };
+            is_down[i] = if along < 0.0 { TRUE } else { 0 };
+            shear[0][i] = first * scale;
+            shear[1][i] = second * scale;
+            shear[2][i] = scale;
+        }
+        Self { rays, longest, is_down, shear }
+    }
+
+    /// Take what is nearer on a triangle, of higher number than those before; `met` are the bits of the rays that are traced, the others
+    /// end below 0.
+    #[inline(always)]
+    pub fn closest(
+        &self,
+        (number, corners): (u32, &[Vec3; 3]),
+        (met, ends): (u32, &mut Ends),
+        found: &mut HitRows,
+        folds: impl Folds,
+    ) {
+        let hits = self.hits(corners, ends);
+        let mut is_nearer = [0; PACKET];
+        for i in 0..PACKET {
+            // At the end of a ray a hit counts, and one as far as another that was found before does not.
+            let is_tie = !found.t[i].is_nan() & (hits.t[i] == found.t[i]);
+            is_nearer[i] = if is_tie { 0 } else { hits.hit[i] };
+        }
+        take(&is_nearer, &hits.t, ends);
+        take(&is_nearer, &hits.t, &mut found.t);
+        take(&is_nearer, &hits.u, &mut found.u);
+        take(&is_nearer, &hits.v, &mut found.v);
+        take_u32(&is_nearer, &[number; PACKET], &mut found.primitive);
+        let doubtful = folds.bits(&hits.doubtful) & met;
+        if doubtful != 0 {
+            self.decide(doubtful, (number, corners), ends, found);
+        }
+    }
+
+    /// A bit for each ray in `met` that hits a triangle; the others end below 0.
+    #[inline(always)]
+    pub fn any(&self, corners: &[Vec3; 3], met: u32, ends: &Ends, folds: impl Folds) -> u32 {
+        let hits = self.hits(corners, ends);
+        let doubtful = folds.bits(&hits.doubtful) & met;
+        let hit = folds.bits(&hits.hit) & met;
+        if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
+    }
+
+    /// [`ShearedRows::closest`] of these rays, one by one.
+    #[cold]
+    #[inline(never)]
+    fn decide(&self, these: u32, (number, corners): (u32, &[Vec3; 3]), ends: &mut Ends, found: &mut HitRows) {
+        for i in lanes(these) {
+            let Some(hit) = self.alone(i, corners, ends[i]) else { continue };
+            if found.t[i].is_nan() || hit.t < found.t[i] {
+                found.put(i, &super::ShapeHit { primitive: number, ..hit });
+                ends[i] = hit.t;
+            }
+        }
+    }
+
+    /// [`ShearedRows::any`] of these rays, one by one.
+    #[cold]
+    #[inline(never)]
+    fn decided(&self, these: u32, corners: &[Vec3; 3], ends: &Ends) -> u32 {
+        lanes(these).filter(|&i| self.alone(i, corners, ends[i]).is_some()).fold(0, |hit, i| hit | 1 << i)
+    }
+
+    fn alone(&self, i: usize, corners: &[Vec3; 3], end: f32) -> Option<super::ShapeHit> {
+        let ray = self.rays.ray(i);
+        ShearedRay::new(ray.origin, ray.direction).intersect(corners, end)
+    }
+
+    /// A corner as each ray sees it.
+    #[inline(always)]
+    fn sheared(&self, corner: Vec3) -> Lanes3 {
+        let mut seen = [[0.0; PACKET]; 3];
+        for i in 0..PACKET {
+            let [x, y, z] = [0, 1, 2].map(|axis| corner[axis] - self.rays.origin[axis][i]);
+            let (is_x, is_y) = (self.longest[0][i] != 0, self.longest[1][i] != 0);
+            let along = if is_x {
+                x
+            } else if is_y {
+                y
+            } else {
+                z
+            };
+            let first = if is_x {
+                y
+            } else if is_y {
+                z
+            } else {
+                x
+            };
+            let second = if is_x {
+                z
+            } else if is_y {
+                x
+            } else {
+                y
+            };
+            seen[0][i] = first - self.shear[0][i] * along;
+            seen[1][i] = second - self.shear[1][i] * along;
+            seen[2][i] = along;
+        }
+        seen
+    }
+
+    /// [`ShearedRay::intersect`] side by side.
+    #[inline(always)]
+    fn hits(&self, corners: &[Vec3; 3], ends: &Ends) -> Hits {
+        let [a, b, c] = [self.sheared(corners[0]), self.sheared(corners[1]), self.sheared(corners[2])];
+        let mut hits = Hits {
+            hit: [0; PACKET],
+            doubtful: [0; PACKET],
+            t: [0.0; PACKET],
+            u: [0.0; PACKET],
+            v: [0.0; PACKET],
+        };
+        for i in 0..PACKET {
+            let ([ax, ay, az], [bx, by, bz]) = ([a[0][i], a[1][i], a[2][i]], [b[0][i], b[1][i], b[2][i]]);
+            let [cx, cy, cz] = [c[0][i], c[1][i], c[2][i]];
+            let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+            let (is_left, is_right) =
+                ((wa < 0.0) | (wb < 0.0) | (wc < 0.0), (wa > 0.0) | (wb > 0.0) | (wc > 0.0));
+            let is_on_edge = (wa == 0.0) | (wb == 0.0) | (wc == 0.0);
+            let inverse = 1.0 / (wa + wb + wc);
+            let shear_z = self.shear[2][i];
+            let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
+            // `ShearedRay::distance_error`.
+            let first = greatest([ax, bx, cx]);
+            let second = greatest([ay, by, cy]);
+            let depth = greatest([az, bz, cz]);
+            let is_down = self.is_down[i] != 0;
+            let (x, y) = (if is_down { second } else { first }, if is_down { first } else { second });
+            let z = depth * shear_z.abs();
+            let error_z = gamma(3) * z;
+            let (error_x, error_y) = (gamma(5) * (x + depth), gamma(5) * (y + depth));
+            let error_edge = 2.0 * (gamma(2) * x * y + error_y * x + error_x * y);
+            let edge = 2.0 * x * y;
+            let error = 3.0 * (gamma(3) * edge * z + error_edge * z + error_z * edge) * inverse.abs();
+            let is_doubtful = (error > z * ILL_CONDITIONED) | (t.abs() <= error) | is_on_edge;
+            let is_inside = !(is_left & is_right);
+            let is_hit = is_inside & !is_doubtful & (t > 0.0) & (t <= ends[i]);
+            hits.doubtful[i] = if is_inside & is_doubtful { TRUE } else { 0 };
+            hits.hit[i] = if is_hit { TRUE } else { 0 };
+            hits.t[i] = t;
+            hits.u[i] = wb * inverse;
+            hits.v[i] = wc * inverse;
+        }
+        hits
+    }
+}
+
+/// The greatest size of three numbers.
+#[inline(always)]
+fn greatest([a, b, c]: [f32; 3]) -> f32 {
+    let (a, b, c) = (a.abs(), b.abs(), c.abs());
+    let most = if a > b { a } else { b };
+    if most > c { most } else { c }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::{Instructions, Loops};
+    use crate::geometry::Ray;
+    use crate::math::random::signed;
+
+    struct Tested<'a> {
+        rays: &'a [Ray],
+        triangles: &'a [[Vec3; 3]],
+    }
+
+    impl Loops for Tested<'_> {
+        type Done = (HitRows, u32);
+
+        #[inline(always)]
+        fn run(self, folds: impl Folds) -> (HitRows, u32) {
+            let (rows, ends) = RayRows::new(self.rays);
+            let (rays, mut found, mut any) = (ShearedRows::new(&rows), HitRows::none(), 0);
+            let (met, mut nearest) = ((1 << self.rays.len()) - 1, ends);
+            for (number, corners) in (0..).zip(self.triangles) {
+                any |= rays.any(corners, met, &ends, folds);
+                rays.closest((number, corners), (met, &mut nearest), &mut found, folds);
+            }
+            (found, any)
+        }
+    }
+
+    #[test]
+    fn rays_side_by_side_have_the_bits_that_each_has_alone() {
+        let mut next = signed(7);
+        let (mut hits, mut shared) = (0, 0);
+        for round in 0..20_000 {
+            // Corners that many triangles have, among them flat ones; rays along axes, into corners and from surfaces.
+            let step = [1.0, 0.25, 1e-6][round % 3];
+            let corners: Vec<Vec3> = (0..6)
+                .map(|_| (Vec3::new(next(), next(), next()) / step).round() * step + Vec3::splat(0.5))
+                .collect();
+            let triangles: Vec<[Vec3; 3]> =
+                (0..8).map(|i| [i, i * i + 1, i + 3].map(|corner| corners[corner % 6])).collect();
+            let ray = |next: &mut dyn FnMut() -> f32| {
+                let target = corners[(next().abs() * 5.99) as usize];
+                let origin = match round % 4 {
+                    0 => target + Vec3::new(next(), 0.0, 0.0),
+                    1 => (corners[0] + corners[1]) * 0.5,
+                    _ => Vec3::new(next(), next(), next()) * 4.0,
+                };
+                let aside = Vec3::new(next(), next(), next()) * [0.0, 0.3][round / 2 % 2];
+                Ray {
+                    t_max: [f32::INFINITY, 0.9, 1.0][round % 3],
+                    ..Ray::new(origin, target + aside - origin)
+                }
+            };
+            let rays: Vec<Ray> = (0..=round % PACKET).map(|_| ray(&mut next)).collect();
+            let alone: Vec<_> = rays
+                .iter()
+                .map(|ray| {
+                    let (sheared, mut best) = (ShearedRay::new(ray.origin, ray.direction), None);
+                    for (number, corners) in (0..).zip(&triangles) {
+                        let end = best.map_or(ray.t_max, |best: super::super::ShapeHit| best.t);
+                        let Some(hit) = sheared.intersect(corners, end) else { continue };
+                        if best.is_none_or(|best| hit.t < best.t) {
+                            best = Some(super::super::ShapeHit { primitive: number, ..hit });
+                        }
+                    }
+                    best
+                })
+                .collect();
+            for instructions in Instructions::ALL {
+                let (found, any) = instructions.run(Tested { rays: &rays, triangles: &triangles });
+                for (i, alone) in alone.iter().enumerate() {
+                    assert_eq!(found.get(i), *alone, "{instructions:?}: {:?} {triangles:?}", rays[i]);
+                    assert_eq!(any & 1 << i != 0, alone.is_some(), "{instructions:?}: {:?}", rays[i]);
+                }
+            }
+            hits += alone.iter().flatten().count();
+            shared += usize::from(alone.iter().flatten().any(|hit| hit.u == 0.0 || hit.v == 0.0));
+        }
+        assert!(hits > 20_000 && shared > 1000, "{hits} hits, {shared} on edges");
+    }
+}

@@ -1,0 +1,79 @@
+//! Meshes of few triangles: each of these is tested against all rays of a packet at once, wherever they go. Hits have the bits of
+//! those under the mesh's tree.
+
+use super::MeshInstance;
+use crate::accel::{Ends, PACKET};
+use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::watertight_rows::ShearedRows;
+use crate::math::lanes::{Folds, lane, set_lane};
+use crate::math::transform::Transform;
+
+/// Triangles of such a mesh at most: of more, the tree passes by so many that it is faster.
+const FEW: usize = 16;
+
+impl MeshInstance {
+    /// Whether it has few triangles.
+    #[inline(always)]
+    pub(super) fn has_few(&self) -> bool {
+        self.tree.loaded().mesh.triangles.len() <= FEW
+    }
+
+    /// The nearest hits of the rays in `met`; the others end below 0.
+    #[inline(always)]
+    pub(super) fn closest_of_few(
+        &self,
+        rows: &RayRows,
+        met: u32,
+        ends: &Ends,
+        found: &mut HitRows,
+        folds: impl Folds,
+    ) {
+        let (mesh, local, mut ends) = (&self.tree.loaded().mesh, self.local_rows(rows), *ends);
+        let rays = ShearedRows::new(&local);
+        for number in 0..mesh.triangles.len() as u32 {
+            rays.closest((number, &mesh.corners(number)), (met, &mut ends), found, folds);
+        }
+    }
+
+    /// A bit for each ray in `met` that hits anything of it but its own of `except`; the others end below 0.
+    #[inline(always)]
+    pub(super) fn any_of_few(
+        &self,
+        rows: &RayRows,
+        met: u32,
+        ends: &Ends,
+        except: Option<(u32, &[u32; PACKET])>,
+        folds: impl Folds,
+    ) -> u32 {
+        let (mesh, local) = (&self.tree.loaded().mesh, self.local_rows(rows));
+        let (rays, mut hit) = (ShearedRows::new(&local), 0);
+        for number in 0..mesh.triangles.len() as u32 {
+            let mut asked = met & !hit;
+            if let Some((own, parts)) = except {
+                for i in 0..PACKET {
+                    let is_own = own & 1 << i != 0 && parts[i] == number;
+                    asked &= !(u32::from(is_own) << i);
+                }
+            }
+            if asked != 0 {
+                hit |= rays.any(&mesh.corners(number), asked, ends, folds);
+            }
+        }
+        hit
+    }
+
+    /// The rays in the mesh's coordinates.
+    #[inline(always)]
+    fn local_rows(&self, rows: &RayRows) -> RayRows {
+        let RayRows { mut origin, mut direction } = *rows;
+        if self.transform != Transform::IDENTITY {
+            for i in 0..PACKET {
+                let at = self.transform.inverse_point(lane(&origin, i).as_dvec3()).as_vec3();
+                set_lane(&mut origin, i, at);
+                let towards = self.transform.inverse_vector(lane(&direction, i).as_dvec3()).as_vec3();
+                set_lane(&mut direction, i, towards);
+            }
+        }
+        RayRows::of(origin, direction)
+    }
+}
