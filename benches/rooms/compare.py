@@ -13,6 +13,7 @@ Each round renders the scene by every program in turns, with two threads and a s
 """
 
 import argparse
+import math
 import os
 import statistics
 import sys
@@ -126,13 +127,20 @@ def at_least(least):
     return read
 
 
+def square(text):
+    """Mitsuba's sampler takes more samples than it is told to where they make no grid."""
+    if math.isqrt(int(text)) ** 2 != int(text):
+        raise argparse.ArgumentTypeError("a square, such as 16, 64, 256")
+    return int(text)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     parser.add_argument("--photons", action="store_true", help="whitted with photons as well")
     parser.add_argument("--rounds", type=at_least(1), default=5)
     parser.add_argument("--seeds", type=at_least(2), default=2, help="pictures of each way in a round")
-    parser.add_argument("--samples", type=at_least(1), default=64, help="of paths, a power of two for Mitsuba's sampler")
+    parser.add_argument("--samples", type=square, default=64, help="of paths")
     parser.add_argument("--passes", type=at_least(1), default=64, help="of photons")
     parser.add_argument("--side", type=at_least(1), default=256, help="pixels of the longer side, of a scene file")
     parser.add_argument("--reference", type=at_least(1), default=8192, help="samples of a scene file's reference")

@@ -3,6 +3,7 @@
 import resource
 import statistics
 import subprocess
+import sys
 import time
 
 import drjit as dr
@@ -49,7 +50,9 @@ class Glimt:
     def seconds(self, options):
         """User and system time of the process."""
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run([*self.call, *options], check=True, stdout=subprocess.DEVNULL)
+        done = subprocess.run([*self.call, *options], capture_output=True, text=True)
+        if done.returncode != 0:
+            sys.exit(done.stderr)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
