@@ -16,12 +16,12 @@ const LIMIT: Duration = Duration::from_secs(20);
 pub fn times(scene: &Path) -> Outcome<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {
-        let worker = start()?;
+        let worker = start(0)?;
         let mut generation = 0;
         send(&worker, scene, &mut generation);
         times.push(cancel(&worker, scene, &mut generation, Duration::from_millis(step * step * 4))?);
     }
-    let worker = start()?;
+    let worker = start(0)?;
     let mut generation = 0;
     send(&worker, scene, &mut generation);
     while !matches!(worker.events.recv_timeout(LIMIT)?, Event::Preview { .. }) {}

@@ -119,7 +119,7 @@ impl Copies {
     pub fn new() -> Outcome<Self> {
         let folder = tempfile::tempdir()?;
         let project = Path::new(env!("CARGO_MANIFEST_DIR"));
-        for name in ["scenes", "assets", "assets/textures"] {
+        for name in ["scenes", "assets", "assets/textures", "assets/stairs", "assets/furniture"] {
             fs::create_dir(folder.path().join(name))?;
             for entry in fs::read_dir(project.join(name))? {
                 let entry = entry?;

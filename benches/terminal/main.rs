@@ -113,7 +113,7 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     }
     // Beside the scenes, for the files that they name.
     let scene = tempfile::Builder::new().prefix("bench").suffix(".toml").tempfile_in(&scenes)?;
-    let handle = glimt::pipeline::start()?;
+    let handle = glimt::pipeline::start(0)?;
     let mut window = Window::new(columns, rows);
     for (generation, name, text) in
         [(1, "start", text.clone()), (2, edit.name, text.replace(edit.from, edit.to))]

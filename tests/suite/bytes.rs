@@ -32,7 +32,7 @@ struct Studio {
 
 impl Studio {
     fn new(preview: PreviewSize) -> Self {
-        let handle = glimt::pipeline::start().expect("a worker");
+        let handle = glimt::pipeline::start(0).expect("a worker");
         Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
     }
 

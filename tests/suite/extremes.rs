@@ -206,7 +206,7 @@ fn bundled() -> Vec<PathBuf> {
 
 /// Whether a file that the scene names is made only when asked for.
 fn is_made_on_demand(scene: &Path) -> bool {
-    scene.file_stem().is_some_and(|stem| stem == "million")
+    scene.file_stem().is_some_and(|stem| stem == "million" || stem == "figure")
 }
 
 #[test]

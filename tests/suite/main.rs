@@ -16,6 +16,8 @@ mod json;
 mod keeping;
 mod kernel;
 mod mutation;
+#[cfg(target_os = "linux")]
+mod niceness;
 mod noise;
 mod once;
 mod options;

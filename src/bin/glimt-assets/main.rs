@@ -1,11 +1,16 @@
 //! Makes what the bundled scenes show: `glimt-assets` writes the stored files of `assets/`, bit for bit the same
-//! on every machine; `glimt-assets million` writes `assets/million.ply`, which is too large to store.
+//! on every machine; `glimt-assets million` writes `assets/million.ply`, `glimt-assets figure` writes `assets/figure.ply`: they are
+//! too large to store.
 
+mod figure;
+mod furniture;
 mod noise;
+mod parts;
 mod pictures;
 mod room;
 mod shapes;
 mod sky;
+mod stairs;
 mod surface;
 mod vector;
 
@@ -14,7 +19,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: glimt-assets [million]   (in the project's folder; writes into assets/)";
+const USAGE: &str = "usage: glimt-assets [million | figure]   (in the project's folder; writes into assets/)";
 
 /// A file below `assets/` and its bytes.
 type Asset = (&'static str, Vec<u8>);
@@ -24,6 +29,7 @@ fn main() -> ExitCode {
     let files = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => stored(),
         ["million"] => vec![("million.ply", shapes::million().to_ply())],
+        ["figure"] => vec![("figure.ply", figure::bear().to_ply())],
         _ => {
             let _ = writeln!(io::stderr(), "{USAGE}");
             return ExitCode::from(2);
@@ -47,7 +53,7 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// All files that the repository keeps.
 fn stored() -> Vec<Asset> {
-    vec![
+    let single = vec![
         ("coral.ply", shapes::coral().to_ply()),
         ("rope.ply", shapes::rope().to_ply()),
         ("knot.obj", shapes::knot().to_obj("A trefoil knot with texture coordinates and normals")),
@@ -63,7 +69,9 @@ fn stored() -> Vec<Asset> {
         ("textures/marble.png", pictures::marble()),
         ("textures/tiles.ppm", pictures::tiles()),
         ("textures/evening.hdr", sky::evening()),
-    ]
+    ];
+    let parts = stairs::parts().into_iter().chain(furniture::parts());
+    single.into_iter().chain(parts.map(|(name, surface)| (name, surface.to_ply()))).collect()
 }
 
 #[cfg(test)]
@@ -128,6 +136,45 @@ mod tests {
         assert!(together >= 100_000, "{together}");
     }
 
+    /// In a closed surface each edge is passed as often in one direction as in the other; cloth and leaves are open.
+    #[test]
+    fn furniture_is_closed_and_its_front_outside() {
+        let parts =
+            stairs::parts().into_iter().chain(furniture::parts()).chain([("figure.ply", figure::bear())]);
+        for (name, surface) in parts {
+            let mut edges = HashMap::new();
+            let mut volume = 0.0;
+            for face in &surface.faces {
+                for (at, &from) in face.iter().enumerate() {
+                    *edges
+                        .entry((place(&surface, from), place(&surface, face[(at + 1) % face.len()])))
+                        .or_insert(0) += 1;
+                }
+                for pair in face[1..].windows(2) {
+                    let [a, b, c] =
+                        [face[0], pair[0], pair[1]].map(|corner| surface.positions[corner as usize]);
+                    volume += vector::dot(a, vector::cross(b, c)) / 6.0;
+                }
+            }
+            let open =
+                edges.iter().filter(|((from, to), count)| edges.get(&(*to, *from)) != Some(count)).count();
+            let is_cloth = name.ends_with("leaf.ply") || name.ends_with("curtain.ply");
+            assert_eq!(open > 0, is_cloth, "{name}: {open} open edges");
+            assert!(is_cloth || volume > 0.0, "{name} is inside out: {volume}");
+        }
+    }
+
+    /// Where a vertex is.
+    fn place(surface: &surface::Surface, vertex: u32) -> [u64; 3] {
+        surface.positions[vertex as usize].map(|coordinate| (coordinate + 0.0).to_bits())
+    }
+
+    #[test]
+    fn the_figure_is_of_many_triangles() {
+        let count = figure::bear().triangle_count();
+        assert!((20_000..=80_000).contains(&count), "{count}");
+    }
+
     #[test]
     fn stored_normals_point_away_from_the_front() {
         for name in ["knot.obj", "vase.obj", "room.obj"] {
@@ -145,6 +192,9 @@ mod tests {
         }
     }
 
+    /// What scenes name and the repository does not keep.
+    const MADE_ON_DEMAND: [&str; 2] = ["../assets/million.ply", "../assets/figure.ply"];
+
     #[test]
     fn the_scenes_name_files_that_are_made_here() {
         let scenes = folder().with_file_name("scenes");
@@ -155,7 +205,7 @@ mod tests {
                 .lines()
                 .filter_map(|line| line.strip_prefix("file = ").or(line.strip_prefix("orbiter = ")));
             for file in files.filter_map(|file| file.split('"').nth(1)) {
-                assert!(file == "../assets/million.ply" || scenes.join(file).is_file(), "{file}");
+                assert!(MADE_ON_DEMAND.contains(&file) || scenes.join(file).is_file(), "{file}");
                 named += 1;
             }
         }

@@ -125,7 +125,7 @@ fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
 
 /// An icosahedron whose edges were halved `times` over, each vertex at the distance that `radius` gives its
 /// direction.
-fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
+pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
     let (mut corners, mut triangles) = icosahedron();
     for _ in 0..times {
         let mut middles = HashMap::new();

@@ -12,6 +12,8 @@ mod input;
 mod keys;
 mod leafing;
 mod outputs;
+#[cfg(target_os = "linux")]
+mod polite;
 mod pty;
 mod relay;
 mod saving;

@@ -215,8 +215,12 @@ impl Terminal {
     }
 
     pub fn signal(&self, signal: Signal) {
-        let id = self.child.process_id().expect("an id");
-        kill(Pid::from_raw(i32::try_from(id).expect("a process id")), signal).expect("sent");
+        kill(Pid::from_raw(i32::try_from(self.id()).expect("a process id")), signal).expect("sent");
+    }
+
+    /// The program's process id.
+    pub fn id(&self) -> u32 {
+        self.child.process_id().expect("an id")
     }
 
     /// Whether the terminal takes what the program writes.

@@ -1,14 +1,21 @@
 //! Which threads go first.
+//!
+//! A nice value says how much a thread gives way to others: 10 more are a tenth of the share of a processor that both want.
 
-/// Less urgent by this: the front end gets ten times the share of a processor that both want.
-#[cfg(target_os = "linux")]
-const STEPS: i32 = 10;
+/// Raises the nice value of this thread and of those that it starts from now on; outside Linux that of the whole process
+/// (nice(2), sched(7)). With 0, or if the system refuses, nothing changes.
+pub fn give_way(steps: u8) {
+    #[cfg(unix)]
+    if steps > 0 {
+        let _ = rustix::process::nice(i32::from(steps));
+    }
+    #[cfg(not(unix))]
+    let _ = steps;
+}
 
-/// Lets all other threads go before this one from now on, those of the terminal and of the shell behind it as well. Where the
-/// system knows no such thing, nothing changes.
-pub fn lower() {
-    // On Linux the nice value belongs to the thread, elsewhere to the whole process (nice(2), sched(7)).
-    #[cfg(target_os = "linux")]
-    // A refusal leaves it as it was.
-    let _ = rustix::process::nice(STEPS);
+/// Raises the nice value of this thread, if threads have one of their own; else nothing changes.
+pub fn give_way_alone(steps: u8) {
+    if cfg!(target_os = "linux") {
+        give_way(steps);
+    }
 }

@@ -212,6 +212,9 @@ pub struct RenderArgs {
     /// Threads that render; 0: one per core
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Method")]
     pub threads: Option<usize>,
+    /// How far rendering gives way to other programs, from 0, not at all, to 19 [default: 0 with --once, else 10]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, help_heading = "Method")]
+    pub nice: Option<u8>,
 
     /// How progress is said on stderr with --once
     #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
@@ -375,6 +378,10 @@ fn threads(text: &str) -> Result<usize, String> {
         Ok(count) if count <= MOST => Ok(count),
         _ => Err(format!("expected a number from 0 to {MOST}")),
     }
+}
+
+fn nice(text: &str) -> Result<u8, String> {
+    whole(text, 0..=19).map(|steps| steps as u8)
 }
 
 fn crop(text: &str) -> Result<Rect, String> {

@@ -22,6 +22,7 @@ use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
+use crate::system::priority;
 use crate::system::threads::not_started;
 
 /// Between two looks for a signal.
@@ -33,6 +34,7 @@ pub(super) fn run(args: &BenchArgs, console: &Console) -> Exit {
 
 /// What was wrong is said, and is the exit code of an error.
 fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
+    priority::give_way(args.nice);
     let order = order(args, console)?;
     let scenes = order.scenes.len();
     let outputs = Outputs::of(args, &order.scenes, console)?;

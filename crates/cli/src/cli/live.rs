@@ -33,7 +33,7 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
 
 fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error: std::io::Error| (Exit::FAILED, not_started("a thread", false, &error));
-    let mut worker = start().map_err(no_thread)?;
+    let mut worker = start(order.nice).map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
         // A front end that is gone wants no news.

@@ -11,6 +11,9 @@ use crate::tui::{ColorChoice, PreviewChoice};
 /// Standard output, where it stands for a file.
 pub(super) const STANDARD: &str = "-";
 
+/// How far the terminal's renders give way to the front end and to all other programs.
+const POLITE: u8 = 10;
+
 /// What is to be done.
 #[derive(Clone, Debug)]
 pub(super) struct Order {
@@ -21,6 +24,8 @@ pub(super) struct Order {
     pub(super) preview: PreviewChoice,
     pub(super) color: ColorChoice,
     pub(super) poll: bool,
+    /// By how much the nice value is raised: with `is_once` that of the program, else that of the render threads.
+    pub(super) nice: u8,
 }
 
 /// The meaning of the arguments.
@@ -46,6 +51,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         preview: args.preview,
         color: args.color,
         poll: args.poll,
+        nice: args.nice.unwrap_or(if args.once { 0 } else { POLITE }),
     })
 }
 
@@ -93,7 +99,8 @@ mod tests {
         let order = lowered(
             "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
-             --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll",
+             --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll \
+             --nice 3",
         )
         .expect("right");
         let expected = Overrides {
@@ -122,6 +129,7 @@ mod tests {
         };
         assert_eq!(order.overrides, expected);
         assert!(order.is_once && order.poll);
+        assert_eq!(order.nice, 3);
         assert_eq!((order.progress, order.color), (Progress::Json, ColorChoice::Indexed256));
     }
 
@@ -147,6 +155,8 @@ mod tests {
             "a.toml --clamp nan",
             "a.toml --accel octree",
             "a.toml --seed -1",
+            "a.toml --nice 20",
+            "a.toml --nice -1",
         ] {
             assert!(lowered(wrong).is_err(), "{wrong}");
         }

@@ -13,6 +13,7 @@ use crate::pipeline::protocol::{Command, Event, Failure, Report, Request, Writin
 use crate::pipeline::settings::{Effective, Overrides};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::system::priority;
 use crate::system::threads::not_started;
 
 /// How long the end may take after a signal.
@@ -21,7 +22,9 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(50);
 
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
-    let worker = match start() {
+    // Before the first thread starts: all of them give way.
+    priority::give_way(order.nice);
+    let worker = match start(0) {
         Ok(worker) => worker,
         Err(error) => return console.fail(Exit::FAILED, &not_started("a thread", false, &error)),
     };

@@ -19,12 +19,13 @@ use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
 
-/// Start a worker with its thread. Its renders let the front end and everything else on the machine go first.
+/// Starts a worker with its thread. On Linux the nice value of its render threads is `nice` above that of this thread, so that
+/// the front end and everything else on the machine can go first.
 ///
 /// # Errors
 /// The system has no thread left.
-pub fn start() -> std::io::Result<Handle> {
-    start_with(Means { is_background: true, ..Means::default() })
+pub fn start(nice: u8) -> std::io::Result<Handle> {
+    start_with(Means { nice, ..Means::default() })
 }
 
 /// A worker with other means.

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::{Progress, Switch, any_whole, clamp, depth, one_of, samples, seconds, side, threads, whole};
+use super::{
+    Progress, Switch, any_whole, clamp, depth, nice, one_of, samples, seconds, side, threads, whole,
+};
 use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::tui::ColorChoice;
 
@@ -103,6 +105,9 @@ pub struct BenchArgs {
     /// Threads that render; 0: one per core
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "All pictures and references")]
     pub threads: Option<usize>,
+    /// How far rendering gives way to other programs, from 0, not at all, to 19
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, default_value = "0", help_heading = "All pictures and references")]
+    pub nice: u8,
 
     /// How progress is said on stderr
     #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]

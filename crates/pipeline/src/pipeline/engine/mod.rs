@@ -65,13 +65,13 @@ pub(super) struct Means {
     pub(super) kernel: Kernel,
     /// What one film may take, at most.
     pub(super) most_film_bytes: u64,
-    /// Whether everything else on this machine goes before the render.
-    pub(super) is_background: bool,
+    /// By how much the nice value of render threads is above that of the thread that starts them.
+    pub(super) nice: u8,
 }
 
 impl Default for Means {
     fn default() -> Self {
-        Self { kernel: crate::integrators::render_tile, most_film_bytes: u64::MAX, is_background: false }
+        Self { kernel: crate::integrators::render_tile, most_film_bytes: u64::MAX, nice: 0 }
     }
 }
 
@@ -462,12 +462,8 @@ impl Engine {
         }
         self.pool = None;
         let name = |index| format!("glimt-{index}");
-        let is_background = self.means.is_background;
-        let begin = move |_| {
-            if is_background {
-                priority::lower();
-            }
-        };
+        let nice = self.means.nice;
+        let begin = move |_| priority::give_way_alone(nice);
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(name)

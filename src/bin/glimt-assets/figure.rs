@@ -1,0 +1,120 @@
+//! A bear of balls and round cones that flow into each other, for `scenes/figure.toml`: 0.33 high, its seat at the origin.
+
+use super::surface::Surface;
+use super::vector::{Vector, add, dot, mix, scale, subtract, unit};
+
+/// The corner of the lattice, the edge of a cell, and the cells along each axis.
+const CORNER: Vector = [-0.13, -0.025, -0.1];
+const CELL: f64 = 0.0029;
+const CELLS: [usize; 3] = [91, 124, 91];
+
+/// Where two parts are nearer than this, they flow into each other.
+const BLEND: f64 = 0.022;
+
+/// Both ends of a part with their radii; those apart from the middle are there on both sides.
+const PARTS: [[(Vector, f64); 2]; 8] = [
+    // Trunk, head, snout.
+    [([0.0, 0.068, 0.0], 0.076), ([0.0, 0.165, -0.004], 0.058)],
+    [([0.0, 0.255, 0.0], 0.058), ([0.0, 0.262, 0.004], 0.056)],
+    [([0.0, 0.242, 0.045], 0.026), ([0.0, 0.24, 0.062], 0.02)],
+    // Ear, arm, leg, foot, tail.
+    [([0.047, 0.302, -0.004], 0.021), ([0.05, 0.308, -0.004], 0.021)],
+    [([0.06, 0.178, 0.01], 0.024), ([0.078, 0.118, 0.068], 0.021)],
+    [([0.048, 0.036, 0.03], 0.037), ([0.074, 0.031, 0.1], 0.031)],
+    [([0.076, 0.034, 0.112], 0.032), ([0.079, 0.056, 0.12], 0.024)],
+    [([0.0, 0.04, -0.07], 0.022), ([0.0, 0.042, -0.076], 0.022)],
+];
+
+/// The isosurface of the distance at 0, by dual cells (Gibson, *Constrained Elastic Surface Nets*, MICCAI 1998): a vertex in each
+/// cell that it passes, moved onto it; a quad around each edge that it passes.
+pub(crate) fn bear() -> Surface {
+    let inside = lattice();
+    let [nx, ny, nz] = CELLS;
+    let corner = |[x, y, z]: [usize; 3]| inside[(x * (ny + 1) + y) * (nz + 1) + z];
+    let mut surface = Surface::default();
+    // A vertex in each cell that has corners on both sides.
+    let mut vertices = vec![u32::MAX; nx * ny * nz];
+    let cell = |[x, y, z]: [usize; 3]| (x * ny + y) * nz + z;
+    for at in all(CELLS) {
+        let corners =
+            (0..8).filter(|&c| corner([at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)])).count();
+        if corners % 8 != 0 {
+            vertices[cell(at)] = surface.positions.len() as u32;
+            surface.positions.push(onto(place(at, 0.5)));
+        }
+    }
+    // A quad around each edge between the two sides, its front outside.
+    for (at, axis) in all(CELLS).flat_map(|at| (0..3).map(move |axis| (at, axis))) {
+        let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+        if at[next] == 0 || at[last] == 0 {
+            continue;
+        }
+        let mut end = at;
+        end[axis] += 1;
+        if corner(at) != corner(end) {
+            let around = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(back, below)| {
+                let mut beside = at;
+                beside[next] -= back;
+                beside[last] -= below;
+                vertices[cell(beside)]
+            });
+            let mut face = around.to_vec();
+            if !corner(at) {
+                face.reverse();
+            }
+            surface.faces.push(face);
+        }
+    }
+    surface
+}
+
+/// Whether each corner of the lattice is inside.
+fn lattice() -> Vec<bool> {
+    all(CELLS.map(|cells| cells + 1)).map(|at| distance(place(at, 0.0)) < 0.0).collect()
+}
+
+/// All places of a lattice, the last axis first.
+fn all([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])))
+}
+
+/// A place of the lattice, moved by a part of a cell along all axes.
+fn place(at: [usize; 3], by: f64) -> Vector {
+    add(CORNER, at.map(|index| (index as f64 + by) * CELL))
+}
+
+/// The nearest point of the surface, by Newton's steps along the gradient.
+fn onto(mut point: Vector) -> Vector {
+    for _ in 0..6 {
+        point = subtract(point, scale(gradient(point), distance(point)));
+    }
+    point
+}
+
+fn gradient(point: Vector) -> Vector {
+    const STEP: f64 = 1e-5;
+    let slope = |axis: usize| {
+        let mut aside = [0.0; 3];
+        aside[axis] = STEP;
+        distance(add(point, aside)) - distance(subtract(point, aside))
+    };
+    unit([slope(0), slope(1), slope(2)])
+}
+
+/// About the distance to the bear, negative inside.
+fn distance([x, y, z]: Vector) -> f64 {
+    // Both sides are alike.
+    let point = [x.abs(), y, z];
+    PARTS.iter().map(|ends| round_cone(point, ends)).fold(f64::MAX, |a, b| {
+        let near = (BLEND - (a - b).abs()).max(0.0) / BLEND;
+        a.min(b) - near * near * BLEND / 4.0
+    })
+}
+
+/// The distance to a ball that moves from one end to the other and changes its radius on its way.
+fn round_cone(point: Vector, [(from, first), (to, second)]: &[(Vector, f64); 2]) -> f64 {
+    let along = subtract(*to, *from);
+    let t = (dot(subtract(point, *from), along) / dot(along, along)).clamp(0.0, 1.0);
+    let aside = subtract(point, mix(*from, *to, t));
+    dot(aside, aside).sqrt() - (first + (second - first) * t)
+}

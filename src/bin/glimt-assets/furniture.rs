@@ -1,0 +1,342 @@
+//! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Metres; each piece stands on the origin, its front towards +z.
+
+use super::parts::{ball, bar, block, join, moved, turned_body};
+use super::surface::Surface;
+use super::vector::{Vector, turn};
+
+/// Each piece and its file.
+pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
+    vec![
+        ("furniture/cushion.ply", cushion()),
+        ("furniture/armrest.ply", block([-0.1, 0.1, -0.42], [0.1, 0.62, 0.42], 0.045)),
+        ("furniture/base.ply", block([-0.5, 0.1, -0.42], [0.5, 0.3, 0.4], 0.02)),
+        ("furniture/foot.ply", foot()),
+        ("furniture/leg.ply", leg()),
+        ("furniture/board.ply", block([-0.5, 0.0, -0.5], [0.5, 0.03, 0.5], 0.006)),
+        ("furniture/plate.ply", plate()),
+        ("furniture/shelf.ply", shelf()),
+        ("furniture/cover.ply", cover()),
+        ("furniture/pages.ply", pages()),
+        ("furniture/chair.ply", chair()),
+        ("furniture/stand.ply", stand()),
+        ("furniture/shade.ply", shade()),
+        ("furniture/decanter.ply", decanter()),
+        ("furniture/tumbler.ply", tumbler()),
+        ("furniture/bowl.ply", bowl()),
+        ("furniture/pot.ply", pot()),
+        ("furniture/leaf.ply", leaf()),
+        ("furniture/curtain.ply", curtain()),
+        ("furniture/window.ply", window()),
+        ("furniture/frame.ply", frame()),
+        ("furniture/door.ply", door()),
+        ("furniture/jamb.ply", jamb()),
+        ("furniture/bed.ply", bed()),
+    ]
+}
+
+/// Filled cloth of 1 by 0.2 by 1, thinner at its edges.
+fn cushion() -> Surface {
+    let (rings, sides) = (9, 32);
+    let outline = |ring: u32| {
+        let (sin, cos) = turn(0.5 * f64::from(ring) / f64::from(rings - 1) - 0.25);
+        (0.1 + 0.1 * sin.signum() * sin.abs().sqrt(), cos.max(0.0).sqrt())
+    };
+    let mut surface = Surface::default();
+    for ring in 0..rings {
+        let (height, reach) = outline(ring);
+        let count = if ring == 0 || ring == rings - 1 { 1 } else { sides };
+        surface.positions.extend((0..count).map(|side| {
+            let (sin, cos) = turn(f64::from(side) / f64::from(sides));
+            // A square with round corners.
+            let round = |along: f64| 0.5 * along.signum() * along.abs().sqrt();
+            [reach * round(cos), height, reach * round(sin)]
+        }));
+    }
+    let vertex = |ring: u32, side: u32| match ring {
+        0 => 0,
+        _ if ring == rings - 1 => 1 + (rings - 2) * sides,
+        _ => 1 + (ring - 1) * sides + side % sides,
+    };
+    for (ring, side) in (0..rings - 1).flat_map(|ring| (0..sides).map(move |side| (ring, side))) {
+        let mut face = vec![
+            vertex(ring, side),
+            vertex(ring + 1, side),
+            vertex(ring + 1, side + 1),
+            vertex(ring, side + 1),
+        ];
+        face.dedup();
+        if face.first() == face.last() {
+            face.pop();
+        }
+        surface.faces.push(face);
+    }
+    surface
+}
+
+fn foot() -> Surface {
+    turned_body(&[[0.0, 0.0], [0.018, 0.0], [0.018, 0.0], [0.03, 0.1], [0.0, 0.1]], 10)
+}
+
+/// A leg of a table, 1 high, to be scaled.
+fn leg() -> Surface {
+    turned_body(&[[0.0, 0.0], [0.016, 0.0], [0.016, 0.0], [0.026, 1.0], [0.026, 1.0], [0.0, 1.0]], 12)
+}
+
+/// A round plate of glass, radius 0.5, with a soft edge.
+fn plate() -> Surface {
+    let outline =
+        [[0.0, 0.0], [0.494, 0.0], [0.498, 0.002], [0.5, 0.006], [0.498, 0.01], [0.494, 0.012], [0.0, 0.012]];
+    turned_body(&outline, 64)
+}
+
+/// A shelf of 1.2 by 2.0, 0.3 deep, with four boards between its sides.
+fn shelf() -> Surface {
+    let side = |x: f64| block([x, 0.0, -0.15], [x + 0.03, 2.0, 0.15], 0.003);
+    let boards = (0..5).map(|index| {
+        let y = 0.06 + 0.47 * f64::from(index);
+        block([-0.57, y, -0.148], [0.57, y + 0.028, 0.145], 0.003)
+    });
+    join(
+        [side(-0.6), side(0.57), block([-0.57, 0.05, -0.15], [0.57, 1.98, -0.14], 0.002)]
+            .into_iter()
+            .chain(boards),
+    )
+}
+
+/// The cover of a book of 1 by 1 by 1, to be scaled; its back is at +z.
+fn cover() -> Surface {
+    join([
+        block([-0.5, 0.0, -0.5], [-0.42, 1.0, 0.5], 0.01),
+        block([0.42, 0.0, -0.5], [0.5, 1.0, 0.5], 0.01),
+        block([-0.43, 0.0, 0.44], [0.43, 1.0, 0.5], 0.01),
+    ])
+}
+
+/// What is in that cover.
+fn pages() -> Surface {
+    block([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
+}
+
+/// A wooden chair of 0.44 by 0.92 by 0.46.
+fn chair() -> Surface {
+    let post = |x: f64| bar(&[[x, 0.0, -0.26], [x, 0.45, -0.2], [x, 0.92, -0.26]], 0.018, 8);
+    let rung = |from: Vector, to: Vector| bar(&[from, to], 0.01, 6);
+    let slat = |y: f64, z: f64| block([-0.2, y, z - 0.01], [0.2, y + 0.07, z + 0.01], 0.004);
+    join([
+        block([-0.22, 0.44, -0.22], [0.22, 0.475, 0.23], 0.01),
+        bar(&[[-0.19, 0.0, 0.19], [-0.19, 0.45, 0.19]], 0.018, 8),
+        bar(&[[0.19, 0.0, 0.19], [0.19, 0.45, 0.19]], 0.018, 8),
+        post(-0.19),
+        post(0.19),
+        rung([-0.19, 0.2, 0.19], [-0.19, 0.2, -0.22]),
+        rung([0.19, 0.2, 0.19], [0.19, 0.2, -0.22]),
+        rung([-0.19, 0.25, 0.0], [0.19, 0.25, 0.0]),
+        slat(0.6, -0.22),
+        slat(0.72, -0.235),
+        slat(0.84, -0.25),
+    ])
+}
+
+/// A lamp's stand on the floor, 1.5 high.
+fn stand() -> Surface {
+    let outline = [
+        [0.0, 0.0],
+        [0.14, 0.0],
+        [0.14, 0.0],
+        [0.14, 0.015],
+        [0.02, 0.03],
+        [0.011, 0.05],
+        [0.011, 1.5],
+        [0.0, 1.5],
+    ];
+    turned_body(&outline, 24)
+}
+
+/// A cone of cloth, open at both ends, 0.26 high.
+fn shade() -> Surface {
+    let outline = [
+        [0.22, 0.0],
+        [0.22, 0.0],
+        [0.14, 0.26],
+        [0.14, 0.26],
+        [0.137, 0.26],
+        [0.137, 0.26],
+        [0.217, 0.0],
+        [0.217, 0.0],
+        [0.22, 0.0],
+    ];
+    turned_body(&outline, 32)
+}
+
+/// A hollow bottle of glass with a round belly, 0.27 high.
+fn decanter() -> Surface {
+    let outside = [
+        [0.0, 0.0],
+        [0.07, 0.0],
+        [0.085, 0.008],
+        [0.095, 0.03],
+        [0.095, 0.06],
+        [0.08, 0.1],
+        [0.05, 0.135],
+        [0.028, 0.165],
+        [0.023, 0.2],
+        [0.025, 0.235],
+        [0.036, 0.262],
+        [0.034, 0.27],
+    ];
+    let inside = [
+        [0.03, 0.262],
+        [0.02, 0.235],
+        [0.018, 0.2],
+        [0.023, 0.166],
+        [0.044, 0.132],
+        [0.074, 0.097],
+        [0.089, 0.06],
+        [0.089, 0.032],
+        [0.078, 0.016],
+        [0.06, 0.012],
+        [0.0, 0.014],
+    ];
+    turned_body(&[&outside[..], &inside[..]].concat(), 40)
+}
+
+/// A glass to drink from, 0.095 high.
+fn tumbler() -> Surface {
+    let outside = [[0.0, 0.0], [0.03, 0.0], [0.034, 0.004], [0.036, 0.02], [0.04, 0.092], [0.039, 0.095]];
+    let inside = [[0.0375, 0.092], [0.0335, 0.024], [0.03, 0.016], [0.0, 0.014]];
+    turned_body(&[&outside[..], &inside[..]].concat(), 32)
+}
+
+/// A wide bowl, 0.09 high.
+fn bowl() -> Surface {
+    let outside =
+        [[0.0, 0.0], [0.05, 0.0], [0.05, 0.0], [0.055, 0.01], [0.11, 0.04], [0.145, 0.085], [0.142, 0.09]];
+    let inside = [[0.137, 0.085], [0.104, 0.044], [0.05, 0.018], [0.0, 0.014]];
+    turned_body(&[&outside[..], &inside[..]].concat(), 32)
+}
+
+/// A pot with earth in it.
+fn pot() -> Surface {
+    let outline = [
+        [0.0, 0.0],
+        [0.12, 0.0],
+        [0.12, 0.0],
+        [0.17, 0.3],
+        [0.17, 0.3],
+        [0.155, 0.3],
+        [0.155, 0.3],
+        [0.15, 0.26],
+        [0.15, 0.26],
+        [0.0, 0.27],
+    ];
+    turned_body(&outline, 28)
+}
+
+/// A leaf of 1 along z, bent down, that has two sides.
+fn leaf() -> Surface {
+    let steps = 8;
+    let place = |step: u32, across: f64| {
+        let along = f64::from(step) / f64::from(steps);
+        let half = 0.16 * (4.0 * along * (1.0 - along)).max(0.0).sqrt() * (1.0 - 0.35 * along);
+        [half * across, 0.75 * along - 0.62 * along * along + 0.05 * across.abs(), along]
+    };
+    let mut surface = Surface::default();
+    for step in 0..=steps {
+        surface.positions.extend([-1.0, 0.0, 1.0].map(|across| place(step, across)));
+    }
+    for step in 0..steps {
+        let base = 3 * step;
+        for column in 0..2 {
+            surface.faces.push(vec![base + column, base + column + 3, base + column + 4, base + column + 1]);
+        }
+    }
+    surface
+}
+
+/// Cloth in folds, 0.5 wide and 1 high, in the plane z = 0.
+fn curtain() -> Surface {
+    let columns = 48;
+    let mut surface = Surface::default();
+    for column in 0..=columns {
+        let along = f64::from(column) / f64::from(columns);
+        let (fold, _) = turn(6.0 * along);
+        let (uneven, _) = turn(1.7 * along + 0.1);
+        for (height, depth) in [(0.0, 0.04), (0.5, 0.034), (1.0, 0.022)] {
+            surface.positions.push([0.5 * along, height, depth * (fold + 0.4 * uneven)]);
+        }
+    }
+    for column in 0..columns {
+        for row in 0..2 {
+            let base = 3 * column + row;
+            surface.faces.push(vec![base, base + 3, base + 4, base + 1]);
+        }
+    }
+    surface
+}
+
+/// The frame of a window of 1.8 by 1.6 with two bars, around the middle of its sill.
+fn window() -> Surface {
+    let upright = |x: f64, half: f64| block([x - half, 0.0, -0.04], [x + half, 1.6, 0.04], 0.006);
+    join([
+        upright(-0.87, 0.03),
+        upright(0.87, 0.03),
+        upright(0.0, 0.025),
+        block([-0.9, 0.0, -0.04], [0.9, 0.06, 0.04], 0.006),
+        block([-0.9, 1.54, -0.04], [0.9, 1.6, 0.04], 0.006),
+        block([-0.9, 1.05, -0.025], [0.9, 1.09, 0.025], 0.006),
+        block([-0.96, -0.04, -0.04], [0.96, 0.0, 0.16], 0.01),
+    ])
+}
+
+/// The frame of a picture of 1 by 1 before a wall that faces +z.
+fn frame() -> Surface {
+    let (inside, outside) = (0.5, 0.55);
+    join([
+        block([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.008),
+        block([-outside, inside, 0.0], [outside, outside, 0.03], 0.008),
+        block([-outside, -inside, 0.0], [-inside, inside, 0.03], 0.008),
+        block([inside, -inside, 0.0], [outside, inside, 0.03], 0.008),
+    ])
+}
+
+/// A door of 0.9 by 2.05 with panels on both sides; its hinges are at the origin.
+fn door() -> Surface {
+    let panel = |x: f64, y: f64, height: f64| block([x, y, -0.005], [x + 0.3, y + height, 0.045], 0.012);
+    let knob = |z: f64| ball(2, [0.83, 1.02, z], 0.028);
+    join([
+        block([0.0, 0.0, 0.0], [0.9, 2.05, 0.04], 0.004),
+        panel(0.1, 0.15, 0.7),
+        panel(0.5, 0.15, 0.7),
+        panel(0.1, 1.05, 0.85),
+        panel(0.5, 1.05, 0.85),
+        knob(0.08),
+        knob(-0.04),
+        bar(&[[0.83, 1.02, -0.04], [0.83, 1.02, 0.08]], 0.01, 8),
+    ])
+}
+
+/// The frame around that door, in a wall of 0.12 behind the origin.
+fn jamb() -> Surface {
+    join([
+        block([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
+        block([0.9, 0.0, -0.14], [0.99, 2.06, 0.02], 0.006),
+        block([-0.09, 2.05, -0.14], [0.99, 2.15, 0.025], 0.006),
+    ])
+}
+
+/// A bed of 1.0 by 2.0 without its cushions; its head is at −z.
+fn bed() -> Surface {
+    let post =
+        |x: f64, z: f64, height: f64| block([x - 0.03, 0.0, z - 0.03], [x + 0.03, height, z + 0.03], 0.008);
+    join([
+        post(-0.5, -1.0, 0.95),
+        post(0.5, -1.0, 0.95),
+        post(-0.5, 1.0, 0.5),
+        post(0.5, 1.0, 0.5),
+        block([-0.47, 0.35, -1.02], [0.47, 0.88, -0.98], 0.008),
+        block([-0.47, 0.25, 0.98], [0.47, 0.45, 1.02], 0.008),
+        block([-0.52, 0.24, -0.97], [-0.48, 0.34, 0.97], 0.006),
+        block([0.48, 0.24, -0.97], [0.52, 0.34, 0.97], 0.006),
+        moved(block([-0.48, 0.0, -0.97], [0.48, 0.2, 0.97], 0.05), [0.0, 0.3, 0.0]),
+    ])
+}

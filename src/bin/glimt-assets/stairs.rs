@@ -1,0 +1,248 @@
+//! What the stair hall of `scenes/stairs.toml` is made of. Metres; treads and balusters stand at the origin and are placed by the
+//! scene, flights and rails lie where they belong.
+
+use super::parts::{ball, bar, block, hexahedron, join, moved, turned_body};
+use super::surface::Surface;
+use super::vector::{Vector, add, turn};
+
+/// Height and depth of a step, and the width of a flight.
+const RISE: f64 = 0.17;
+const GO: f64 = 0.28;
+const WIDTH: f64 = 1.1;
+
+/// The open corner where the first flight begins, and its corner at the landing.
+const FOOT: Vector = [-1.9, 0.0, 1.14];
+const LANDING: Vector = [-1.9, 1.53, -1.1];
+/// Where the second flight ends.
+const GALLERY: Vector = [0.62, 3.23, -1.1];
+const LEFT_WALL: f64 = -3.0;
+const RIGHT_WALL: f64 = 3.0;
+const BACK_WALL: f64 = -2.2;
+const TREAD: f64 = 0.035;
+
+/// Each part and its file.
+pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
+    vec![
+        ("stairs/tread.ply", tread()),
+        ("stairs/flight1.ply", first_flight()),
+        ("stairs/flight2.ply", second_flight()),
+        ("stairs/gallery.ply", gallery()),
+        ("stairs/baluster.ply", baluster()),
+        ("stairs/newel.ply", newel()),
+        ("stairs/rail1.ply", rail(FOOT, LANDING)),
+        ("stairs/rail2.ply", rail(LANDING, GALLERY)),
+        ("stairs/rail3.ply", rail(GALLERY, [RIGHT_WALL, GALLERY[1], GALLERY[2]])),
+        ("stairs/candle.ply", candle()),
+        ("stairs/bowl.ply", bowl()),
+        ("stairs/shade.ply", shade()),
+        ("stairs/stand.ply", stand()),
+        ("stairs/chandelier.ply", chandelier()),
+        ("stairs/door.ply", door()),
+        ("stairs/frame.ply", frame()),
+        ("stairs/console.ply", console()),
+    ]
+}
+
+/// A board; its nosing looks towards +z, its end over the open side of the flight.
+fn tread() -> Surface {
+    block([0.0, -TREAD, -GO], [WIDTH + 0.03, 0.0, 0.03], 0.008)
+}
+
+/// Steps up to the landing with the landing itself, closed down to the floor.
+fn first_flight() -> Surface {
+    let step = |index: u32| {
+        let (front, top) = (FOOT[2] - f64::from(index) * GO, f64::from(index + 1) * RISE - TREAD);
+        upright_block([LEFT_WALL, 0.0, front - GO], [FOOT[0], top, front])
+    };
+    let landing = upright_block([LEFT_WALL, 0.0, BACK_WALL], [LANDING[0], LANDING[1], LANDING[2]]);
+    join((0..8).map(step).chain([landing]))
+}
+
+/// Steps from the landing to the gallery, with a sloping soffit.
+fn second_flight() -> Surface {
+    let soffit = |x: f64| LANDING[1] - 0.14 + (x - LANDING[0]) * RISE / GO;
+    join((0..9).map(|index| {
+        let (from, to) = (LANDING[0] + f64::from(index) * GO, LANDING[0] + f64::from(index + 1) * GO);
+        let top = LANDING[1] + f64::from(index + 1) * RISE - TREAD;
+        let corner = |x: f64, y: f64, z: f64| [x, y, z];
+        let (far, near) = (BACK_WALL, LANDING[2]);
+        let (low, high) = (soffit(from), soffit(to));
+        hexahedron([
+            corner(from, low, far),
+            corner(to, high, far),
+            corner(to, high, near),
+            corner(from, low, near),
+            corner(from, top, far),
+            corner(to, top, far),
+            corner(to, top, near),
+            corner(from, top, near),
+        ])
+    }))
+}
+
+/// The floor at the top, with a moulding along its edge.
+fn gallery() -> Surface {
+    let [x, y, z] = GALLERY;
+    join([
+        block([x, y - 0.25, BACK_WALL], [RIGHT_WALL, y, z], 0.004),
+        block([x, y - 0.035, z], [RIGHT_WALL, y, z + 0.03], 0.008),
+        block([x, y - 0.25, z], [RIGHT_WALL, y - 0.2, z + 0.02], 0.006),
+    ])
+}
+
+/// A block with sharp edges.
+fn upright_block(from: Vector, to: Vector) -> Surface {
+    let corner = |x: Vector, y: Vector, z: Vector| [x[0], y[1], z[2]];
+    let floor = |y| [corner(from, y, from), corner(to, y, from), corner(to, y, to), corner(from, y, to)];
+    let [a, b, c, d] = floor(from);
+    let [e, f, g, h] = floor(to);
+    hexahedron([a, b, c, d, e, f, g, h])
+}
+
+/// A turned post of 1.05, its foot to be sunk into the tread.
+fn baluster() -> Surface {
+    let outline = [
+        [0.0, 0.0],
+        [0.02, 0.0],
+        [0.02, 0.2],
+        [0.02, 0.2],
+        [0.026, 0.22],
+        [0.016, 0.25],
+        [0.021, 0.33],
+        [0.022, 0.4],
+        [0.013, 0.62],
+        [0.012, 0.78],
+        [0.02, 0.8],
+        [0.014, 0.83],
+        [0.014, 1.05],
+        [0.0, 1.05],
+    ];
+    turned_body(&outline, 8)
+}
+
+/// A square post with a ball.
+fn newel() -> Surface {
+    join([
+        block([-0.05, 0.0, -0.05], [0.05, 1.12, 0.05], 0.008),
+        block([-0.065, 1.12, -0.065], [0.065, 1.16, 0.065], 0.012),
+        ball(2, [0.0, 1.205, 0.0], 0.055),
+    ])
+}
+
+/// The handrail along the open side of a flight, above the nosings and a little inside.
+fn rail(from: Vector, to: Vector) -> Surface {
+    let above = if from[0] == to[0] { [-0.05, 1.0, 0.0] } else { [0.0, 1.0, -0.05] };
+    bar(&[add(from, above), add(to, above)], 0.032, 12)
+}
+
+/// A bulb in the shape of a flame, 0.1 high.
+fn candle() -> Surface {
+    let outline =
+        [[0.0, 0.0], [0.012, 0.004], [0.02, 0.02], [0.022, 0.036], [0.016, 0.058], [0.007, 0.08], [0.0, 0.1]];
+    turned_body(&outline, 8)
+}
+
+/// A bowl on a wall, open above, of some thickness.
+fn bowl() -> Surface {
+    let outer = [[0.0, -0.09], [0.05, -0.085], [0.09, -0.06], [0.12, -0.02], [0.135, 0.03], [0.135, 0.03]];
+    let inner =
+        [[0.128, 0.03], [0.128, 0.03], [0.113, -0.018], [0.085, -0.055], [0.047, -0.078], [0.0, -0.082]];
+    turned_body(&[outer, inner].concat(), 24)
+}
+
+/// A cone of cloth, open at both ends.
+fn shade() -> Surface {
+    let outline = [
+        [0.14, 0.0],
+        [0.14, 0.0],
+        [0.09, 0.2],
+        [0.09, 0.2],
+        [0.088, 0.2],
+        [0.088, 0.2],
+        [0.138, 0.0],
+        [0.138, 0.0],
+        [0.14, 0.0],
+    ];
+    turned_body(&outline, 24)
+}
+
+/// The foot of a lamp on a table.
+fn stand() -> Surface {
+    let outline = [
+        [0.0, 0.0],
+        [0.07, 0.0],
+        [0.07, 0.012],
+        [0.03, 0.02],
+        [0.015, 0.04],
+        [0.04, 0.09],
+        [0.055, 0.14],
+        [0.04, 0.2],
+        [0.012, 0.24],
+        [0.008, 0.3],
+        [0.0, 0.3],
+    ];
+    turned_body(&outline, 20)
+}
+
+/// A ring of five arms under a rod, without its bulbs.
+fn chandelier() -> Surface {
+    let rod = bar(&[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.012, 8);
+    let hub =
+        turned_body(&[[0.0, -0.08], [0.03, -0.06], [0.05, 0.0], [0.03, 0.06], [0.012, 0.1], [0.0, 0.1]], 16);
+    let arm = |index: u32| {
+        let (sin, cos) = turn(f64::from(index) / 5.0);
+        let path: Vec<Vector> = (0..=10)
+            .map(|step| {
+                let along = f64::from(step) / 10.0;
+                let (bend, _) = turn(0.5 * along);
+                [0.42 * along * cos, 0.06 * along - 0.12 * bend, 0.42 * along * sin]
+            })
+            .collect();
+        let holder =
+            [[0.0, 0.05], [0.02, 0.05], [0.05, 0.07], [0.05, 0.075], [0.02, 0.08], [0.02, 0.12], [0.0, 0.12]];
+        join([bar(&path, 0.01, 6), moved(turned_body(&holder, 12), [0.42 * cos, 0.0, 0.42 * sin])])
+    };
+    join([rod, hub].into_iter().chain((0..5).map(arm)))
+}
+
+/// A door of 0.9 by 2.05 with four panels, in its frame, before a wall that faces +z.
+fn door() -> Surface {
+    let panel = |x: f64, y: f64, height: f64| block([x, y, 0.0], [x + 0.3, y + height, 0.035], 0.015);
+    join([
+        block([-0.45, 0.0, 0.0], [0.45, 2.05, 0.02], 0.004),
+        panel(-0.36, 0.15, 0.7),
+        panel(0.06, 0.15, 0.7),
+        panel(-0.36, 1.02, 0.85),
+        panel(0.06, 1.02, 0.85),
+        block([-0.57, 0.0, 0.0], [-0.45, 2.05, 0.06], 0.01),
+        block([0.45, 0.0, 0.0], [0.57, 2.05, 0.06], 0.01),
+        block([-0.6, 2.05, 0.0], [0.6, 2.18, 0.07], 0.01),
+    ])
+}
+
+/// The frame of a picture of 1 by 1 before a wall that faces +z.
+fn frame() -> Surface {
+    let (inside, outside) = (0.5, 0.57);
+    join([
+        block([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.01),
+        block([-outside, inside, 0.0], [outside, outside, 0.03], 0.01),
+        block([-outside, -inside, 0.0], [-inside, inside, 0.03], 0.01),
+        block([inside, -inside, 0.0], [outside, inside, 0.03], 0.01),
+    ])
+}
+
+/// A narrow table of 1.1 by 0.36, 0.78 high.
+fn console() -> Surface {
+    let leg = |x: f64, z: f64| {
+        let outline = [[0.0, 0.0], [0.015, 0.0], [0.02, 0.3], [0.024, 0.6], [0.024, 0.7], [0.0, 0.7]];
+        moved(turned_body(&outline, 10), [x, 0.0, z])
+    };
+    join([
+        block([-0.55, 0.75, -0.18], [0.55, 0.78, 0.18], 0.008),
+        block([-0.5, 0.65, -0.14], [0.5, 0.75, 0.14], 0.004),
+        leg(-0.47, -0.11),
+        leg(0.47, -0.11),
+        leg(-0.47, 0.11),
+        leg(0.47, 0.11),
+    ])
+}

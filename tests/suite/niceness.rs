@@ -1,0 +1,82 @@
+//! How far render threads give way to other programs, as the system tells it (proc(5)).
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::{Command as Process, Stdio};
+use std::time::{Duration, Instant};
+
+use super::desk::{Desk, SCENE};
+
+/// Nothing takes this long, on however busy a machine.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// Name and nice value of a thread, by its line in /proc.
+fn of_thread(stat: &str) -> Option<(String, i32)> {
+    let (name, after) = stat.split_once('(')?.1.rsplit_once(')')?;
+    // The state, which stands behind the name, is the third of the fields; the nice value is the 19th.
+    Some((name.to_owned(), after.split_whitespace().nth(16)?.parse().ok()?))
+}
+
+/// The nice value that programs get from this one.
+fn own() -> i32 {
+    let stat = fs::read_to_string("/proc/thread-self/stat").expect("of this thread");
+    of_thread(&stat).expect("a nice value").1
+}
+
+/// `own` raised by this much, as far as it goes.
+pub(crate) fn raised(steps: i32) -> i32 {
+    (own() + steps).min(19)
+}
+
+/// The nice values of a program's render threads.
+pub(crate) fn of_render_threads(id: u32) -> Vec<i32> {
+    let tasks = fs::read_dir(format!("/proc/{id}/task")).expect("its threads");
+    let stats = tasks.filter_map(|task| fs::read_to_string(task.ok()?.path().join("stat")).ok());
+    let is_render = |name: &str| name.strip_prefix("glimt-").is_some_and(|rest| rest.parse::<u32>().is_ok());
+    stats
+        .filter_map(|stat| of_thread(&stat))
+        .filter(|(name, _)| is_render(name))
+        .map(|(_, nice)| nice)
+        .collect()
+}
+
+/// The different nice values of two or more render threads at work: of a program that says `sign` on stderr once it renders.
+fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
+    let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");
+    let mut said = BufReader::new(child.stderr.take().expect("stderr"));
+    let mut line = String::new();
+    while !line.contains(sign) {
+        line.clear();
+        assert!(said.read_line(&mut line).expect("a line") > 0, "it ended early");
+    }
+    let deadline = Instant::now() + LIMIT;
+    let mut found = of_render_threads(child.id());
+    while found.len() < 2 && Instant::now() < deadline {
+        std::thread::sleep(Duration::from_millis(5));
+        found = of_render_threads(child.id());
+    }
+    child.kill().expect("killed");
+    child.wait().expect("it ends");
+    assert!(found.len() >= 2, "{found:?}");
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+#[test]
+fn once_and_bench_give_way_to_nobody_unless_they_are_asked_to() {
+    let desk = Desk::new();
+    // As many samples as it never gets to.
+    desk.write("long.toml", SCENE.replace("samples = 2", "samples = 4000000000"));
+    let calls = [
+        ("long.toml --once --threads 2 --progress json", "\"event\":\"progress\""),
+        (
+            "bench ball.toml --threads 2 --reference-samples 4000000000 --no-cache --progress json",
+            "reference 1 of 2",
+        ),
+    ];
+    for (call, sign) in calls {
+        assert_eq!(of_program(desk.glimt(call), sign), [raised(0)], "{call}");
+        assert_eq!(of_program(desk.glimt(&format!("{call} --nice 7")), sign), [raised(7)], "{call} --nice 7");
+    }
+}
