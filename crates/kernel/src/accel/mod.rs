@@ -12,6 +12,8 @@ pub mod wide_bvh;
 mod pathological;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod watertight_rows_tests;
 
 pub use along::{Cell, Stretch};
 pub use bvh::{AnyTest, Bvh, ClosestTest};
