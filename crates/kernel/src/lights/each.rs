@@ -1,16 +1,34 @@
 //! Samples of lights that each point of a row picked for itself.
 
 use super::emitter::{Arrival, Emitter};
-use super::row::row_of;
+use super::mesh::{Facets, Sampling};
+use super::rectangle::QuadEmitter;
+use super::row::{row_of, row_of_facets};
 use super::sphere::SphereEmitter;
 use super::{AreaLight, Light, LightRow, Lights, PointLight, Source};
 use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
+/// The row of samples of convex emitters, one and its light for each lane.
+macro_rules! row_of_wholes {
+    ($i:ident => $all:expr, $points:expr, $u:expr) => {{
+        let mut row = row_of!(Source::Nothing, $i => {
+            let (emitter, light) = $all[$i];
+            let Arrival { direction, target, factor } =
+                emitter.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
+            (direction, target, light.radiance * factor)
+        });
+        for $i in 0..LANES {
+            row.sources.set($i, Source::Object($all[$i].1.object));
+        }
+        row
+    }};
+}
+
 impl Lights {
     /// [`Light::sample`] of a light of its own for each point whose bit is set, by numbers of its own; one over the densities
-    /// in sr⁻¹, as [`Light::inverse_densities`]; and how many texture look-ups that took. Side by side where all are points, or balls.
+    /// in sr⁻¹, as [`Light::inverse_densities`]; and how many texture look-ups that took.
     #[inline(always)]
     pub fn sample_each(
         &self,
@@ -23,26 +41,42 @@ impl Lights {
         for i in 1..LANES {
             lights[i] = self.get(picked[i]);
         }
-        let mut row = if let Some(lights) = all(&lights, point) {
-            row_of!(Source::Nothing, i => {
-                let (direction, weight) = lights[i].arriving(lane(points, i));
-                (direction, lights[i].position.as_vec3(), weight)
-            })
-        } else if let Some(balls) = all(&lights, ball) {
-            let mut row = row_of!(Source::Nothing, i => {
-                let (ball, light) = balls[i];
-                let Arrival { direction, target, factor } = ball.sample(lane(points, i), [u[0][i], u[1][i]]);
-                (direction, target, light.radiance * factor)
-            });
-            for i in 0..LANES {
-                row.sources.set(i, Source::Object(balls[i].1.object));
-            }
-            row
-        } else {
-            let sample =
-                |i: usize, point| lights[i].plain_sample(point, lane(normals, i), [u[0][i], u[1][i]]);
-            LightRow::one_by_one(points, used, sample)
-        };
+        let mut row = LightRow::dark(Source::Nothing);
+        let mut left = used;
+        // Sample the lights of each kind side by side; lanes of other kinds look at one of these as well, which counts nothing.
+        while left != 0 {
+            let first = left.trailing_zeros() as usize % LANES;
+            let mut of = 0;
+            let found = if let Some(filler) = point(lights[first]) {
+                let lights = alike((&lights, left), &mut of, point, filler);
+                row_of!(Source::Nothing, i => {
+                    let (direction, weight) = lights[i].arriving(lane(points, i));
+                    (direction, lights[i].position.as_vec3(), weight)
+                })
+            } else if let Some(filler) = ball(lights[first]) {
+                let balls = alike((&lights, left), &mut of, ball, filler);
+                row_of_wholes!(i => balls, points, u)
+            } else if let Some(filler) = quad(lights[first]) {
+                let quads = alike((&lights, left), &mut of, quad, filler);
+                let mut row = row_of_wholes!(i => quads, points, u);
+                for i in 0..LANES {
+                    if let Some((_, Some(two))) = quads[i].1.quad() {
+                        row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
+                    }
+                }
+                row
+            } else if let Some(filler) = facets(lights[first]) {
+                let all = alike((&lights, left), &mut of, facets, filler);
+                row_of_facets!(i => (all[i].0, all[i].1), points, u)
+            } else {
+                of = 1 << first;
+                let sample =
+                    |i: usize, point| lights[i].plain_sample(point, lane(normals, i), [u[0][i], u[1][i]]);
+                LightRow::one_by_one(points, of, sample)
+            };
+            row.take_lanes(of, &found);
+            left &= !of;
+        }
         let mut inverse = [0.0; LANES];
         for i in 0..LANES {
             inverse[i] = lights[i].inverse_density(lane(&row.directions, i), lane(&row.weights, i));
@@ -71,32 +105,62 @@ fn point(light: &Light) -> Option<&PointLight> {
 
 #[inline(always)]
 fn ball(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
-    let Light::Area(light) = light else { return None };
+    let light = area(light)?;
+    if let Emitter::Sphere(ball) = &light.shape { Some((ball, light)) } else { None }
+}
+
+#[inline(always)]
+fn quad(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
+    let light = area(light)?;
+    light.quad().map(|(quad, _)| (quad, light))
+}
+
+#[inline(always)]
+fn facets(light: &Light) -> Option<(&Facets, &AreaLight)> {
+    let light = area(light)?;
+    if let Some(Sampling::Area(facets)) = sampling(light) { Some((facets, light)) } else { None }
+}
+
+#[inline(always)]
+fn area(light: &Light) -> Option<&AreaLight> {
+    match light {
+        Light::Area(light) => Some(light),
+        Light::Point(_) | Light::Spot(_) | Light::Directional(_) | Light::Environment(_) => None,
+    }
+}
+
+#[inline(always)]
+fn sampling(light: &AreaLight) -> Option<&Sampling> {
     match &light.shape {
-        Emitter::Sphere(ball) => Some((ball, light)),
-        Emitter::Quad(_)
+        Emitter::Mesh(mesh) => Some(mesh.sampling()),
+        Emitter::Sphere(_)
+        | Emitter::Quad(_)
         | Emitter::Picture(_)
         | Emitter::Box(_)
         | Emitter::Triangle(_)
         | Emitter::Disk(_)
         | Emitter::Cylinder(_)
         | Emitter::Cone(_)
-        | Emitter::Torus(_)
-        | Emitter::Mesh(_) => None,
+        | Emitter::Torus(_) => None,
     }
 }
 
-/// What all lights are, if they are.
+/// The lights of one kind, and a bit of `left` for each lane that has one; the others get the filler.
 #[inline(always)]
-fn all<'a, T: Copy>(
-    lights: &[&'a Light; LANES],
+fn alike<'a, T: Copy>(
+    (lights, left): (&[&'a Light; LANES], u32),
+    of: &mut u32,
     kind: impl Fn(&'a Light) -> Option<T>,
-) -> Option<[T; LANES]> {
-    let mut all = [kind(lights[0])?; LANES];
-    for i in 1..LANES {
-        all[i] = kind(lights[i])?;
+    filler: T,
+) -> [T; LANES] {
+    let mut all = [filler; LANES];
+    for i in 0..LANES {
+        if let Some(own) = kind(lights[i]) {
+            all[i] = own;
+            *of |= left & 1 << i;
+        }
     }
-    Some(all)
+    all
 }
 
 impl Light {

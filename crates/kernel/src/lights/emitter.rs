@@ -2,7 +2,7 @@
 
 use super::cuboid::BoxEmitter;
 use super::disk::DiskEmitter;
-use super::mesh::MeshEmitter;
+use super::mesh::{MeshEmitter, QuadOfTwo, Sampling};
 use super::pattern::Pattern;
 use super::picture::PictureEmitter;
 use super::rectangle::QuadEmitter;
@@ -122,6 +122,26 @@ impl AreaLight {
             }
         }
         Self { pattern: Some(Box::new(pattern)), ..self }
+    }
+
+    /// The quad that its points are chosen on, and the two triangles that this is made of, if it is.
+    #[inline(always)]
+    pub fn quad(&self) -> Option<(&QuadEmitter, Option<&QuadOfTwo>)> {
+        match &self.shape {
+            Emitter::Quad(quad) => Some((quad, None)),
+            Emitter::Mesh(mesh) => match mesh.sampling() {
+                Sampling::Quad(two) => Some((two.quad(), Some(two))),
+                Sampling::Area(_) | Sampling::Tree(_) => None,
+            },
+            Emitter::Sphere(_)
+            | Emitter::Picture(_)
+            | Emitter::Box(_)
+            | Emitter::Triangle(_)
+            | Emitter::Disk(_)
+            | Emitter::Cylinder(_)
+            | Emitter::Cone(_)
+            | Emitter::Torus(_) => None,
+        }
     }
 
     /// [`Light::sample`](super::Light::sample).

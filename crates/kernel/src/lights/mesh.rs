@@ -1,5 +1,7 @@
-//! Emissive triangles of a mesh: few by area, many by a tree over them.
+//! Emissive triangles of a mesh: two that make a parallelogram as a quad is, few others by area, many by a tree over them.
 
+use super::emitter::Arrival;
+use super::rectangle::QuadEmitter;
 use super::tree::{LightBounds, LightTree, MOST_WITHOUT, Receiver};
 use super::triangle::TriangleEmitter;
 use super::{End, LightSample, Met, Source};
@@ -20,8 +22,48 @@ pub struct MeshEmitter {
     center: DVec3,
     /// Where the triangles are and what they send, for a unit of radiance.
     bounds: LightBounds,
-    /// Over the triangles, where they are many.
-    tree: Option<LightTree>,
+    sampling: Sampling,
+}
+
+/// How points of a mesh are chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sampling {
+    /// As those of a quad.
+    Quad(Box<QuadOfTwo>),
+    /// Uniform over the area.
+    Area(Facets),
+    /// A triangle by a tree over all, and a point by what is seen of it.
+    Tree(LightTree),
+}
+
+/// A parallelogram of two triangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuadOfTwo {
+    quad: QuadEmitter,
+    /// An offset from the corner times this is below 1 on the triangle at the corner, above on the other.
+    across: Vec3,
+    /// The numbers of the two triangles in the object.
+    primitives: [u32; 2],
+}
+
+/// Triangles that are sampled by area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facets {
+    all: Vec<Facet>,
+    by_area: Discrete,
+    area: f32,
+}
+
+/// A triangle with its front along `ab` × `ac`.
+#[derive(Clone, Debug, PartialEq)]
+struct Facet {
+    corner: DVec3,
+    ab: Vec3,
+    ac: Vec3,
+    /// Unit normal of the front.
+    normal: Vec3,
+    /// Its number in the object.
+    primitive: u32,
 }
 
 impl MeshEmitter {
@@ -40,7 +82,12 @@ impl MeshEmitter {
         let all: Vec<_> = triangles.iter().map(|(corners, _)| LightBounds::of_triangle(corners)).collect();
         let Some(bounds) = LightBounds::around(all.iter().flatten()) else { return Ok(None) };
         let tree = if all.len() > MOST_WITHOUT { LightTree::new(&all, token)? } else { None };
-        Ok(Some(Self { triangles, by_area, center, bounds, tree }))
+        let sampling = match (tree, QuadOfTwo::of(&triangles)) {
+            (Some(tree), _) => Sampling::Tree(tree),
+            (None, Some(quad)) => Sampling::Quad(Box::new(quad)),
+            (None, None) => Sampling::Area(Facets::new(&triangles, &by_area)),
+        };
+        Ok(Some(Self { triangles, by_area, center, bounds, sampling }))
     }
 
     /// The numbers that its triangles have in their object.
@@ -63,13 +110,21 @@ impl MeshEmitter {
         self.bounds
     }
 
-    /// The tree over its triangles.
-    pub fn tree(&self) -> Option<&LightTree> {
-        self.tree.as_ref()
+    /// How its points are chosen.
+    #[inline(always)]
+    pub fn sampling(&self) -> &Sampling {
+        &self.sampling
     }
 
-    /// For a point of a surface with this normal: uniform over the area of all triangles, or one of them by the tree, and its
-    /// solid angle.
+    /// The tree over its triangles, if they are many.
+    pub fn tree(&self) -> Option<&LightTree> {
+        match &self.sampling {
+            Sampling::Tree(tree) => Some(tree),
+            Sampling::Quad(_) | Sampling::Area(_) => None,
+        }
+    }
+
+    /// A way for its light to arrive at a point of a surface with this normal.
     #[inline(always)]
     pub fn sample(
         &self,
@@ -78,43 +133,38 @@ impl MeshEmitter {
         u: [f32; 2],
         (radiance, object): (Vec3, u32),
     ) -> Option<LightSample> {
-        match &self.tree {
-            Some(tree) => {
+        let (arrival, primitive) = match &self.sampling {
+            Sampling::Quad(quad) => {
+                let arrival = quad.quad.sample(point, u);
+                (arrival, quad.part(point, arrival.target))
+            }
+            Sampling::Area(facets) => {
+                let arrival = facets.sample(point, u);
+                (arrival, facets.part(u[0]))
+            }
+            Sampling::Tree(tree) => {
                 let pick = tree.pick(&Receiver::plain(point, normal), f64::from(u[0]))?;
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
-                let arrival = emitter(corners)?.sample(point, [rest, u[1]]);
-                (arrival.factor > 0.0).then(|| LightSample {
-                    end: End::At(arrival.target),
-                    direction: arrival.direction,
-                    weight: radiance * (arrival.factor / pick.probability),
-                    source: Source::Primitive(object, *primitive),
-                })
+                let Arrival { direction, target, factor } = emitter(corners)?.sample(point, [rest, u[1]]);
+                (Arrival { direction, target, factor: factor / pick.probability }, *primitive)
             }
-            None => self.sample_by_area(point, u, radiance, object),
-        }
-    }
-
-    fn sample_by_area(&self, point: Vec3, u: [f32; 2], radiance: Vec3, object: u32) -> Option<LightSample> {
-        let (index, rest) = self.by_area.sample(u[0]);
-        let ([a, b, c], primitive) = &self.triangles[index];
-        let weights = warp::triangle(Vec2::new(rest, u[1])).as_dvec3();
-        let target = *a * weights.x + *b * weights.y + *c * weights.z;
-        let offset = target - point.as_dvec3();
-        let distance_squared = offset.length_squared();
-        let direction = offset / distance_squared.sqrt();
-        let cosine = -(*b - *a).cross(*c - *a).normalize().dot(direction);
-        (cosine > 0.0).then(|| LightSample {
-            end: End::At(target.as_vec3()),
-            direction: direction.as_vec3(),
-            weight: radiance * (self.by_area.total() * cosine / distance_squared) as f32,
-            source: Source::Primitive(object, *primitive),
+        };
+        (arrival.factor > 0.0).then(|| LightSample {
+            end: End::At(arrival.target),
+            direction: arrival.direction,
+            weight: radiance * arrival.factor,
+            source: Source::Primitive(object, primitive),
         })
     }
 
     /// [`Light::pdf`](super::Light::pdf).
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
-        let Some(tree) = &self.tree else { return met.pdf_by_area(self.by_area.total()) };
+        let tree = match &self.sampling {
+            Sampling::Quad(quad) => return quad.quad.pdf(from, met),
+            Sampling::Area(_) => return met.pdf_by_area(self.by_area.total()),
+            Sampling::Tree(tree) => tree,
+        };
         let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
         let own = index.ok().and_then(|index| Some((index, emitter(&self.triangles[index].0)?)));
         own.map_or(0.0, |(index, own)| {
@@ -131,6 +181,78 @@ impl MeshEmitter {
     /// Centre of area.
     pub fn middle(&self) -> DVec3 {
         self.center
+    }
+}
+
+impl QuadOfTwo {
+    /// How far the fourth corner of a parallelogram may be off, in units of its size.
+    const FLATNESS: f64 = 1e-5;
+
+    /// Two triangles that share an edge and make a parallelogram; `None` of others.
+    fn of(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
+        let [(first, one), (second, two)] = triangles else { return None };
+        let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a);
+        if normal(first).dot(normal(second)) <= 0.0 {
+            return None;
+        }
+        // The corner of the first that the second lacks, and the one that the first lacks.
+        let corner = (0..3).find(|&i| !second.contains(&first[i]))?;
+        let [p, x, y] = [0, 1, 2].map(|i| first[(corner + i) % 3]);
+        let far = second.iter().find(|other| !first.contains(other))?;
+        let (u, v) = (x - p, y - p);
+        let is_shared = second.contains(&x) && second.contains(&y);
+        let is_flat = (p + u + v - far).length() <= Self::FLATNESS * (u.length() + v.length());
+        if !(is_shared && is_flat) {
+            return None;
+        }
+        let quad = QuadEmitter::new(p, u, v);
+        let [along_u, along_v] = quad.along();
+        Some(Self { quad, across: along_u + along_v, primitives: [*one, *two] })
+    }
+
+    /// The parallelogram.
+    #[inline(always)]
+    pub fn quad(&self) -> &QuadEmitter {
+        &self.quad
+    }
+
+    /// The number of the triangle that a target of a sample for a point is on.
+    #[inline(always)]
+    pub fn part(&self, point: Vec3, target: Vec3) -> u32 {
+        let offset = (target - point) - self.quad.corner_from(point);
+        if offset.dot(self.across) < 1.0 { self.primitives[0] } else { self.primitives[1] }
+    }
+}
+
+impl Facets {
+    fn new(triangles: &[([DVec3; 3], u32)], by_area: &Discrete) -> Self {
+        let facet = |&([a, b, c], primitive): &([DVec3; 3], u32)| {
+            let (ab, ac) = (b - a, c - a);
+            let normal = ab.cross(ac).normalize_or_zero().as_vec3();
+            Facet { corner: a, ab: ab.as_vec3(), ac: ac.as_vec3(), normal, primitive }
+        };
+        let all = triangles.iter().map(facet).collect();
+        Self { all, by_area: by_area.clone(), area: by_area.total() as f32 }
+    }
+
+    /// A way for their light to arrive at a point.
+    #[inline(always)]
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let (index, rest) = self.by_area.sample(u[0]);
+        let Facet { corner, ab, ac, normal, .. } = &self.all[index];
+        let weights = warp::triangle(Vec2::new(rest, u[1]));
+        let offset = (*corner - point.as_dvec3()).as_vec3() + *ab * weights.y + *ac * weights.z;
+        let nearness = 1.0 / offset.length_squared().sqrt();
+        let direction = offset * nearness;
+        let factor = -normal.dot(direction) * self.area * (nearness * nearness);
+        let factor = if factor > 0.0 { factor } else { 0.0 };
+        Arrival { direction, target: point + offset, factor }
+    }
+
+    /// The number of the triangle that a sample comes from, by its first random number.
+    #[inline(always)]
+    pub fn part(&self, u: f32) -> u32 {
+        self.all[self.by_area.sample(u).0].primitive
     }
 }
 

@@ -34,7 +34,7 @@ pub use row::{LightRow, SourceRow};
 pub use set::{Lights, Picks, Receivers, Samples, Selection};
 pub use sky::SkyMap;
 pub use spot::SpotLight;
-pub use tree::{Cut, LightBounds, LightTree, Lobe, Pick, Receiver};
+pub use tree::{Cut, LightBounds, LightTree, Lobe, Pick, Receiver, ReceiverRow};
 
 use crate::math::Vec3;
 

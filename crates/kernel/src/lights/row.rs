@@ -2,9 +2,10 @@
 
 use super::emitter::{Arrival, Emitter};
 use super::environment::SkyRow;
+use super::mesh::Sampling;
 use super::{End, Light, LightSample, Source};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane, take, take_u32, truths};
 
 /// Ways for the light of one lamp to arrive at some points: [`LightSample`]s side by side.
 #[derive(Clone, Debug)]
@@ -52,6 +53,16 @@ impl SourceRow {
         self.is_any |= other.is_any;
     }
 
+    /// One of them.
+    #[inline]
+    pub fn source(&self, lane: usize) -> Source {
+        match (self.object[lane], self.part[lane]) {
+            (Self::NONE, _) => Source::Nothing,
+            (object, Self::NONE) => Source::Object(object),
+            (object, part) => Source::Primitive(object, part),
+        }
+    }
+
     /// Of one of them.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, source: Source) {
@@ -97,7 +108,48 @@ macro_rules! row_beyond {
     }};
 }
 
+/// The row of samples of facets, those of one light for each lane.
+macro_rules! row_of_facets {
+    ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
+        let mut row = row_of!(Source::Nothing, $i => {
+            let sample: Arrival = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
+            (sample.direction, sample.target, $light.radiance * sample.factor)
+        });
+        for $i in 0..LANES {
+            let source = Source::Primitive($light.object, $facets.part($u[0][$i]));
+            row.sources.set($i, source);
+        }
+        row
+    }};
+}
+
+pub(super) use row_of_facets;
+
+/// The row of samples of one light where there is no loop for its shape.
+macro_rules! one_by_one {
+    ($light:expr, $points:expr, $normals:expr, $used:expr, $u:expr) => {
+        LightRow::one_by_one($points, $used, |i, point| {
+            $light.plain_sample(point, lane($normals, i), [$u[0][i], $u[1][i]])
+        })
+    };
+}
+
 impl LightRow {
+    /// Take the samples of another row in the lanes whose bits are set.
+    #[inline(always)]
+    pub(super) fn take_lanes(&mut self, bits: u32, other: &Self) {
+        let of = truths(bits);
+        for axis in 0..3 {
+            take(&of, &other.directions[axis], &mut self.directions[axis]);
+            take(&of, &other.targets[axis], &mut self.targets[axis]);
+            take(&of, &other.weights[axis], &mut self.weights[axis]);
+        }
+        take_u32(&of, &other.sources.object, &mut self.sources.object);
+        take_u32(&of, &other.sources.part, &mut self.sources.part);
+        self.sources.is_any |= other.sources.is_any;
+        self.beyond = self.beyond & !bits | other.beyond & bits;
+    }
+
     #[inline(always)]
     pub(super) fn dark(source: Source) -> Self {
         Self {
@@ -172,19 +224,32 @@ impl Light {
                 })
             };
         }
+        // One loop for all quads: of a second one, compilers make no vector instructions.
+        if let Some((quad, of_two)) = light.quad() {
+            let mut row = row_by!(quad);
+            if let Some(two) = of_two {
+                for i in 0..LANES {
+                    row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
+                }
+            }
+            return row;
+        }
         match &light.shape {
-            Emitter::Quad(quad) => row_by!(quad),
             Emitter::Picture(picture) => row_by!(picture),
             Emitter::Sphere(sphere) => row_by!(sphere),
             Emitter::Disk(disk) => row_by!(disk),
             Emitter::Box(cuboid) => row_by!(cuboid),
-            Emitter::Triangle(_)
+            Emitter::Mesh(mesh) => match mesh.sampling() {
+                Sampling::Area(facets) => row_of_facets!(i => (facets, light), points, u),
+                Sampling::Quad(_) | Sampling::Tree(_) => one_by_one!(light, points, normals, used, u),
+            },
+            Emitter::Quad(_)
+            | Emitter::Triangle(_)
             | Emitter::Cylinder(_)
             | Emitter::Cone(_)
-            | Emitter::Torus(_)
-            | Emitter::Mesh(_) => LightRow::one_by_one(points, used, |i, point| {
-                light.plain_sample(point, lane(normals, i), [u[0][i], u[1][i]])
-            }),
+            | Emitter::Torus(_) => {
+                one_by_one!(light, points, normals, used, u)
+            }
         }
     }
 }

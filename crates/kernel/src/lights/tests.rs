@@ -92,6 +92,52 @@ fn rows_hold_the_samples_of_their_points() {
     }
 }
 
+#[test]
+fn lights_that_each_point_picked_give_the_samples_of_each_alone() {
+    let quad = |at: f64| {
+        let corner = |x: f64, y: f64| DVec3::new(at + x, y, 2.0);
+        mesh_light(&[
+            [corner(0.0, 0.0), corner(0.0, 1.0), corner(1.0, 0.0)],
+            [corner(1.0, 1.0), corner(1.0, 0.0), corner(0.0, 1.0)],
+        ])
+    };
+    let facets = mesh_light(&[[DVec3::ZERO, DVec3::Y, DVec3::X], [DVec3::Z, DVec3::X, DVec3::Y]]);
+    let shapes =
+        shapes().into_iter().filter_map(|shape| area_light(&shape, Vec3::new(1.0, 2.0, 0.5), OBJECT));
+    let areas = shapes.chain([quad(0.0), facets, quad(-2.0)]);
+    let all: Vec<Light> = std::iter::once(Light::Point(POINT)).chain(areas.map(Light::Area)).collect();
+    let lights = Lights::new(all.clone(), &CancelToken::new()).expect("nobody cancels");
+    let mut seen = 0;
+    for round in 0..200_u32 {
+        let at = |i: usize, decision| PixelSampler::new(5, round, i as u32, 0).pair(1, decision);
+        let picked: [u32; LANES] =
+            std::array::from_fn(|i| (at(i, Decision::Pick).x * all.len() as f32) as u32);
+        let used = 0xffff & !(round * 37 % 97);
+        let u: [Lanes; 2] = [
+            std::array::from_fn(|i| at(i, Decision::Picked).x),
+            std::array::from_fn(|i| at(i, Decision::Picked).y),
+        ];
+        let points: Lanes3 = std::array::from_fn(|axis| {
+            std::array::from_fn(|i| 6.0 * at(axis * LANES + i, Decision::Lobe).x - 3.0)
+        });
+        let normals: Lanes3 = [[0.0; LANES], [1.0; LANES], [0.0; LANES]];
+        let (row, inverse, _) = lights.sample_each(&picked, (&points, &normals), used, &u);
+        for i in (0..LANES).filter(|i| used & 1 << i != 0) {
+            let light = &all[picked[i] as usize];
+            let alone = light.sample(lane(&points, i), lane(&normals, i), [u[0][i], u[1][i]]);
+            let Some(alone) = alone else {
+                assert_eq!(lane(&row.weights, i), Vec3::ZERO, "{light:?}");
+                continue;
+            };
+            assert_eq!((lane(&row.weights, i), lane(&row.directions, i)), (alone.weight, alone.direction));
+            assert_eq!((End::At(lane(&row.targets, i)), row.sources.source(i)), (alone.end, alone.source));
+            assert_eq!(inverse[i] > 0.0, picked[i] > 0, "a point has no other way to be found");
+            seen += 1;
+        }
+    }
+    assert!(seen > 1000, "{seen}");
+}
+
 fn points() -> [Vec3; 3] {
     [Vec3::new(2.0, 1.5, 3.0), Vec3::new(-3.0, 0.4, 1.0), Vec3::new(0.5, 4.0, -1.5)]
 }
@@ -212,6 +258,117 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
     assert!((light.pdf(Vec3::ZERO, Vec3::Z, &met) - 8.0).abs() < 1e-5);
     assert_eq!(light.pdf(Vec3::ZERO, Vec3::Z, &Met { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
     assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &met), 0.0);
+}
+
+/// A light of these triangles, numbered from 5 on.
+fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
+    let numbered = triangles.iter().copied().zip(5..).collect();
+    let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("nobody cancels").expect("an area");
+    let bounds = mesh.bounds();
+    let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
+    AreaLight { shape, radiance, bounds, pattern: None, object: OBJECT, part: Part::Listed }
+}
+
+#[test]
+fn two_triangles_that_make_a_parallelogram_are_sampled_as_a_quad_is() {
+    let (p, u, v) = (DVec3::new(0.3, -0.2, 0.1), DVec3::X, DVec3::new(0.0, 1.0, -0.5));
+    let quad = Shape::Quad(Parallelogram::new(p, u, v));
+    let quad = area_light(&quad, Vec3::ONE, OBJECT).expect("a light");
+    let far = p + u + v;
+    let (mut parts, mut seen) = ([0; 2], 0);
+    for (first, second) in [
+        ([p, p + u, p + v], [far, p + v, p + u]),
+        ([p + u, p + v, p], [p + u, far, p + v]),
+        ([p + v, p, p + u], [p + v, p + u, far]),
+    ] {
+        let light = mesh_light(&[first, second]);
+        assert!(light.quad().is_some());
+        for sample in 0..400 {
+            let at = |decision| PixelSampler::new(9, 2, 3, sample).pair(1, decision);
+            let (a, b) = (at(Decision::Pick), at(Decision::Picked));
+            let from = Vec3::new(4.0 * a.x - 2.0, 4.0 * a.y - 2.0, 3.0 * b.x);
+            let own = light.sample(from, Vec3::Z, [b.x, b.y]);
+            let expected = quad.sample(from, Vec3::Z, [b.x, b.y]);
+            let (Some(own), Some(expected)) = (own, expected) else {
+                assert_eq!(own.is_some(), expected.is_some());
+                continue;
+            };
+            assert_eq!(
+                (own.direction, own.weight, own.end),
+                (expected.direction, expected.weight, expected.end)
+            );
+            let (Source::Primitive(OBJECT, part), End::At(target)) = (own.source, own.end) else {
+                panic!("a point of a triangle")
+            };
+            let corners = if part == 5 { first } else { second };
+            let triangle = Shape::Triangle(Triangle { a: corners[0], b: corners[1], c: corners[2] });
+            let way = target - from;
+            let inside = triangle.intersect(&Ray::new(from - 0.01 * way, way).to_f64()).is_some();
+            let on_edge = (target.as_dvec3() - p).dot(u + v - u.dot(v) * u);
+            assert!(inside || (on_edge - 1.0).abs() < 0.3, "{target} is on triangle {part}");
+            seen += u32::from(inside);
+            parts[(part - 5) as usize] += 1;
+            let met = Met {
+                direction: own.direction,
+                distance: way.length(),
+                normal: u.cross(v).as_vec3(),
+                primitive: part,
+            };
+            assert_eq!(light.pdf(from, Vec3::Z, &met), quad.pdf(from, Vec3::Z, &met));
+        }
+    }
+    assert!(seen > 400 && parts.iter().all(|&count| count > 100), "{seen} {parts:?}");
+}
+
+#[test]
+fn what_makes_no_parallelogram_is_sampled_by_area() {
+    let (o, x, y) = (DVec3::ZERO, DVec3::X, DVec3::Y);
+    let first = [o, x, y];
+    for (second, what) in [
+        ([x + y * 1.2, y, x], "a trapezium"),
+        ([x + y + DVec3::Z * 0.1, y, x], "a fold"),
+        ([x + y, x, y], "two that face away from each other"),
+        ([x + y, y + x * 1e-3, x], "no common edge"),
+        ([x + y, x * 2.0, y * 2.0], "one common corner at most"),
+    ] {
+        assert!(mesh_light(&[first, second]).quad().is_none(), "{what}");
+    }
+    assert!(mesh_light(&[first]).quad().is_none());
+    assert!(mesh_light(&[first, [x + y, y, x]]).quad().is_some());
+    assert!(mesh_light(&[first, [x + y, y, x], first.map(|p| p + x * 3.0)]).quad().is_none());
+}
+
+#[test]
+fn samples_by_area_fall_on_triangles_as_often_as_these_are_large() {
+    let triangle = |at: f64, size: f64| {
+        let p = DVec3::new(at, 0.0, 0.0);
+        [p, p + DVec3::X * size, p + DVec3::Y * size]
+    };
+    let light = mesh_light(&[triangle(0.0, 1.0), triangle(2.0, 2.0), triangle(5.0, 0.5)]);
+    let (from, mut counts, mut flux) = (Vec3::new(1.0, 0.5, 2.0), [0_u32; 3], 0.0);
+    const COUNT: u32 = 1 << 14;
+    for sample in 0..COUNT {
+        let u = PixelSampler::new(3, 1, 4, sample).pair(1, Decision::Picked);
+        let Some(sample) = light.sample(from, Vec3::NEG_Z, [u.x, u.y]) else { panic!("seen from the front") };
+        let Source::Primitive(OBJECT, part) = sample.source else { panic!("a triangle of it") };
+        counts[(part - 5) as usize] += 1;
+        flux += f64::from(sample.weight.x * -sample.direction.z) / f64::from(COUNT);
+    }
+    for (count, area) in counts.iter().zip([0.5, 2.0, 0.125]) {
+        let expected = area / 2.625 * f64::from(COUNT);
+        assert!((f64::from(*count) - expected).abs() < 5.0, "{counts:?}");
+    }
+    // Lambert's formula for polygons: ½ Σ Θᵢ (Γᵢ · n).
+    let of = |corners: [DVec3; 3]| {
+        let ways = corners.map(|corner| (corner - from.as_dvec3()).normalize());
+        let edge = |i: usize| {
+            let (a, b) = (ways[i], ways[(i + 1) % 3]);
+            a.angle_between(b) * a.cross(b).normalize().z
+        };
+        0.5 * (edge(0) + edge(1) + edge(2)).abs()
+    };
+    let expected = of(triangle(0.0, 1.0)) + of(triangle(2.0, 2.0)) + of(triangle(5.0, 0.5));
+    assert!((flux / expected - 1.0).abs() < 1e-3, "{flux} where {expected} arrives");
 }
 
 #[test]

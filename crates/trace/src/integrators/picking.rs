@@ -6,7 +6,7 @@ use super::light::{Lighting, Sums, add_where};
 use super::pool::Pool;
 use super::view::Measure;
 use crate::geometry::rows::lanes;
-use crate::lights::{Light, LightRow, LightTree, Lobe, Middle, Receiver, Selection};
+use crate::lights::{Light, LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
@@ -134,6 +134,49 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             }
         }
         let mut picks = vec![PickRow::NOTHING; numbers.len()];
+        if tree.is_flat() {
+            self.pick_flat(tree, &numbers, &mut picks);
+        } else {
+            self.pick_by_cuts(tree, way, &numbers, &mut picks);
+        }
+        for row in &mut picks {
+            row.invert(count as f32, WEIGHED);
+        }
+        picks
+    }
+
+    /// Pick from a tree of one node, all vertices side by side.
+    #[inline(always)]
+    fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
+        let row = self.row;
+        let plain = ReceiverRow::plain(&row.from, &row.normal);
+        let mut glossy = plain.clone();
+        for i in lanes(if row.is_glossy { self.used } else { 0 }) {
+            if let Some(lobe) = self.lobe(i) {
+                glossy.set_lobe(i, &lobe);
+            }
+        }
+        let Some(shares) = tree.flat_shares(&glossy, row.is_glossy) else { return };
+        let without = (WEIGHED && row.is_glossy).then(|| tree.flat_shares(&plain, false)).flatten();
+        for (numbers, pick) in numbers.iter().zip(picks) {
+            let picked = shares.pick(numbers);
+            pick.lights = picked.lights;
+            pick.weighed = match &without {
+                Some(without) => without.probabilities(&picked),
+                None => picked.probabilities,
+            };
+            pick.shares = picked.probabilities;
+            for i in 0..LANES {
+                let is_used = self.used & 1 << i != 0;
+                pick.shares[i] = if is_used { pick.shares[i] } else { 0.0 };
+            }
+        }
+    }
+
+    /// Pick from any tree, one vertex after the other.
+    #[inline(always)]
+    fn pick_by_cuts(&self, tree: &LightTree, way: Picks, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
+        let (row, group) = (self.row, way.count as usize);
         let (mut cut, mut without) = (way.cut(tree), WEIGHED.then(|| way.cut(tree)));
         for i in lanes(self.used) {
             let plain = Receiver::plain(lane(&row.from, i), lane(&row.normal, i));
@@ -154,10 +197,6 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 });
             }
         }
-        for row in &mut picks {
-            row.invert(count as f32, WEIGHED);
-        }
-        picks
     }
 
     /// The glossy lobe of a vertex.

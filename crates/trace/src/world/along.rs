@@ -1,6 +1,6 @@
 //! The trees of a scene along a ray.
 
-use super::Geometry;
+use super::{Geometry, Object};
 use crate::accel::{Cell, Stretch};
 use crate::geometry::Ray;
 
@@ -9,15 +9,20 @@ impl Geometry {
     /// direction of a unit ray is as long as a unit of the scene is there, and says whether to go on below. Depths are counted
     /// through both trees: a mesh's root is a step below the leaf that holds the mesh.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &Cell, &Stretch) -> bool) {
-        let mut meshes = Vec::new();
-        self.tree().along(
+        let mut below = Vec::new();
+        self.visited().along(
             ray,
             |cell, stretch| visit(ray, cell, stretch),
-            |id, depth| meshes.extend(self.objects()[id as usize].mesh().map(|mesh| (mesh, depth))),
+            |id, depth| below.push((id, depth)),
         );
-        for (mesh, above) in meshes {
-            let local = mesh.local_ray(ray);
-            mesh.tree.along(&local, |cell, stretch| {
+        for (id, above) in below {
+            let (local, tree) =
+                match (self.merged(id), self.objects().get(id as usize).and_then(Object::mesh)) {
+                    (Some(merged), _) => (*ray, merged.tree()),
+                    (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangles()),
+                    (None, None) => continue,
+                };
+            tree.along(&local, |cell, stretch| {
                 visit(&local, &Cell { depth: above + cell.depth, ..*cell }, stretch)
             });
         }

@@ -212,7 +212,7 @@ impl Geometry {
         let near = self.near_box(at);
         self.near_objects(at, |id, object| {
             let Object::Mesh(mesh) = object else { return };
-            mesh.tree.meeting(&mesh.local_box(&near), |triangle| {
+            mesh.tree.triangles().meeting(&mesh.local_box(&near), |triangle| {
                 if Aabb::around_f64(mesh.world_corners(triangle)).meets(&near) {
                     triangles.push((id, triangle));
                     error = error.max(mesh.touch_error(triangle, at.surface.point));

@@ -192,7 +192,7 @@ mod tests {
             (DVec3::new(1e4, 1e4, -1e3), DVec3::new(-1.0, 5.0, 0.0)),
         ] {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
-            let mesh = MeshInstance { tree: Arc::clone(&tree), transform, smooth: false };
+            let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
             let emission = Emission::constant(Vec3::ONE);
             let lights = mesh_lights(0, &mesh, Some(&emission), &Images::default(), &CancelToken::new())
                 .expect("nobody cancels");

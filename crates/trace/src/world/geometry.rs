@@ -10,7 +10,8 @@ use crate::math::DVec3;
 use crate::math::transform::Transform;
 use crate::scene::description::{self, Lowered, Scene};
 
-use super::{MeshInstance, MeshTree, Object};
+use super::merged::MergedTriangle;
+use super::{MergedMeshes, MeshInstance, MeshTree, Object};
 
 /// The nearest hit in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,12 +29,23 @@ pub struct Geometry {
     /// Where the coordinates of all of them start, in the scene's.
     origin: DVec3,
     tree: Bvh,
+    /// Small meshes under one tree.
+    merged: Option<Merged>,
     /// Objects that are not in the tree.
     unbounded: Vec<u32>,
     /// What the triangles of any mesh may be off, and room for the tests of rays there.
     mesh_rounding: f32,
     has_meshes: bool,
     instructions: Instructions,
+}
+
+/// Small meshes under one tree, and what rays visit in place of the tree over all objects.
+#[derive(Debug)]
+pub(super) struct Merged {
+    /// The meshes; their number among the objects of `over` comes after those of all objects.
+    pub(super) meshes: MergedMeshes,
+    /// The tree over them and the other objects.
+    pub(super) over: Bvh,
 }
 
 impl Geometry {
@@ -55,17 +67,24 @@ impl Geometry {
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn build(objects: Vec<Object>, token: &CancelToken) -> Result<Self, Cancelled> {
+    pub fn build(mut objects: Vec<Object>, token: &CancelToken) -> Result<Self, Cancelled> {
+        let merged = MergedMeshes::of_objects(&mut objects, token)?;
         let bounds: Vec<Option<Aabb>> = objects.iter().map(Object::bounds).collect();
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
         let (tree, instructions) = (Bvh::build(&boxes, token)?, Instructions::best());
+        let merged = merged.map(|meshes| -> Result<_, Cancelled> {
+            let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
+            let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
+            Ok(Merged { over: Bvh::build(&with_all, token)?, meshes })
+        });
+        let merged = merged.transpose()?;
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
         let mesh_rounding = rounding.fold(0.0, f32::max);
         let has_meshes = objects.iter().any(|object| object.mesh().is_some());
         let origin = DVec3::ZERO;
-        Ok(Self { objects, origin, tree, unbounded, mesh_rounding, has_meshes, instructions })
+        Ok(Self { objects, origin, tree, merged, unbounded, mesh_rounding, has_meshes, instructions })
     }
 
     /// The objects, known by their index.
@@ -81,6 +100,33 @@ impl Geometry {
     /// The tree over the objects that have an end.
     pub(super) fn tree(&self) -> &Bvh {
         &self.tree
+    }
+
+    /// The tree that rays visit: objects by their number, and after them the merged meshes.
+    pub(super) fn visited(&self) -> &Bvh {
+        self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
+    }
+
+    /// The merged meshes, if a number that [`Geometry::visited`] tells is theirs.
+    #[inline(always)]
+    pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
+        let merged = self.merged.as_ref()?;
+        (id as usize == self.objects.len()).then_some(&merged.meshes)
+    }
+
+    /// Whether any meshes are merged.
+    #[inline(always)]
+    pub(super) fn has_merged(&self) -> bool {
+        self.merged.is_some()
+    }
+
+    /// Whether a light is all of an object that is merged: shadow rays to it visit the trees of each mesh.
+    #[inline(always)]
+    pub(super) fn is_whole_merged(&self, source: Source) -> bool {
+        match (source, &self.merged) {
+            (Source::Object(object), Some(merged)) => merged.meshes.has(object),
+            (Source::Nothing | Source::Object(_) | Source::Primitive(..), _) => false,
+        }
     }
 
     /// Whether any object has no end.
@@ -122,19 +168,28 @@ impl Geometry {
         let mut segment = *ray;
         let mut test = |id: u32, t_max: f32| {
             segment.t_max = t_max;
-            ray_f64.t_max = f64::from(t_max);
-            let shape = self.objects[id as usize].closest(&segment, &ray_f64)?;
-            let nearer = best.is_none_or(|best| (shape.t, id) < (best.shape.t, best.object));
+            let hit = match self.merged(id) {
+                Some(merged) => {
+                    let shape = merged.closest(&segment)?;
+                    let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
+                    Hit { shape: ShapeHit { primitive, ..shape }, object }
+                }
+                None => {
+                    ray_f64.t_max = f64::from(t_max);
+                    Hit { shape: self.objects[id as usize].closest(&segment, &ray_f64)?, object: id }
+                }
+            };
+            let nearer = best.is_none_or(|best| (hit.shape.t, hit.object) < (best.shape.t, best.object));
             nearer.then(|| {
-                best = Some(Hit { shape, object: id });
-                shape.t
+                best = Some(hit);
+                hit.shape.t
             })
         };
         let mut end = ray.t_max;
         for &id in &self.unbounded {
             end = test(id, end).unwrap_or(end);
         }
-        self.tree.closest(&Ray { t_max: end, ..*ray }, test);
+        self.visited().closest(&Ray { t_max: end, ..*ray }, test);
         best
     }
 
@@ -142,12 +197,20 @@ impl Geometry {
     pub fn occluded(&self, ray: &Ray, source: Source) -> bool {
         let ray_f64 = ray.to_f64();
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any(ray, &ray_f64, except);
-        let test = |id: u32| match source {
+        let of_object = |id: u32| match source {
             Source::Nothing => any(id, None),
             Source::Object(own) => own != id && any(id, None),
             Source::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
-        self.unbounded.iter().any(|&id| test(id)) || self.tree.any(ray, test)
+        let test = |id: u32| match (self.merged(id), source) {
+            (Some(merged), Source::Nothing | Source::Object(_)) => merged.any(ray, None),
+            (Some(merged), Source::Primitive(own, part)) => merged.any(ray, merged.number(own, part)),
+            (None, _) => of_object(id),
+        };
+        if self.is_whole_merged(source) {
+            return self.unbounded.iter().any(|&id| of_object(id)) || self.tree.any(ray, of_object);
+        }
+        self.unbounded.iter().any(|&id| test(id)) || self.visited().any(ray, test)
     }
 
     /// The surface at a hit of this ray.
@@ -177,13 +240,15 @@ impl Geometry {
 
     /// Bytes held by the objects and the tree over them, without those of meshes.
     pub fn own_memory_bytes(&self) -> usize {
-        self.tree.memory_bytes() + size_of_val(self.objects.as_slice())
+        let of_merged = |merged: &Merged| merged.meshes.memory_bytes() + merged.over.memory_bytes();
+        let merged = self.merged.as_ref().map_or(0, of_merged);
+        self.tree.memory_bytes() + merged + size_of_val(self.objects.as_slice())
     }
 
     /// Bytes held by this tree and by each mesh's once.
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
-        let mut bytes = self.tree.memory_bytes();
+        let mut bytes = self.own_memory_bytes() - size_of_val(self.objects.as_slice());
         for mesh in self.objects.iter().filter_map(Object::mesh) {
             if !seen.contains(&Arc::as_ptr(&mesh.tree)) {
                 seen.push(Arc::as_ptr(&mesh.tree));
@@ -206,11 +271,8 @@ fn lowered(
     };
     let tree = &meshes[mesh.file];
     let placed = Transform::scale_rotate_translate(mesh.scale, mesh.rotate, mesh.translate);
-    let instance = MeshInstance {
-        tree: Arc::clone(tree),
-        transform: placed.between(tree.loaded().mesh.origin, origin),
-        smooth: mesh.smooth,
-    };
+    let transform = placed.between(tree.loaded().mesh.origin, origin);
+    let instance = MeshInstance::new(Arc::clone(tree), transform, mesh.smooth);
     if instance.smooth {
         instance.tree.prepare_normals(token)?;
     }

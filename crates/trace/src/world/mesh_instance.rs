@@ -20,6 +20,8 @@ pub struct MeshInstance {
     pub transform: Transform,
     /// Interpolate vertex normals.
     pub smooth: bool,
+    /// Whether rays meet it in a tree over several meshes, in the scene's coordinates.
+    pub(super) is_merged: bool,
 }
 
 /// A point of a triangle of an instance.
@@ -39,6 +41,11 @@ pub(super) struct Facet {
 }
 
 impl MeshInstance {
+    /// A mesh under its own tree.
+    pub fn new(tree: Arc<MeshTree>, transform: Transform, smooth: bool) -> Self {
+        Self { tree, transform, smooth, is_merged: false }
+    }
+
     /// The ray in the mesh's coordinates, with the same t.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
         if self.transform == Transform::IDENTITY {
@@ -73,6 +80,20 @@ impl MeshInstance {
     pub fn world_corners(&self, triangle: u32) -> [DVec3; 3] {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
+    }
+
+    /// Triangles of the mesh.
+    pub(super) fn triangle_count(&self) -> usize {
+        self.tree.loaded().mesh.triangles.len()
+    }
+
+    /// Corners of a triangle in the scene's coordinates, rounded, in the order of the file.
+    pub(super) fn rounded_corners(&self, triangle: u32) -> [Vec3; 3] {
+        let corners = self.tree.loaded().mesh.corners(triangle);
+        if self.transform == Transform::IDENTITY {
+            return corners;
+        }
+        corners.map(|corner| self.transform.point(corner.as_dvec3()).as_vec3())
     }
 
     /// Texture coordinates of the corners of a triangle, in the order of [`MeshInstance::world_corners`].
@@ -140,14 +161,26 @@ impl MeshInstance {
     }
 
     /// Rounding of a point of a triangle, of the next ray's origin in the mesh's coordinates, and of what it is computed from;
-    /// where all of these are near 0, that of the double precision in which sides of the triangle are told apart.
+    /// where all of these are near 0, that of the double precision in which sides of the triangle are told apart. In a tree over
+    /// several meshes, also the rounding of the corners there.
     #[inline(always)]
     pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
         let reach = self.transform.reach(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.transform.translation.abs().as_vec3();
-        let greatest = a.abs().max(b.abs()).max(c.abs());
-        let of_double = double_error(self.transform.reach(greatest).max_element());
-        parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE)
+        let greatest = self.transform.reach(a.abs().max(b.abs()).max(c.abs()));
+        let of_double = double_error(greatest.max_element());
+        let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
+        if self.has_rounded_corners() {
+            error + (greatest + self.transform.translation.abs()).as_vec3() * f32::EPSILON
+        } else {
+            error
+        }
+    }
+
+    /// Whether rays meet triangles whose corners were rounded after they were placed.
+    #[inline(always)]
+    fn has_rounded_corners(&self) -> bool {
+        self.is_merged && self.transform != Transform::IDENTITY
     }
 
     /// A point of a triangle, by its corners in the mesh's coordinates and the weights of the second and the third.
@@ -233,7 +266,7 @@ impl MeshInstance {
     #[inline(never)]
     pub(super) fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         let mut hits = [None; PACKET];
-        self.tree.closest_packet(&self.local_rays(rows, met), ends, &mut hits);
+        self.tree.triangles().closest_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.put(lane, hit);
@@ -251,10 +284,10 @@ impl MeshInstance {
         except: Option<(u32, &[u32; PACKET])>,
     ) -> u32 {
         let local = self.local_rays(rows, met);
-        let Some((own, numbers)) = except else { return self.tree.any_packet(&local, ends, &[]) };
+        let Some((own, numbers)) = except else { return self.tree.triangles().any_packet(&local, ends, &[]) };
         let mut parts = [None; PACKET];
         lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
-        self.tree.any_packet(&local, ends, &parts)
+        self.tree.triangles().any_packet(&local, ends, &parts)
     }
 
     /// Those rays of a packet that are in `met` in the mesh's coordinates; in the place of each other one the first of them, which

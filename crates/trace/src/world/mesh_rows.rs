@@ -152,7 +152,7 @@ mod tests {
                 [Transform::IDENTITY, placed(DVec3::splat(1.3)), placed(DVec3::new(0.2, -1.0, 3.0))]
             {
                 for smooth in [false, true] {
-                    instances.push(MeshInstance { tree: Arc::clone(&tree), transform, smooth });
+                    instances.push(MeshInstance::new(Arc::clone(&tree), transform, smooth));
                 }
             }
         }

@@ -22,7 +22,7 @@ impl Object {
     pub fn closest(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64),
-            Self::Mesh(mesh) => mesh.tree.closest(&mesh.local_ray(ray)),
+            Self::Mesh(mesh) => mesh.tree.triangles().closest(&mesh.local_ray(ray)),
         }
     }
 
@@ -30,7 +30,7 @@ impl Object {
     pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
-            Self::Mesh(mesh) => mesh.tree.any(&mesh.local_ray(ray), except),
+            Self::Mesh(mesh) => mesh.tree.triangles().any(&mesh.local_ray(ray), except),
         }
     }
 

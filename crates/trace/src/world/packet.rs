@@ -1,10 +1,11 @@
 //! Up to sixteen rays at once through a scene: what they hit is what each hits alone.
 
+use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
 use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
 use crate::geometry::Ray;
-use crate::geometry::rows::{HitRows, RayRows, traced};
-use crate::lights::SourceRow;
+use crate::geometry::rows::{HitRows, RayRows, lanes, traced};
+use crate::lights::{Source, SourceRow};
 use crate::math::lanes::{Folds, TRUE, take, take_u32};
 
 impl Geometry {
@@ -26,7 +27,7 @@ impl Geometry {
     ) -> (HitRows, [u32; PACKET]) {
         let mut nearest =
             Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET], folds };
-        self.tree().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, folds);
+        self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, folds);
         (nearest.hits, nearest.object)
     }
 
@@ -41,9 +42,37 @@ impl Geometry {
         sources: &SourceRow,
         folds: impl Folds,
     ) -> u32 {
+        let by_each = traced & self.to_whole_merged(sources);
+        if by_each != 0 {
+            return self.occluded_by_each(rows, ends, traced, sources);
+        }
         let mut blockers =
             Blockers { geometry: self, rows, sources, in_part: in_part(sources, folds), folds };
-        self.tree().any_packet(rows, ends, traced, self.unbounded(), &mut blockers, folds)
+        self.visited().any_packet(rows, ends, traced, self.unbounded(), &mut blockers, folds)
+    }
+}
+
+impl Geometry {
+    /// A bit for each ray whose light is all of a merged mesh.
+    #[inline(always)]
+    fn to_whole_merged(&self, sources: &SourceRow) -> u32 {
+        if !sources.is_any || !self.has_merged() {
+            return 0;
+        }
+        let is_whole = |lane: usize| {
+            sources.part[lane] == SourceRow::NONE
+                && self.is_whole_merged(Source::Object(sources.object[lane]))
+        };
+        (0..PACKET).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
+    }
+
+    /// [`Geometry::occluded`] one ray after the other.
+    #[cold]
+    #[inline(never)]
+    fn occluded_by_each(&self, rows: &RayRows, ends: &Ends, traced: u32, sources: &SourceRow) -> u32 {
+        let is_occluded =
+            |&lane: &usize| self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.source(lane));
+        lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
     }
 }
 
@@ -83,13 +112,22 @@ struct Nearest<'a, F> {
 impl<F: Folds> ClosestTest for Nearest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut Ends) {
-        let object = &self.geometry.objects()[id as usize];
         let mut found = HitRows::none();
-        object.closest_rows(self.rows, met, &of_these(met, ends), &mut found, self.folds);
+        let (these, mut objects) = (of_these(met, ends), [id; PACKET]);
+        match self.geometry.merged(id) {
+            Some(merged) => {
+                merged.closest_rows(self.rows, met, &these, &mut found);
+                objects = numbered_by_object(merged, &mut found);
+            }
+            None => {
+                let object = &self.geometry.objects()[id as usize];
+                object.closest_rows(self.rows, met, &these, &mut found, self.folds);
+            }
+        }
         let mut nearer = [0; PACKET];
         for lane in 0..PACKET {
             let (t, end) = (found.t[lane], ends[lane]);
-            let is_nearer = (t < end) | ((t == end) & (id < self.object[lane]));
+            let is_nearer = (t < end) | ((t == end) & (objects[lane] < self.object[lane]));
             nearer[lane] = if is_nearer { TRUE } else { 0 };
         }
         take(&nearer, &found.t, ends);
@@ -97,8 +135,21 @@ impl<F: Folds> ClosestTest for Nearest<'_, F> {
         take(&nearer, &found.u, &mut self.hits.u);
         take(&nearer, &found.v, &mut self.hits.v);
         take_u32(&nearer, &found.primitive, &mut self.hits.primitive);
-        take_u32(&nearer, &[id; PACKET], &mut self.object);
+        take_u32(&nearer, &objects, &mut self.object);
     }
+}
+
+/// Tells the objects of hits of merged meshes, and has their triangles numbered by object.
+#[inline(always)]
+fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKET] {
+    let mut objects = [NONE; PACKET];
+    for lane in 0..PACKET {
+        // Rays that hit nothing look at the first triangle, which counts nothing.
+        let is_hit = !found.t[lane].is_nan();
+        let of = merged.triangle(if is_hit { found.primitive[lane] } else { 0 });
+        (objects[lane], found.primitive[lane]) = (of.object, of.primitive);
+    }
+    objects
 }
 
 /// Looks for what is in the way of shadow rays.
@@ -114,6 +165,18 @@ struct Blockers<'a, F> {
 impl<F: Folds> AnyTest for Blockers<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32 {
+        if let Some(merged) = self.geometry.merged(id) {
+            let these = of_these(met, ends);
+            if self.in_part & met == 0 {
+                return merged.any_rows(self.rows, met, &these, None);
+            }
+            let mut own = [MergedMeshes::NO_TRIANGLE; PACKET];
+            for lane in lanes(self.in_part & met) {
+                let number = merged.number(self.sources.object[lane], self.sources.part[lane]);
+                own[lane] = number.unwrap_or(MergedMeshes::NO_TRIANGLE);
+            }
+            return merged.any_rows(self.rows, met, &these, Some(&own));
+        }
         let own = own_bits(self.sources, id, self.folds);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
         let met = met & !whole;
@@ -210,11 +273,7 @@ mod tests {
             Transform::scale_rotate_translate(DVec3::splat(1.3), DVec3::splat(20.0 * f64::from(i)), at)
         };
         for transform in [Transform::IDENTITY, placed(0), placed(1), placed(2)] {
-            objects.push(Object::Mesh(Box::new(MeshInstance {
-                tree: Arc::clone(&tree),
-                transform,
-                smooth: false,
-            })));
+            objects.push(Object::Mesh(Box::new(MeshInstance::new(Arc::clone(&tree), transform, false))));
         }
         Geometry::build(objects, &CancelToken::new()).expect("nobody cancels")
     }

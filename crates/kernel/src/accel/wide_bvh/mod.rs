@@ -245,7 +245,7 @@ impl WideBvh {
 }
 
 /// Fewer shadow rays are faster one by one.
-const SMALL_GROUP: usize = 4;
+const SMALL_GROUP: usize = 8;
 
 /// The ends of those rays together that go to the same side along each axis, and furthest along the same one, and how many
 /// they are; the others end below 0.

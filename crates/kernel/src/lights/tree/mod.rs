@@ -5,11 +5,13 @@
 pub mod bounds;
 mod build;
 mod cut;
+mod flat;
 mod node;
 
 pub use bounds::{EmissionCone, LightBounds};
 pub use cut::Cut;
-pub use node::{Child, Lobe, Node, Receiver};
+pub use flat::{FlatPicks, FlatShares};
+pub use node::{Child, Lobe, Node, Receiver, ReceiverRow};
 
 use crate::math::lanes::{LANES, Lanes};
 

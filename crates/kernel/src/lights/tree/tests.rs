@@ -361,6 +361,60 @@ fn a_tree_that_nobody_waits_for_is_not_built() {
     assert_eq!(Lights::new(lights_of(100, &mut next), &token), Err(Cancelled));
 }
 
+#[test]
+fn points_side_by_side_pick_from_one_node_as_each_does_alone() {
+    use crate::lights::ReceiverRow;
+    let mut next = random::unit(21);
+    let mut picked = 0;
+    for count in [1, 2, 9, 13, 16] {
+        let lights = lights_of(count, &mut next);
+        let tree = tree_of(&lights);
+        assert!(tree.is_flat());
+        for round in 0..60 {
+            let receivers: [Receiver; LANES] = std::array::from_fn(|i| {
+                let (point, normal) = place(&mut next);
+                let (_, axis) = place(&mut next);
+                let lobe = Lobe { axis, shininess: 20.0 * next(), peak: 3.0 * next(), diffuse: 1.0 };
+                Receiver { point, normal, lobe: (round % 2 == 0 && i % 3 != 0).then_some(lobe) }
+            });
+            let column = |of: &dyn Fn(&Receiver) -> Vec3| {
+                let vectors = receivers.each_ref().map(|receiver| of(receiver).to_array());
+                [0, 1, 2].map(|axis| vectors.map(|vector| vector[axis]))
+            };
+            let mut row = ReceiverRow::plain(&column(&|one| one.point), &column(&|one| one.normal));
+            for (i, receiver) in receivers.iter().enumerate() {
+                receiver.lobe.iter().for_each(|lobe| row.set_lobe(i, lobe));
+            }
+            let shares = tree.flat_shares(&row, round % 2 == 0).expect("one node");
+            let numbers: [f64; LANES] = std::array::from_fn(|_| f64::from(next()));
+            let picks = shares.pick(&numbers);
+            assert_eq!(shares.probabilities(&picks), picks.probabilities);
+            for (i, receiver) in receivers.iter().enumerate() {
+                let alone = tree.pick(receiver, numbers[i]);
+                let Some(alone) = alone else {
+                    assert_eq!(picks.probabilities[i], 0.0);
+                    continue;
+                };
+                let own = tree.probability(receiver, picks.lights[i]);
+                assert!(
+                    (picks.probabilities[i] / own - 1.0).abs() < 1e-5,
+                    "{} {own}",
+                    picks.probabilities[i]
+                );
+                // Sums in another order may have a number fall on the next light.
+                picked += u32::from(alone.light == picks.lights[i]);
+            }
+            let greatest = shares.pick(&[1.0_f64.next_down(); LANES]);
+            for (i, receiver) in receivers.iter().enumerate() {
+                let own = tree.probability(receiver, greatest.lights[i]);
+                assert_eq!(greatest.probabilities[i] > 0.0, own > 0.0, "the last light that arrives");
+            }
+        }
+    }
+    assert!(picked > 3000, "{picked} picks are the same");
+    assert!(!tree_of(&lights_of(17, &mut next)).is_flat());
+}
+
 /// A wide and a near mesh of uneven triangles.
 fn uneven_mesh(count: u32) -> MeshEmitter {
     let mut next = random::signed(8);

@@ -1,0 +1,106 @@
+//! Trees of one node: points pick from its children side by side, light by light.
+
+use super::node::{Child, Node, ReceiverRow};
+use super::{LightTree, ROOT};
+use crate::math::lanes::{LANES, Lanes};
+
+/// What points are expected to get of each light of a tree that has one node.
+pub struct FlatShares<'a> {
+    node: &'a Node,
+    /// By child, then by point.
+    importance: [Lanes; LANES],
+    /// Sums over the children.
+    totals: [f64; LANES],
+}
+
+/// Lights that points picked.
+pub struct FlatPicks {
+    /// Places of the lights among the children.
+    children: [u32; LANES],
+    /// Numbers of the lights.
+    pub lights: [u32; LANES],
+    /// With which probabilities; 0 where no light arrives.
+    pub probabilities: Lanes,
+}
+
+impl LightTree {
+    /// What its lights bring to points, if it has one node.
+    #[inline(always)]
+    pub fn flat_shares(&self, receivers: &ReceiverRow, has_lobes: bool) -> Option<FlatShares<'_>> {
+        self.is_flat().then(|| FlatShares::new(&self.nodes[ROOT as usize], receivers, has_lobes))
+    }
+
+    /// Whether it has one node.
+    #[inline(always)]
+    pub fn is_flat(&self) -> bool {
+        self.nodes.len() == 1
+    }
+}
+
+impl<'a> FlatShares<'a> {
+    #[inline(always)]
+    fn new(node: &'a Node, receivers: &ReceiverRow, has_lobes: bool) -> Self {
+        let (mut importance, mut totals) = ([[0.0; LANES]; LANES], [0.0; LANES]);
+        for child in 0..node.count as usize % (LANES + 1) {
+            importance[child] = node.expected_of(child, receivers, has_lobes);
+            for i in 0..LANES {
+                totals[i] += f64::from(importance[child][i]);
+            }
+        }
+        Self { node, importance, totals }
+    }
+
+    /// Pick a light for each point, by numbers in [0, 1).
+    #[inline(always)]
+    pub fn pick(&self, u: &[f64; LANES]) -> FlatPicks {
+        let mut targets = [0.0; LANES];
+        for i in 0..LANES {
+            // Below the total, so that rounding leads to no child after the last that brings anything.
+            let (target, last) = (u[i] * self.totals[i], before(self.totals[i]));
+            targets[i] = if target < last { target } else { last };
+        }
+        let (mut sums, mut children, mut values) = ([0.0; LANES], [0; LANES], [0.0; LANES]);
+        for child in 0..self.node.count as usize % (LANES + 1) {
+            for i in 0..LANES {
+                let is_reached = sums[i] <= targets[i];
+                children[i] = if is_reached { child as u32 } else { children[i] };
+                values[i] = if is_reached { self.importance[child][i] } else { values[i] };
+                sums[i] += f64::from(self.importance[child][i]);
+            }
+        }
+        let mut lights = [0; LANES];
+        for i in 0..LANES {
+            lights[i] = match self.node.children[children[i] as usize % LANES] {
+                Child::Light(light) => light,
+                Child::Node(_) => 0,
+            };
+        }
+        FlatPicks { children, lights, probabilities: self.shares(&values) }
+    }
+
+    /// The probabilities with which it picks the lights of other picks.
+    #[inline(always)]
+    pub fn probabilities(&self, picks: &FlatPicks) -> Lanes {
+        let mut values = [0.0; LANES];
+        for i in 0..LANES {
+            values[i] = self.importance[picks.children[i] as usize % LANES][i];
+        }
+        self.shares(&values)
+    }
+
+    #[inline(always)]
+    fn shares(&self, values: &Lanes) -> Lanes {
+        let mut shares = [0.0; LANES];
+        for i in 0..LANES {
+            let share = (f64::from(values[i]) / self.totals[i]) as f32;
+            shares[i] = if self.totals[i] > 0.0 { share } else { 0.0 };
+        }
+        shares
+    }
+}
+
+/// The greatest number below one that is above 0; 0 for 0.
+#[inline(always)]
+fn before(total: f64) -> f64 {
+    f64::from_bits(total.to_bits().saturating_sub(1))
+}

@@ -1,0 +1,340 @@
+//! Small meshes under one tree: a ray that passes many of them visits one set of boxes in place of a tree of each.
+//!
+//! The triangles are those of the instances in the scene's coordinates, rounded there; `contact` and `along` keep to the trees of the
+//! meshes themselves. Hits of instances that stand as their files have them keep their bits.
+
+use super::triangle_tree::TriangleTree;
+use super::{MeshInstance, Object};
+use crate::accel::{Ends, PACKET};
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::rows::{HitRows, RayRows, lanes};
+use crate::geometry::{Aabb, Ray, ShapeHit};
+use crate::math::Vec3;
+
+/// Most triangles of a mesh that is merged: a larger one pays for its own tree, and an edit that moves it builds nothing again.
+const MOST_EACH: usize = 1 << 14;
+
+/// Most triangles in all: a tree over so many is built in some 10 ms.
+const MOST_IN_ALL: usize = 1 << 17;
+
+/// Least triangles in all: fewer are as fast in rows of rays, mesh by mesh.
+const LEAST_IN_ALL: usize = 64;
+
+/// Largest coordinate of a merged mesh, in units of its size: further off, rounding would bend it.
+const FARTHEST: f32 = 1024.0;
+
+/// A triangle of the tree: its object, and its number there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MergedTriangle {
+    /// The object.
+    pub object: u32,
+    /// The number among the object's triangles.
+    pub primitive: u32,
+}
+
+/// Instances of small meshes, under one tree.
+#[derive(Debug)]
+pub struct MergedMeshes {
+    tree: TriangleTree,
+    /// In the order of objects, so that of hits at one distance the lowest object counts.
+    triangles: Vec<MergedTriangle>,
+    /// The number of the first triangle of each object; [`MergedMeshes::NOT_HERE`] of the others.
+    first: Vec<u32>,
+}
+
+impl MergedMeshes {
+    /// Stands for the first triangle of an object that is not merged.
+    const NOT_HERE: u32 = u32::MAX;
+
+    /// Merges the small meshes among objects; `None` if that is not worth a tree.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of_objects(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
+        // Choose the smallest first, up to the number of triangles that may be built again at each edit.
+        let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
+        let mut chosen: Vec<usize> = (0..objects.len()).filter(|&id| may_be_merged(&objects[id])).collect();
+        chosen.sort_by_key(|&id| (count(&objects[id]), id));
+        let mut total = 0;
+        chosen.retain(|&id| {
+            let with_it = total + count(&objects[id]);
+            let has_room = with_it <= MOST_IN_ALL;
+            total = if has_room { with_it } else { total };
+            has_room
+        });
+        let Some(accel) = chosen.first().and_then(|&id| Some(objects[id].mesh()?.tree.accel())) else {
+            return Ok(None);
+        };
+        if chosen.len() < 2 || total < LEAST_IN_ALL {
+            return Ok(None);
+        }
+        // Number their triangles by object.
+        chosen.sort_unstable();
+        let mut triangles = Vec::with_capacity(total);
+        let mut first = vec![Self::NOT_HERE; objects.len()];
+        for &id in &chosen {
+            first[id] = triangles.len() as u32;
+            let object = id as u32;
+            triangles.extend(
+                (0..count(&objects[id]) as u32).map(|primitive| MergedTriangle { object, primitive }),
+            );
+            if let Object::Mesh(mesh) = &mut objects[id] {
+                mesh.is_merged = true;
+            }
+        }
+        // Build the tree.
+        let corners = |number: u32| {
+            let MergedTriangle { object, primitive } = triangles[number as usize];
+            objects[object as usize].mesh().map_or([Vec3::NAN; 3], |mesh| mesh.rounded_corners(primitive))
+        };
+        let number = triangles.len() as u32;
+        let tree = TriangleTree::build(accel, number, corners, token)?;
+        Ok(Some(Self { tree, triangles, first }))
+    }
+
+    /// The box around all.
+    pub fn bounds(&self) -> Aabb {
+        self.tree.bounds()
+    }
+
+    /// The tree over the triangles.
+    pub fn tree(&self) -> &TriangleTree {
+        &self.tree
+    }
+
+    /// Whether an object is in the tree.
+    pub fn has(&self, object: u32) -> bool {
+        self.first.get(object as usize).is_some_and(|&first| first != Self::NOT_HERE)
+    }
+
+    /// A triangle of the tree by its number.
+    #[inline(always)]
+    pub fn triangle(&self, number: u32) -> MergedTriangle {
+        self.triangles[number as usize]
+    }
+
+    /// The number of an object's triangle in the tree; `None` if the object is not merged.
+    #[inline(always)]
+    pub fn number(&self, object: u32, primitive: u32) -> Option<u32> {
+        let first = self.first.get(object as usize).copied().filter(|&first| first != Self::NOT_HERE)?;
+        Some(first + primitive)
+    }
+
+    /// The nearest hit, by the number of the triangle.
+    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
+        self.tree.closest(ray)
+    }
+
+    /// Whether the ray hits any triangle but `except`.
+    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
+        self.tree.any(ray, except)
+    }
+
+    /// The number of no triangle.
+    pub const NO_TRIANGLE: u32 = u32::MAX;
+
+    /// The nearest hits of the rays in `met`, by the numbers of triangles; the others end below 0.
+    #[inline(never)]
+    pub fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+        let mut hits = [None; PACKET];
+        self.tree.closest_packet(&rays(rows, met), ends, &mut hits);
+        for (lane, hit) in hits.iter().enumerate() {
+            if let Some(hit) = hit {
+                found.put(lane, hit);
+            }
+        }
+    }
+
+    /// A bit for each ray in `met` that hits any triangle but its own of `except`, which has the number of one for each ray,
+    /// [`MergedMeshes::NO_TRIANGLE`] for none.
+    #[inline(never)]
+    pub fn any_rows(&self, rows: &RayRows, met: u32, ends: &Ends, except: Option<&[u32; PACKET]>) -> u32 {
+        let rays = rays(rows, met);
+        let Some(numbers) = except else { return self.tree.any_packet(&rays, ends, &[]) };
+        let own = numbers.map(|number| (number != Self::NO_TRIANGLE).then_some(number));
+        self.tree.any_packet(&rays, ends, &own)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.tree.memory_bytes() + size_of_val(&*self.triangles) + size_of_val(&*self.first)
+    }
+}
+
+/// The rays of a packet; in the place of one that is not in `met` the first that is, which goes the same way as they do.
+#[inline]
+fn rays(rows: &RayRows, met: u32) -> [Ray; PACKET] {
+    let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET); PACKET];
+    for lane in lanes(met & met.wrapping_sub(1)) {
+        rays[lane] = rows.ray(lane);
+    }
+    rays
+}
+
+/// Whether an object is a small mesh that single precision holds in the scene's coordinates.
+fn may_be_merged(object: &Object) -> bool {
+    let Some(mesh) = object.mesh() else { return false };
+    let Some(bounds) = object.bounds().filter(|bounds| !bounds.is_empty()) else { return false };
+    let greatest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let size = bounds.extent().max_element();
+    let count = mesh.triangle_count();
+    (1..=MOST_EACH).contains(&count) && greatest.is_finite() && greatest <= FARTHEST * size
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::assets::LoadedMesh;
+    use crate::geometry::mesh::TriangleMesh;
+    use crate::geometry::ray::offset_origin;
+    use crate::lights::Source;
+    use crate::math::DVec3;
+    use crate::math::random::signed as random;
+    use crate::math::transform::Transform;
+    use crate::scene::description::Accel;
+    use crate::world::{Geometry, Hit, MeshTree};
+
+    /// A mesh of random triangles, some of which are there twice.
+    fn mesh(seed: u64, count: u32) -> Arc<MeshTree> {
+        let mut next = random(seed);
+        let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+        let mut mesh = TriangleMesh::default();
+        for i in 0..count {
+            let place = vector(1.0);
+            mesh.positions.extend([place, place + vector(0.5), place + vector(0.5)]);
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+            if i % 5 == 0 {
+                mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+            }
+        }
+        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"))
+    }
+
+    fn objects(of: &[(&Arc<MeshTree>, Transform)]) -> Vec<Object> {
+        let instance = |(tree, transform): &(&Arc<MeshTree>, Transform)| {
+            Object::Mesh(Box::new(MeshInstance::new(Arc::clone(tree), *transform, false)))
+        };
+        of.iter().map(instance).collect()
+    }
+
+    fn geometry(objects: Vec<Object>) -> Geometry {
+        Geometry::build(objects, &CancelToken::new()).expect("nobody cancels")
+    }
+
+    fn rays(seed: u64) -> Vec<Ray> {
+        let mut next = random(seed);
+        let mut vector = || Vec3::new(next(), next(), next());
+        (0..4000)
+            .map(|i| {
+                if i % 2 == 0 { Ray::new(vector() * 3.0, vector()) } else { Ray::segment(vector(), vector()) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn meshes_under_one_tree_are_hit_where_each_is_hit_alone() {
+        let trees = [mesh(1, 30), mesh(2, 50), mesh(3, 7)];
+        // The second mesh is there twice in one place: of its hits the first object counts.
+        let of: Vec<_> = [0, 1, 1, 2].iter().map(|&i| (&trees[i], Transform::IDENTITY)).collect();
+        let geometry = geometry(objects(&of));
+        let alone = objects(&of);
+        assert!(geometry.has_merged());
+        let (mut hits, mut blocked) = (0, 0);
+        for ray in rays(4) {
+            let each = (0_u32..)
+                .zip(&alone)
+                .filter_map(|(object, own)| Some(Hit { shape: own.closest(&ray, &ray.to_f64())?, object }));
+            let expected = each.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
+            let found = geometry.closest(&ray);
+            assert_eq!(found, expected, "{ray:?}");
+            hits += u32::from(found.is_some());
+            let nothing = Hit { shape: ShapeHit::at(0.0), object: 3 };
+            let Hit { shape, object } = found.unwrap_or(nothing);
+            for source in
+                [Source::Nothing, Source::Object(object), Source::Primitive(object, shape.primitive)]
+            {
+                let any = (0_u32..).zip(&alone).any(|(id, own)| match source {
+                    Source::Nothing => own.any(&ray, &ray.to_f64(), None),
+                    Source::Object(except) => id != except && own.any(&ray, &ray.to_f64(), None),
+                    Source::Primitive(of, part) => own.any(&ray, &ray.to_f64(), (id == of).then_some(part)),
+                });
+                assert_eq!(geometry.occluded(&ray, source), any, "{ray:?} {source:?}");
+                blocked += u32::from(any);
+            }
+        }
+        assert!(hits > 900 && blocked > 2000, "{hits} hits, {blocked} blocked");
+    }
+
+    /// Triangles about the origin, much larger than the part of them near it.
+    fn fans() -> Arc<MeshTree> {
+        let mut next = random(7);
+        let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+        let mut mesh = TriangleMesh::default();
+        for i in 0..40 {
+            let (a, b) = (vector(50.0), vector(50.0));
+            mesh.positions.extend([a, b, vector(0.1) - a - b]);
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+        }
+        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"))
+    }
+
+    #[test]
+    fn rays_from_merged_meshes_do_not_meet_where_they_start() {
+        let tree = fans();
+        let turned = |degrees: DVec3, at: DVec3| {
+            Transform::scale_rotate_translate(DVec3::new(1.0, 3.0, 0.7), degrees, at)
+        };
+        let of = [
+            (&tree, turned(DVec3::new(13.0, 57.0, 211.0), DVec3::ZERO)),
+            (&tree, turned(DVec3::new(-71.0, 5.0, 19.0), DVec3::splat(1e-3))),
+        ];
+        let geometry = geometry(objects(&of));
+        assert!(geometry.has_merged());
+        let mut next = random(9);
+        let (mut started, mut again) = (0, 0);
+        for _ in 0..4000 {
+            let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+            let ray = Ray { t_max: f32::INFINITY, ..Ray::segment(vector(1.0), vector(0.02)) };
+            let Some(hit) = geometry.closest(&ray) else { continue };
+            let surface = geometry.surface(&ray, &hit);
+            for side in [1.0, -1.0] {
+                let direction = vector(1.0).normalize();
+                let direction =
+                    direction * if direction.dot(surface.normal) * side < 0.0 { -1.0 } else { 1.0 };
+                let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
+                let met = geometry.closest(&Ray::new(origin, direction));
+                let is_own =
+                    |met: Hit| (met.object, met.shape.primitive) == (hit.object, hit.shape.primitive);
+                (started, again) = (started + 1, again + u32::from(met.is_some_and(is_own)));
+            }
+        }
+        assert!(started > 5000, "{started} rays");
+        assert_eq!(again, 0, "rays that meet the triangle that they leave, of {started}");
+    }
+
+    #[test]
+    fn what_is_large_far_off_or_alone_keeps_its_own_tree() {
+        let (small, few) = (mesh(1, 60), mesh(2, 8));
+        let here = Transform::IDENTITY;
+        let far = Transform::scale_rotate_translate(DVec3::splat(1e-4), DVec3::ZERO, DVec3::splat(9.0));
+        let members = |of: &[(&Arc<MeshTree>, Transform)]| {
+            let mut objects = objects(of);
+            let merged = MergedMeshes::of_objects(&mut objects, &CancelToken::new()).expect("nobody cancels");
+            merged.map(|merged| (0..of.len() as u32).filter(|&id| merged.has(id)).collect::<Vec<_>>())
+        };
+        assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));
+        assert_eq!(members(&[(&small, here), (&few, far), (&few, here)]), Some(vec![0, 2]));
+        assert_eq!(members(&[(&small, here)]), None, "alone");
+        assert_eq!(members(&[(&few, here), (&few, here)]), None, "fewer triangles than are worth a tree");
+        let large = mesh(3, 14_000);
+        assert_eq!(members(&[(&large, here), (&small, here), (&few, here)]), Some(vec![1, 2]));
+        // The smallest are merged until there is no room.
+        let half = mesh(4, 13_000);
+        let many: Vec<_> = (0..12).map(|i| (if i == 0 { &few } else { &half }, here)).collect();
+        assert_eq!(members(&many), Some((0..9).collect()));
+    }
+}

@@ -1,0 +1,112 @@
+//! Trees of either kind over triangles; both give the same hits, bit for bit.
+
+use crate::accel::wide_bvh::Quality;
+use crate::accel::{Cell, Ends, KdTree, Stretch, WideBvh};
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::{Aabb, Ray, ShapeHit};
+use crate::math::Vec3;
+use crate::scene::description::Accel;
+
+/// A tree over triangles that are known by their number.
+#[derive(Debug)]
+pub enum TriangleTree {
+    /// Of boxes.
+    Boxes(WideBvh),
+    /// Of planes.
+    Planes(KdTree),
+}
+
+impl TriangleTree {
+    /// Builds a tree of the requested kind over `count` triangles with these corners.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn build(
+        accel: Accel,
+        count: u32,
+        corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
+        Ok(match accel {
+            Accel::Bvh => Self::Boxes(WideBvh::build(count, corners, token)?),
+            Accel::BvhHigh => Self::Boxes(WideBvh::build_with(Quality::High, count, corners, token)?),
+            Accel::KdTree => Self::Planes(KdTree::build(count, corners, token)?),
+        })
+    }
+
+    /// The box around all triangles.
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Self::Boxes(tree) => tree.bounds(),
+            Self::Planes(tree) => tree.bounds(),
+        }
+    }
+
+    /// Bytes held by the tree with its copy of the triangles.
+    pub fn memory_bytes(&self) -> usize {
+        match self {
+            Self::Boxes(tree) => tree.memory_bytes(),
+            Self::Planes(tree) => tree.memory_bytes(),
+        }
+    }
+
+    /// The nearest hit of a ray; of hits at one distance the triangle of the lowest number.
+    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
+        match self {
+            Self::Boxes(tree) => tree.closest(ray),
+            Self::Planes(tree) => tree.closest(ray),
+        }
+    }
+
+    /// Whether the ray hits any triangle but `except`.
+    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
+        match self {
+            Self::Boxes(tree) => tree.any(ray, except),
+            Self::Planes(tree) => tree.any(ray, except),
+        }
+    }
+
+    /// Visit the nodes of the tree whose boxes a ray meets, parents first; `visit` says whether to go on below.
+    pub fn along(&self, ray: &Ray, visit: impl FnMut(&Cell, &Stretch) -> bool) {
+        match self {
+            Self::Boxes(tree) => tree.along(ray, visit),
+            Self::Planes(tree) => tree.along(ray, visit),
+        }
+    }
+
+    /// Visit every triangle that has a point in a box, and maybe others near it; some maybe more than once.
+    pub fn meeting(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
+        match self {
+            Self::Boxes(tree) => tree.meeting(bounds, visit),
+            Self::Planes(tree) => tree.meeting(bounds, visit),
+        }
+    }
+
+    /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays up to their ends.
+    pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
+        match self {
+            Self::Boxes(tree) => tree.closest_packet(rays, ends, hits),
+            Self::Planes(tree) => {
+                hits.fill(None);
+                for (lane, hit) in hits.iter_mut().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
+                    *hit = tree.closest(&Ray { t_max: ends[lane], ..rays[lane] });
+                }
+            }
+        }
+    }
+
+    /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle up to its end but its own of `except`,
+    /// which may be empty.
+    pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
+        match self {
+            Self::Boxes(tree) => tree.any_packet(rays, ends, except),
+            Self::Planes(tree) => {
+                let hit = |lane: usize| {
+                    let ray = Ray { t_max: ends[lane], ..rays[lane] };
+                    u32::from(tree.any(&ray, except.get(lane).copied().flatten())) << lane
+                };
+                (0..rays.len()).filter(|&lane| ends[lane] >= 0.0).map(hit).sum()
+            }
+        }
+    }
+}
