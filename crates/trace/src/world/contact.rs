@@ -41,7 +41,7 @@ pub enum Near {
         hit: Hit,
         /// Its material.
         material: u32,
-        /// Whether its front is on the side of the point before.
+        /// Whether its front is on the side of the point before; of glass, whether the outside of its body is.
         is_front: bool,
     },
 }
@@ -109,7 +109,7 @@ impl World {
             let mesh = geometry.objects()[object as usize].mesh();
             if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.crossed(triangle, ends)) {
                 let hit = Hit { shape, object };
-                found(Near::Surface { hit, material: self.material_index(&hit) as u32, is_front });
+                found(self.surface_near(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { Sides { before: probe.close, ..sides } }
@@ -124,7 +124,27 @@ impl World {
         let bare = Asked { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
         let is_front = shape.asked_surface(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(Near::Surface { hit: Hit { shape: own, object }, material, is_front })
+        Some(self.surface_near(Hit { shape: own, object }, material, is_front))
+    }
+
+    fn surface_near(&self, hit: Hit, material: u32, is_front: bool) -> Near {
+        let is_turned = self.is_glass(material) && self.bodies.is_turned(hit.object);
+        Near::Surface { hit, material, is_front: is_front != is_turned }
+    }
+
+    /// The body of glass that an object is of, by its place in the order of the file.
+    pub fn body(&self, object: u32) -> u32 {
+        self.bodies.place(object)
+    }
+
+    /// Whether any body of glass is open: no ray knows whether it is in such a one.
+    pub fn has_open_glass(&self) -> bool {
+        self.has_open_glass
+    }
+
+    /// Whether the body of glass at a place is open.
+    pub fn is_open(&self, body: u32) -> bool {
+        self.bodies.is_open(body)
     }
 
     /// Whether a material is glass.
