@@ -4,7 +4,7 @@ use super::medium::{Inside, Medium};
 use super::queues::PathRay;
 use super::shot::Shot;
 use super::vertices::Vertex;
-use crate::world::{Hit, Meeting, Near, NearTriangles, Sides};
+use crate::world::{Hit, Meeting, Near, NearMemory, Sides};
 
 /// What a ray crosses at a hit of glass.
 pub struct Crossing {
@@ -23,7 +23,7 @@ pub struct Crossing {
 /// Memory for what is near.
 #[derive(Default)]
 pub struct CrossingMemory {
-    triangles: NearTriangles,
+    around: NearMemory,
     near: Vec<Near>,
 }
 
@@ -33,14 +33,14 @@ impl Shot<'_> {
         &self,
         path: &PathRay,
         vertex: &Vertex<'_>,
-        distance: f32,
+        hit: &Hit,
         memory: &mut CrossingMemory,
     ) -> Crossing {
-        let CrossingMemory { triangles, near: found } = memory;
+        let CrossingMemory { around, near: found } = memory;
         found.clear();
-        let lead = distance * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
-        let meeting = Meeting { surface: vertex.surface, normal: vertex.normal, lead };
-        let sides = self.world.contact(&meeting, triangles, |near| found.push(near));
+        let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
+        let meeting = Meeting { hit: *hit, surface: vertex.surface, normal: vertex.normal, lead };
+        let sides = self.world.contact(&meeting, around, |near| found.push(near));
         let [arrived, near, far] = self.media(path.medium, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));

@@ -290,7 +290,7 @@ impl Wave<'_, '_> {
                 return self.shade_surface(path, &vertex, (hit.shape.t, after), weight);
             }
             let Crossing { sides, arrived, near, far, opaque } =
-                shot.crossing(&path, &vertex, hit.shape.t, self.crossing);
+                shot.crossing(&path, &vertex, &hit, self.crossing);
             path.medium = arrived;
             if let Some(touching) = opaque {
                 let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);

@@ -66,7 +66,9 @@ fn warning(loaded: &Loaded, open: &OpenGlass) -> Option<Diagnostic> {
             format!("mesh{name} of glass is inside out in parts: {edges} between two fronts and backs")
         } else {
             let part = percent(open.missing);
-            format!("mesh{name} of glass is not closed: {edges} without a neighbour, {part} of its surface missing")
+            format!(
+                "mesh{name} of glass is not closed: {edges} without a neighbour, {part} of its surface missing"
+            )
         };
     }
     let help = Some(help.to_owned());

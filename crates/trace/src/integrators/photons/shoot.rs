@@ -220,7 +220,7 @@ impl Flight<'_> {
                 return self.shade_surface(&path, &vertex, lacks_photons);
             }
             let Crossing { sides, arrived, near, far, opaque } =
-                shot.crossing(&path, &vertex, hit.shape.t, &mut self.crossing);
+                shot.crossing(&path, &vertex, &hit, &mut self.crossing);
             path.throughput *= absorption(shot.world, arrived, hit.shape.t);
             path.medium = near;
             if let Some(touching) = opaque {

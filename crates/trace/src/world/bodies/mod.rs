@@ -13,8 +13,10 @@ mod cover;
 mod pieces;
 mod seams;
 
+use std::collections::BTreeMap;
+
 use pieces::{Pieces, Rim};
-use seams::{Seams, root};
+use seams::{OpenRim, Seam, Seams, root};
 
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -72,8 +74,12 @@ impl Bodies {
         if pieces.list.is_empty() {
             return Ok(Self::default());
         }
-        let seams = Seams::between(&pieces.list, &pieces.rims, token)?;
+        let mut seams = Seams::between(&pieces.list, &pieces.rims, token)?;
         let groups = Groups::of(&pieces, &seams);
+        // Where pieces do not agree with the rest of their border, nothing closes them.
+        let is_odd = |seam: &&Seam| groups.disagree(seam.pieces()) != seam.disagrees;
+        let odd: Vec<OpenRim> = seams.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
+        seams.open.extend(odd);
         let mut bodies = Self::default();
         let alone = |place| Part { place, is_turned: false, is_open: false };
         bodies.parts = (0..scene.objects.len() as u32).map(alone).collect();
@@ -137,17 +143,24 @@ impl Groups {
     fn of(pieces: &Pieces, seams: &Seams) -> Self {
         let mut same: Vec<u32> = (0..pieces.list.len() as u32).collect();
         for seam in &seams.joined {
-            let [one, other] = seam.pieces.map(|piece| root(&mut same, piece));
+            let [one, other] = seam.pieces().map(|piece| root(&mut same, piece));
             same[one.max(other) as usize] = one.min(other);
         }
         let roots: Vec<u32> = (0..same.len() as u32).map(|piece| root(&mut same, piece)).collect();
-        // Tell each front from that of a neighbour, from the first piece on.
-        let mut neighbours = vec![Vec::new(); roots.len()];
-        for seam in seams.joined.iter().filter(|seam| seam.pieces[0] != seam.pieces[1]) {
-            let [one, other] = seam.pieces;
-            neighbours[one as usize].push((other, seam.disagrees));
-            neighbours[other as usize].push((one, seam.disagrees));
+        // Two pieces agree if most of the border between them does.
+        let mut borders = BTreeMap::new();
+        for seam in &seams.joined {
+            let [one, other] = seam.pieces();
+            let length = seam.rims[0].0.ends[0].distance(seam.rims[0].0.ends[1]);
+            *borders.entry([one.min(other), one.max(other)]).or_insert(0.0) +=
+                if seam.disagrees { -length } else { length };
         }
+        let mut neighbours = vec![Vec::new(); roots.len()];
+        for ([one, other], agreed) in borders.into_iter().filter(|([one, other], _)| one != other) {
+            neighbours[one as usize].push((other, agreed < 0.0));
+            neighbours[other as usize].push((one, agreed < 0.0));
+        }
+        // Tell each front from that of a neighbour, from the first piece on.
         let mut flips = vec![None; roots.len()];
         for first in 0..roots.len() {
             if flips[first].is_some() {
@@ -166,6 +179,11 @@ impl Groups {
             }
         }
         Self { roots, flips: flips.into_iter().map(Option::unwrap_or_default).collect() }
+    }
+
+    /// Whether the fronts of two pieces of one body look different ways.
+    fn disagree(&self, [one, other]: [u32; 2]) -> bool {
+        self.flips[one as usize] != self.flips[other as usize]
     }
 
     /// The pieces of each body.
@@ -205,7 +223,7 @@ struct Hole {
 impl Hole {
     fn of(pieces: &Pieces, groups: &Groups, members: &[u32], seams: &Seams) -> Self {
         let is_own = |rim: &Rim| groups.roots[rim.piece as usize] == members[0];
-        let mut own: Vec<(Rim, [u32; 2])> = seams.open.iter().filter(|(rim, _)| is_own(rim)).copied().collect();
+        let mut own: Vec<OpenRim> = seams.open.iter().filter(|(rim, _)| is_own(rim)).copied().collect();
         if own.is_empty() {
             return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };
         }

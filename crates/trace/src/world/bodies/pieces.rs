@@ -156,9 +156,10 @@ impl Pieces {
         let mirrors = place.mirrors();
         let is_glass = |triangle: usize| match glass {
             MeshGlass::All => true,
-            MeshGlass::Some => mesh.materials.get(triangle).is_some_and(|&own| {
-                loaded.materials.get(own as usize).is_some_and(file_is_glass)
-            }),
+            MeshGlass::Some => mesh
+                .materials
+                .get(triangle)
+                .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(file_is_glass)),
         };
         // Area and volume, by triangles in world coordinates.
         let (mut area, mut volume, mut reach) = (0.0, 0.0, DVec3::ZERO);

@@ -9,11 +9,14 @@ use crate::math::DVec3;
 /// Angles in radians by which surfaces at one edge are told apart.
 const SAME_ANGLE: f64 = 1e-3;
 
+/// A rim with the places of its ends.
+pub(super) type OpenRim = (Rim, [u32; 2]);
+
 /// Two pieces that close each other along an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seam {
-    /// The pieces.
-    pub pieces: [u32; 2],
+    /// The rims, with the places of their ends.
+    pub rims: [OpenRim; 2],
     /// Whether the front of one is on the side of the back of the other.
     pub disagrees: bool,
 }
@@ -23,7 +26,7 @@ pub(super) struct Seam {
 pub(super) struct Seams {
     pub joined: Vec<Seam>,
     /// Rims that nothing closes, with the places of their ends.
-    pub open: Vec<(Rim, [u32; 2])>,
+    pub open: Vec<OpenRim>,
 }
 
 /// A rim between two places.
@@ -34,6 +37,20 @@ struct Half {
     /// Whether it goes from the higher to the lower.
     is_back: bool,
     rim: Rim,
+}
+
+impl Half {
+    fn open(&self) -> OpenRim {
+        let [low, high] = self.places;
+        (self.rim, if self.is_back { [high, low] } else { [low, high] })
+    }
+}
+
+impl Seam {
+    /// The pieces.
+    pub fn pieces(&self) -> [u32; 2] {
+        self.rims.map(|(rim, _)| rim.piece)
+    }
 }
 
 impl Seams {
@@ -52,8 +69,8 @@ impl Seams {
     }
 
     /// Join rims with the same places; returns the others.
-    fn join(&mut self, rims: Vec<(Rim, [u32; 2])>) -> Vec<(Rim, [u32; 2])> {
-        let half = |(rim, [from, to]): (Rim, [u32; 2])| Half {
+    fn join(&mut self, rims: Vec<OpenRim>) -> Vec<OpenRim> {
+        let half = |(rim, [from, to]): OpenRim| Half {
             places: [from.min(to), from.max(to)],
             is_back: from > to,
             rim,
@@ -66,7 +83,7 @@ impl Seams {
         for same in halves.chunk_by(|one, other| one.places == other.places) {
             let mut is_closed = vec![false; same.len()];
             let mut close = |i: usize, j: usize, disagrees: bool| {
-                self.joined.push(Seam { pieces: [same[i].rim.piece, same[j].rim.piece], disagrees });
+                self.joined.push(Seam { rims: [same[i], same[j]].map(|half| half.open()), disagrees });
                 (is_closed[i], is_closed[j]) = (true, true);
             };
             match *same {
@@ -76,10 +93,7 @@ impl Seams {
                 _ => around(same).for_each(|[i, j]| close(i, j, false)),
             }
             let left = same.iter().zip(is_closed).filter(|(_, is_closed)| !is_closed);
-            open.extend(left.map(|(half, _)| {
-                let [low, high] = half.places;
-                (half.rim, if half.is_back { [high, low] } else { [low, high] })
-            }));
+            open.extend(left.map(|(half, _)| half.open()));
         }
         open
     }
@@ -173,9 +187,9 @@ impl Sites {
     fn cut(
         &self,
         pieces: &[Piece],
-        rims: &[(Rim, [u32; 2])],
+        rims: &[OpenRim],
         token: &CancelToken,
-    ) -> Result<Vec<(Rim, [u32; 2])>, Cancelled> {
+    ) -> Result<Vec<OpenRim>, Cancelled> {
         let mut ends: Vec<u32> = rims.iter().flat_map(|&(_, ends)| ends).collect();
         ends.sort_unstable();
         ends.dedup();
@@ -188,14 +202,17 @@ impl Sites {
             let tolerance = pieces[rim.piece as usize].tolerance;
             let way = to - from;
             let mut cuts = Vec::new();
-            tree.meeting(&Aabb::around_f64([from, to]).grown(crate::math::Vec3::splat(tolerance as f32)), |i| {
-                let (site, point) = (ends[i as usize], points[i as usize]);
-                let along = (point - from).dot(way) / way.length_squared();
-                let off = (from + way * along).distance(point);
-                if off <= tolerance + tolerances[i as usize] && along > 0.0 && along < 1.0 {
-                    cuts.push((along, site));
-                }
-            });
+            tree.meeting(
+                &Aabb::around_f64([from, to]).grown(crate::math::Vec3::splat(tolerance as f32)),
+                |i| {
+                    let (site, point) = (ends[i as usize], points[i as usize]);
+                    let along = (point - from).dot(way) / way.length_squared();
+                    let off = (from + way * along).distance(point);
+                    if off <= tolerance + tolerances[i as usize] && along > 0.0 && along < 1.0 {
+                        cuts.push((along, site));
+                    }
+                },
+            );
             cuts.retain(|&(_, site)| site != first && site != last);
             cuts.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
             let mut begin = (0.0, first);
