@@ -1,5 +1,6 @@
 //! The tracer against closed forms: each comment derives the right answer.
 
+mod bodies;
 mod camera;
 mod caustics;
 mod direct;

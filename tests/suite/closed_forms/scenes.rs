@@ -323,6 +323,11 @@ pub fn glass(ior: f32) -> Material {
     plain(MaterialKind::Glass { ior, tint: DVec3::ONE })
 }
 
+/// Glass of this transmittance per unit of length.
+pub fn tinted(ior: f32, tint: DVec3) -> Material {
+    plain(MaterialKind::Glass { ior, tint })
+}
+
 /// A material of a mesh file by its illumination model: 2 is matte grey, 9 glass.
 pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
     FileMaterial {

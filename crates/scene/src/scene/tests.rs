@@ -334,40 +334,6 @@ fn a_value_that_broken_toml_hides_is_not_found_wrong_too() {
 }
 
 #[test]
-fn glass_without_an_inside_is_warned_about() {
-    let glass = "[materials.a]\ntype = 'glass'\n[render]\nambient = [1, 1, 1]\n";
-    let warnings = |shape: &str, material: &str| {
-        let text = format!("{material}{shape}\nmaterial = 'a'\n{CAMERA}");
-        let outcome = outcome(&text);
-        assert!(outcome.scene.is_some(), "{shape}: {:?}", outcome.diagnostics);
-        let all = outcome.diagnostics;
-        assert!(all.iter().all(|one| one.severity == Severity::Warning && one.help.is_some()), "{shape}");
-        all.into_iter().map(|one| one.message).collect::<Vec<_>>()
-    };
-    for (shape, expected) in [
-        ("[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]", "a quad of glass has no inside"),
-        ("[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 1, 0]", "a triangle of glass has no inside"),
-        ("[[disk]]", "a disk of glass has no inside"),
-        ("[[cylinder]]\ncaps = false", "an open cylinder of glass has no inside"),
-        ("[[cone]]\ncap = false", "an open cone of glass has no inside"),
-    ] {
-        assert_eq!(warnings(shape, glass), [expected]);
-        let phong = glass.replace("'glass'", "'phong'");
-        assert_eq!(warnings(shape, &phong), [""; 0], "{shape} that is not of glass");
-    }
-    for closed in [
-        "[[cylinder]]",
-        "[[cone]]",
-        "[[torus]]",
-        "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1",
-        "[[box]]",
-        "[[plane]]",
-    ] {
-        assert_eq!(warnings(closed, glass), [""; 0], "{closed}");
-    }
-}
-
-#[test]
 fn objects_have_the_order_of_the_file_whatever_their_kinds() {
     let radii = |text: &str| -> Vec<i64> {
         let size = |object: &Object| match object.shape {

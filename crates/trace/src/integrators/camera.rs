@@ -55,8 +55,7 @@ impl Shot<'_> {
 
     /// The path that a ray of the camera is.
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
-        let around =
-            self.world.glass_around(ray.origin).map(|(object, material)| Inside { object, material });
+        let around = self.world.glass_around(ray.origin).map(|(body, material)| Inside { body, material });
         let medium = around.fold(Medium::default(), Medium::entered);
         let history = History::CAMERA;
         let cone = Cone { width: 0.0, spread: self.pixel_spread };

@@ -4,11 +4,11 @@ use crate::materials::Glass;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// A glass that a ray is in: the parts of one object may be of several.
+/// A glass that a ray is in: the parts of one body may be of several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Inside {
-    /// The object.
-    pub object: u32,
+    /// The body, by its place in the order of the file.
+    pub body: u32,
     /// The material of the surface that the ray entered by.
     pub material: u32,
 }
@@ -52,11 +52,11 @@ impl Medium {
         self
     }
 
-    /// After leaving a glass; none where the ray was in none of that object, as far as it knows. A surface of several
-    /// glasses may be entered by one and left by another: then the object's last is left.
+    /// After leaving a glass; none where the ray was in none of that body, as far as it knows. A surface of several
+    /// glasses may be entered by one and left by another: then the body's last is left.
     pub fn left(self, glass: Inside) -> Option<Self> {
         let same = self.known().iter().rposition(|&own| own == glass);
-        same.or_else(|| self.known().iter().rposition(|own| own.object == glass.object))
+        same.or_else(|| self.known().iter().rposition(|own| own.body == glass.body))
             .map(|place| self.without(place))
     }
 
@@ -92,8 +92,8 @@ fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
 mod tests {
     use super::*;
 
-    const fn part(object: u32, material: u32) -> Inside {
-        Inside { object, material }
+    const fn part(body: u32, material: u32) -> Inside {
+        Inside { body, material }
     }
 
     #[test]
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_one_object_are_told_apart_by_their_material() {
+    fn parts_of_one_body_are_told_apart_by_their_material() {
         let both = Medium::default().entered(part(1, 0)).entered(part(1, 5));
         assert_eq!(both.left(part(1, 0)), Some(Medium::default().entered(part(1, 5))));
         // Entered by material 0, left by material 2.
@@ -132,7 +132,7 @@ mod tests {
     fn what_is_retained_keeps_its_order() {
         let both = Medium::default().entered(part(3, 0)).entered(part(1, 5)).entered(part(2, 0));
         let odd = Medium::default().entered(part(1, 5)).entered(part(3, 0));
-        assert_eq!(both.retained(|glass| glass.object != 2), odd);
+        assert_eq!(both.retained(|glass| glass.body != 2), odd);
         assert_eq!(both.retained(|_| false), Medium::default());
     }
 }

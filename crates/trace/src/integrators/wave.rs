@@ -286,21 +286,22 @@ impl Wave<'_, '_> {
             let vertex = Vertex::to_shade(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
                 let weight = if vertex.emits() { shot.lamp_weight(&path, &hit) } else { 1.0 };
-                return self.shade_surface(path, &vertex, hit.shape.t, weight);
+                let after = shot.without_open(path.medium);
+                return self.shade_surface(path, &vertex, (hit.shape.t, after), weight);
             }
-            let Crossing { sides, near, far, opaque } =
-                shot.crossing(&path, &vertex, hit.shape.t, self.crossing);
-            path.medium = near;
+            let Crossing { sides, arrived, near, far, opaque } =
+                shot.crossing(&path, &vertex, &hit, self.crossing);
+            path.medium = arrived;
             if let Some(touching) = opaque {
                 let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let weight = if vertex.emits() { shot.touching_lamp_weight(&path, &touched) } else { 1.0 };
-                return self.shade_surface(path, &vertex, hit.shape.t, weight);
+                return self.shade_surface(path, &vertex, (hit.shape.t, near), weight);
             }
             if near.glass() != far.glass() {
-                return self.shade_glass(path, &vertex.between(sides), far, hit.shape.t);
+                return self.shade_glass(path, &vertex.between(sides), [near, far], hit.shape.t);
             }
-            path.throughput *= absorption(shot.world, near, hit.shape.t);
+            path.throughput *= absorption(shot.world, arrived, hit.shape.t);
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
             path.history = path.history.hidden();
             path.cone = path.cone.after(hit.shape.t);
@@ -318,10 +319,18 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// Take what a surface sends out on the way of a path; whether the path may be scattered there.
-    fn arrive(&mut self, path: &mut PathRay, vertex: &Vertex<'_>, distance: f32, weight: f32) -> bool {
+    /// Take what a surface sends out on the way of a path, which goes on in the medium `after`; whether the path may be scattered
+    /// there.
+    fn arrive(
+        &mut self,
+        path: &mut PathRay,
+        vertex: &Vertex<'_>,
+        (distance, after): (f32, Medium),
+        weight: f32,
+    ) -> bool {
         let shot = self.shot;
         path.throughput *= absorption(shot.world, path.medium, distance);
+        path.medium = after;
         if vertex.emits() {
             let radiance = vertex.emitted(path, self.counters);
             self.add_emitted(path, radiance, weight);
@@ -329,8 +338,8 @@ impl Wave<'_, '_> {
         self.depth < shot.settings.render.max_depth
     }
 
-    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, distance: f32, weight: f32) {
-        if !self.arrive(&mut path, vertex, distance, weight) {
+    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, way: (f32, Medium), weight: f32) {
+        if !self.arrive(&mut path, vertex, way, weight) {
             return;
         }
         match &vertex.material.bsdf {
@@ -370,8 +379,14 @@ impl Wave<'_, '_> {
         self.push_reflected(reflected(path, vertex, &shading, mirror.reflectance));
     }
 
-    fn shade_glass(&mut self, mut path: PathRay, vertex: &Vertex<'_>, far: Medium, distance: f32) {
-        if !self.arrive(&mut path, vertex, distance, 1.0) {
+    fn shade_glass(
+        &mut self,
+        mut path: PathRay,
+        vertex: &Vertex<'_>,
+        [near, far]: [Medium; 2],
+        distance: f32,
+    ) {
+        if !self.arrive(&mut path, vertex, (distance, near), 1.0) {
             return;
         }
         let shading = vertex.shading(self.counters);

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Camera, Geometry, ObjectMaterial, Parts, World, lower};
+use super::{Bodies, Camera, Geometry, ObjectMaterial, Parts, World, lower};
+use crate::assets::LoadedMesh;
+use crate::control::CancelToken;
 use crate::lights::Lights;
 use crate::materials::Material;
 use crate::scene::description::{self, Scene};
@@ -14,11 +16,26 @@ impl World {
         let camera = parts.camera.as_ref().unwrap_or(&scene.camera);
         let camera = Camera::new(camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
         let is_mipmapped = materials.iter().any(Material::is_mipmapped);
-        let glass_at_eye = Vec::new();
-        let world =
-            Self { camera, geometry, materials, object_materials, lights, glass_at_eye, is_mipmapped };
+        let bodies = parts.bodies.clone().unwrap_or_else(|| Arc::new(bodies_of(scene, parts)));
+        let world = Self {
+            camera,
+            geometry,
+            materials,
+            object_materials,
+            lights,
+            has_open_glass: bodies.has_open(),
+            bodies,
+            glass_at_eye: Vec::new(),
+            is_mipmapped,
+        };
         Self { glass_at_eye: world.find_glass_at_eye(), ..world }
     }
+}
+
+fn bodies_of(scene: &Scene, parts: &Parts) -> Bodies {
+    let meshes: Vec<&LoadedMesh> = parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
+    // A token that nobody cancels.
+    Bodies::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
 }
 
 /// The scene's materials, then each mesh file's, then the one for triangles without any.

@@ -4,6 +4,7 @@
 //! of the hit: they are crossed together, on the way from a point that is certainly before all of them to one that is
 //! certainly beyond. Rays that leave start at these two, so that none is missed and none is met again.
 
+use super::lonely::meets;
 use super::{Geometry, Hit, MeshInstance, Object, World};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Asked, Ray, Shape, ShapeHit, SurfacePoint};
@@ -41,18 +42,25 @@ pub enum Near {
         hit: Hit,
         /// Its material.
         material: u32,
-        /// Whether its front is on the side of the point before.
+        /// Whether its front is on the side of the point before; of glass, whether the outside of its body is.
         is_front: bool,
     },
 }
 
-/// Objects and triangles of them that may be near.
-pub type NearTriangles = Vec<(u32, u32)>;
+/// Memory for what may be near.
+#[derive(Debug, Default)]
+pub struct NearMemory {
+    objects: Vec<u32>,
+    /// Objects and triangles of them.
+    triangles: Vec<(u32, u32)>,
+}
 
 /// What is asked of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meeting {
-    /// A point of one of the surfaces.
+    /// The hit of one of the surfaces.
+    pub hit: Hit,
+    /// A point of that surface.
     pub surface: SurfacePoint,
     /// Its normal on the side that a ray comes from.
     pub normal: Vec3,
@@ -77,11 +85,25 @@ impl Probe {
 
 impl World {
     /// The sides of all surfaces that touch at a point, and what is there, in an order that depends on the scene alone.
-    /// `triangles` is memory.
-    pub fn contact(&self, at: &Meeting, triangles: &mut NearTriangles, mut visit: impl FnMut(Near)) -> Sides {
+    #[inline]
+    pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
+        let error = if self.geometry.is_lonely(&at.hit, at) {
+            self.geometry.only(at, memory)
+        } else {
+            self.geometry.search(at, memory)
+        };
+        self.contact_of(at, (memory, error), visit)
+    }
+
+    /// The same of what may be near, where points may be off by so much.
+    pub(super) fn contact_of(
+        &self,
+        at: &Meeting,
+        (memory, error): (&NearMemory, Vec3),
+        mut visit: impl FnMut(Near),
+    ) -> Sides {
         let geometry = &self.geometry;
         let (point, normal) = (at.surface.point, at.normal);
-        let error = geometry.near_triangles(at, triangles);
         let sides = Sides {
             before: offset_origin(point, error + normal.abs() * at.lead, normal, normal),
             beyond: offset_origin(point, error, normal, -normal),
@@ -97,19 +119,19 @@ impl World {
             visit(near);
         };
         let mut closed_lead = false;
-        geometry.near_objects(at, |id, object| {
-            if let Object::Shape(shape) = object {
+        for &id in &memory.objects {
+            if let Object::Shape(shape) = &geometry.objects()[id as usize] {
                 closed_lead |=
                     shape.encloses(sides.before.as_dvec3()) != shape.encloses(probe.close.as_dvec3());
                 self.near_shape(shape, id, &sides).into_iter().for_each(&mut found);
             }
-        });
+        }
         let ends = [sides.before, sides.beyond].map(|end| end.as_dvec3());
-        for &(object, triangle) in &*triangles {
+        for &(object, triangle) in &memory.triangles {
             let mesh = geometry.objects()[object as usize].mesh();
             if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.crossed(triangle, ends)) {
                 let hit = Hit { shape, object };
-                found(Near::Surface { hit, material: self.material_index(&hit) as u32, is_front });
+                found(self.surface_near(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { Sides { before: probe.close, ..sides } }
@@ -124,7 +146,27 @@ impl World {
         let bare = Asked { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
         let is_front = shape.asked_surface(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(Near::Surface { hit: Hit { shape: own, object }, material, is_front })
+        Some(self.surface_near(Hit { shape: own, object }, material, is_front))
+    }
+
+    fn surface_near(&self, hit: Hit, material: u32, is_front: bool) -> Near {
+        let is_turned = self.is_glass(material) && self.bodies.is_turned(hit.object);
+        Near::Surface { hit, material, is_front: is_front != is_turned }
+    }
+
+    /// The body of glass that an object is of, by its place in the order of the file.
+    pub fn body(&self, object: u32) -> u32 {
+        self.bodies.place(object)
+    }
+
+    /// Whether any body of glass is open: no ray knows whether it is in such a one.
+    pub fn has_open_glass(&self) -> bool {
+        self.has_open_glass
+    }
+
+    /// Whether the body of glass at a place is open.
+    pub fn is_open(&self, body: u32) -> bool {
+        self.bodies.is_open(body)
     }
 
     /// Whether a material is glass.
@@ -188,37 +230,47 @@ impl Geometry {
     /// How much farther than the error of a point what touches it is looked for.
     const REACH: f32 = 16.0;
 
-    /// Visit the objects whose boxes are near to a point.
-    fn near_objects(&self, at: &Meeting, mut visit: impl FnMut(u32, &Object)) {
-        for &id in self.unbounded() {
-            visit(id, &self.objects()[id as usize]);
+    /// How near what touches a point is looked for, along each axis.
+    pub(super) fn margin(&self, at: &Meeting) -> Vec3 {
+        (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead))
+    }
+
+    /// Collect what was hit as the only thing that may be near; a bound on each component's distance to it.
+    pub(super) fn only(&self, at: &Meeting, memory: &mut NearMemory) -> Vec3 {
+        let Hit { shape, object } = at.hit;
+        memory.objects.clear();
+        memory.triangles.clear();
+        match &self.objects()[object as usize] {
+            Object::Shape(_) => {
+                memory.objects.push(object);
+                at.surface.error
+            }
+            Object::Mesh(mesh) => {
+                memory.triangles.push((object, shape.primitive));
+                at.surface.error.max(mesh.touch_error(shape.primitive, at.surface.point))
+            }
         }
-        self.tree().meeting(&self.near_box(at), |id| visit(id, &self.objects()[id as usize]));
     }
 
-    fn near_box(&self, at: &Meeting) -> Aabb {
-        let SurfacePoint { point, error, .. } = at.surface;
-        let margin = (error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead));
-        Aabb { min: point, max: point }.grown(margin)
-    }
-
-    /// Collect the triangles of meshes that may touch a point; a bound on each component's distance to what touches it.
-    fn near_triangles(&self, at: &Meeting, triangles: &mut NearTriangles) -> Vec3 {
+    /// Collect the shapes and triangles of meshes that may touch a point; a bound on each component's distance to what touches it.
+    pub(super) fn search(&self, at: &Meeting, memory: &mut NearMemory) -> Vec3 {
+        let NearMemory { objects, triangles } = memory;
+        objects.clear();
         triangles.clear();
+        let point = at.surface.point;
+        let near = Aabb { min: point, max: point }.grown(self.margin(at));
+        objects.extend(self.unbounded());
+        self.tree().meeting(&near, |id| objects.push(id));
         let mut error = at.surface.error;
-        if !self.has_meshes() {
-            return error;
-        }
-        let near = self.near_box(at);
-        self.near_objects(at, |id, object| {
-            let Object::Mesh(mesh) = object else { return };
+        for &id in &*objects {
+            let Object::Mesh(mesh) = &self.objects()[id as usize] else { continue };
             mesh.tree.triangles().meeting(&mesh.local_box(&near), |triangle| {
-                if Aabb::around_f64(mesh.world_corners(triangle)).meets(&near) {
+                if meets(mesh.world_corners(triangle), &near) {
                     triangles.push((id, triangle));
-                    error = error.max(mesh.touch_error(triangle, at.surface.point));
+                    error = error.max(mesh.touch_error(triangle, point));
                 }
             });
-        });
+        }
         // Some are visited more than once.
         triangles.sort_unstable();
         triangles.dedup();
@@ -228,7 +280,7 @@ impl Geometry {
 
 impl MeshInstance {
     /// A box of the world in the mesh's coordinates.
-    fn local_box(&self, bounds: &Aabb) -> Aabb {
+    pub(super) fn local_box(&self, bounds: &Aabb) -> Aabb {
         let corner = |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { bounds.min[axis] } else { bounds.max[axis] };
             self.transform.inverse_point(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())

@@ -10,6 +10,7 @@ use crate::math::DVec3;
 use crate::math::transform::Transform;
 use crate::scene::description::{self, Lowered, Scene};
 
+use super::lonely::Lonely;
 use super::merged::MergedTriangle;
 use super::{MergedMeshes, MeshInstance, MeshTree, Object};
 
@@ -35,7 +36,8 @@ pub struct Geometry {
     unbounded: Vec<u32>,
     /// What the triangles of any mesh may be off, and room for the tests of rays there.
     mesh_rounding: f32,
-    has_meshes: bool,
+    /// Where nothing is near a surface.
+    lonely: Lonely,
     instructions: Instructions,
 }
 
@@ -82,9 +84,9 @@ impl Geometry {
         let merged = merged.transpose()?;
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
         let mesh_rounding = rounding.fold(0.0, f32::max);
-        let has_meshes = objects.iter().any(|object| object.mesh().is_some());
         let origin = DVec3::ZERO;
-        Ok(Self { objects, origin, tree, merged, unbounded, mesh_rounding, has_meshes, instructions })
+        let lonely = Lonely::new(&boxes);
+        Ok(Self { objects, origin, tree, merged, unbounded, mesh_rounding, lonely, instructions })
     }
 
     /// The objects, known by their index.
@@ -144,16 +146,16 @@ impl Geometry {
         self.mesh_rounding
     }
 
+    /// Where nothing is near a surface.
+    pub(super) fn lonely(&self) -> &Lonely {
+        &self.lonely
+    }
+
     /// The same, with packets traced by other instructions.
     #[cfg(test)]
     pub(super) fn with(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions;
         self
-    }
-
-    /// Whether any of the objects is a mesh.
-    pub(super) fn has_meshes(&self) -> bool {
-        self.has_meshes
     }
 
     /// What packets are traced by.

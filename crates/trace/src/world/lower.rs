@@ -62,6 +62,14 @@ pub fn file_emits(own: &FileMaterial) -> bool {
     }
 }
 
+/// Whether a mesh file's material is glass.
+pub fn file_is_glass(own: &FileMaterial) -> bool {
+    match kind(own) {
+        FileKind::Glass => true,
+        FileKind::Phong | FileKind::Mirror => false,
+    }
+}
+
 /// What the front side of a mesh file's material sends out.
 pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     if !file_emits(own) {

@@ -2,11 +2,13 @@
 
 mod along;
 mod assemble;
+mod bodies;
 pub mod camera;
 pub mod contact;
 mod emitters;
 mod few;
 pub mod geometry;
+mod lonely;
 mod lower;
 mod merged;
 mod mesh_instance;
@@ -22,8 +24,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 pub use crate::accel::{Cell, Loops, PACKET, Stretch};
+pub use bodies::{Bodies, OpenGlass};
 pub use camera::Camera;
-pub use contact::{Meeting, Near, NearTriangles, Sides};
+pub use contact::{Meeting, Near, NearMemory, Sides};
 pub use emitters::{lights, photon_source, sky};
 pub use geometry::{Geometry, Hit};
 pub use lower::file_emits;
@@ -65,6 +68,8 @@ pub struct Parts {
     pub orbiter: Option<OrbiterCamera>,
     /// A camera in place of the scene's.
     pub camera: Option<description::Camera>,
+    /// The bodies of glass, if they were found before.
+    pub bodies: Option<Arc<Bodies>>,
 }
 
 /// A scene that can be traced.
@@ -80,6 +85,10 @@ pub struct World {
     object_materials: Vec<ObjectMaterial>,
     /// Lights of every kind.
     pub lights: Arc<Lights>,
+    /// Which surfaces of glass are one body.
+    bodies: Arc<Bodies>,
+    /// Whether any body of glass is open.
+    has_open_glass: bool,
     /// The closed shapes of glass that the lens may be in, with their materials.
     glass_at_eye: Vec<(u32, u32)>,
     /// Whether any material has a texture with levels.

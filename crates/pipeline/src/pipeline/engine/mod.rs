@@ -33,6 +33,7 @@ use super::stages::accel::{AccelCache, accel};
 use super::stages::canvas::Canvas;
 use super::stages::coarse::Coarse;
 use super::stages::films::Films;
+use super::stages::glass::glass;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
@@ -57,7 +58,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
 use crate::system::threads::not_started;
-use crate::world::{Lookups, World};
+use crate::world::{Bodies, Lookups, World};
 
 /// What an engine works with; tests work with other means.
 #[derive(Clone, Copy)]
@@ -81,6 +82,7 @@ pub(super) struct Engine {
     contents: Arc<Contents>,
     parsed: Memo<Arc<Parsed>>,
     meshes: Pool<PathBuf, KeptMesh>,
+    bodies: Memo<Arc<Bodies>>,
     textures: TextureCache,
     accel: AccelCache,
     /// How many requests there were.
@@ -127,6 +129,7 @@ impl Engine {
             contents,
             parsed: Memo::default(),
             meshes: Pool::default(),
+            bodies: Memo::default(),
             textures: TextureCache::default(),
             accel: AccelCache::default(),
             requests: 0,
@@ -337,11 +340,11 @@ impl Engine {
         let pool = self.pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool };
         let lookups = plan.settings.lookups();
-        let (meshes, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
+        let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;
-        let good = Good { generation, parsed, meshes, textures: Arc::new(textures), needed };
+        let good = Good { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
         let ready = self.build(request, &good, plan, table, &reading)?;
         self.good = Some(good);
         Ok(ready)
@@ -356,7 +359,7 @@ impl Engine {
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
     ) -> Result<Ready, Stop> {
-        let Good { parsed, meshes, textures, .. } = good;
+        let Good { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
         let eye = Eye::new(scene, parsed.orbiter, &request.overrides.camera);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
@@ -370,7 +373,8 @@ impl Engine {
         let gather = || Ok(lights(scene, &of, &built.geometry, textures, memos, reading.token)?);
         let lights = table.run(Stage::Lights, gather)?;
         let surfaces = keys::surfaces(scene, &of, &textures.keys);
-        let world = world(scene, (&surfaces, &of), (built, lights), textures, &eye, &mut self.world);
+        let parts = (built, lights, Arc::clone(bodies));
+        let world = world(scene, (&surfaces, &of), parts, textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = **textures;
         Ok(Ready {
             parsed: parsed.clone(),
@@ -391,19 +395,20 @@ impl Engine {
         findings: &mut Findings,
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
-    ) -> Result<(Meshes, Textures, Needed), Stop> {
+    ) -> Result<(Meshes, Arc<Bodies>, Textures, Needed), Stop> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, reading))?;
         let needed = needed(loaded, &found, lookups, cache);
         let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
+        let bodies = glass(loaded, &found, &mut self.bodies, findings, reading.token)?;
         if findings.errors.is_empty() {
             self.say_files(findings, table.sink);
             let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
             let generation = table.sink.generation;
             table.sink.send(Event::Warnings { generation, warnings });
-            Ok((found, texels, needed))
+            Ok((found, bodies, texels, needed))
         } else {
             Err(Stop::Failed(findings.take_failure()))
         }
@@ -502,6 +507,7 @@ impl Engine {
             let mut wanted = needed(loaded, &found, Lookups::ALL, &self.textures);
             add_declared(loaded, &mut wanted.textures);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
+            glass(loaded, &found, &mut self.bodies, &mut findings, &token)?;
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;

@@ -12,7 +12,7 @@ use crate::pipeline::stages::textures::{Needed, Textures, needed, textures};
 use crate::pipeline::stages::{Findings, Reading, Stop};
 use crate::pipeline::table::StageTable;
 use crate::pipeline::watch::content::Snapshot;
-use crate::world::Lookups;
+use crate::world::{Bodies, Lookups};
 
 /// A scene with all files that its picture needs.
 #[derive(Clone)]
@@ -21,6 +21,7 @@ pub(super) struct Good {
     pub(super) generation: u64,
     pub(super) parsed: Arc<Parsed>,
     pub(super) meshes: Meshes,
+    pub(super) bodies: Arc<Bodies>,
     pub(super) textures: Arc<Textures>,
     /// What the textures were loaded for.
     pub(super) needed: Needed,

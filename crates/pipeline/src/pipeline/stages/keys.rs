@@ -44,6 +44,17 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
+/// Which surfaces there are, and which of them are of glass.
+pub(in crate::pipeline) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
+    let mut key = Fingerprint::new("glass");
+    key.key(&shapes(scene, of));
+    for object in &scene.objects {
+        let is_glass = object.material.map(|index| scene.materials[index].kind.is_glass());
+        key.flag(is_glass.is_some()).flag(is_glass.unwrap_or_default());
+    }
+    key.finish()
+}
+
 /// What gives light, where it is, and which objects it is. `sky` is the map of the environment, `patterns` are the images that
 /// lamps may have on them.
 pub(in crate::pipeline) fn lights(

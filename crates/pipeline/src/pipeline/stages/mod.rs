@@ -6,6 +6,7 @@ pub(super) mod canvas;
 pub(super) mod coarse;
 mod cost;
 pub(super) mod films;
+pub(super) mod glass;
 pub(super) mod keys;
 pub(super) mod lights;
 pub(super) mod meshes;

@@ -11,7 +11,7 @@ use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
 use crate::scene::fingerprint::{Key, Referents};
-use crate::world::{self, Parts, World};
+use crate::world::{self, Bodies, Parts, World};
 
 /// A world with the key of all that its pictures depend on.
 pub(in crate::pipeline) type Keyed = (Key, Arc<World>);
@@ -52,7 +52,7 @@ impl Eye {
 pub(in crate::pipeline) fn world(
     scene: &Scene,
     (surfaces, of): (&Key, &Referents<'_>),
-    (built, lights): (Built, Arc<Lights>),
+    (built, lights, bodies): (Built, Arc<Lights>, Arc<Bodies>),
     textures: &Textures,
     eye: &Eye,
     memo: &mut Memo<Arc<World>>,
@@ -63,8 +63,13 @@ pub(in crate::pipeline) fn world(
         return (key, world.clone());
     }
     let Eye { camera, orbiter } = eye.clone();
-    let parts =
-        Parts { meshes: built.meshes, images: textures.images.clone(), orbiter, camera: Some(camera) };
+    let parts = Parts {
+        meshes: built.meshes,
+        images: textures.images.clone(),
+        orbiter,
+        camera: Some(camera),
+        bodies: Some(bodies),
+    };
     let world = Arc::new(World::new(scene, &parts, built.geometry, lights));
     memo.set(built_key, world.clone());
     (key, world)

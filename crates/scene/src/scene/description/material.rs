@@ -87,6 +87,14 @@ impl MaterialKind {
             Self::Glass { .. } => "glass",
         }
     }
+
+    /// Whether it is glass.
+    pub fn is_glass(&self) -> bool {
+        match self {
+            Self::Glass { .. } => true,
+            Self::Phong { .. } | Self::Mirror { .. } => false,
+        }
+    }
 }
 
 /// A tangent-space normal map.

@@ -17,16 +17,9 @@ pub(super) struct Materials {
     pub(super) list: Option<Vec<Material>>,
     /// Which of them emit light.
     emissive: Vec<bool>,
-    /// Which of them are of glass.
-    glass: Vec<bool>,
 }
 
 impl Materials {
-    /// Whether a material is glass.
-    pub(super) fn is_glass(&self, index: usize) -> bool {
-        self.glass.get(index).copied().unwrap_or(false)
-    }
-
     /// Whether a material emits light.
     pub(super) fn is_emissive(&self, index: usize) -> bool {
         self.emissive.get(index).copied().unwrap_or(false)
@@ -40,9 +33,7 @@ pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
         tables.into_iter().map(|(name, _, table)| material(name, &table?, textures)).collect();
     let emits = |material: &Material| material.emits();
     let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
-    let is_glass = |material: &Material| matches!(material.kind, MaterialKind::Glass { .. });
-    let glass = read.iter().map(|material| material.as_ref().is_some_and(is_glass)).collect();
-    Materials { names, list: read.into_iter().collect(), emissive, glass }
+    Materials { names, list: read.into_iter().collect(), emissive }
 }
 
 choice! {

@@ -230,7 +230,7 @@ impl Photons {
         let settings =
             RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
         let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
-        let inside = |&object: &u32| Inside { object, material: material(object) };
+        let inside = |&body: &u32| Inside { body, material: material(body) };
         let glasses: &[Inside] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {

@@ -117,7 +117,7 @@ impl Shooting<'_> {
     /// The glass around a point.
     fn medium_at(&self, point: Vec3) -> Medium {
         let world = self.shot.world;
-        let around = |glass: &&Inside| world.encloses(glass.object, point);
+        let around = |glass: &&Inside| world.encloses(glass.body, point);
         self.glasses.iter().filter(around).copied().fold(Medium::default(), Medium::entered)
     }
 }
@@ -215,16 +215,18 @@ impl Flight<'_> {
         for _ in 0..MOST_HIDDEN {
             let vertex = Vertex::to_shade(shot, &path, &hit);
             if vertex.material.bsdf.glass().is_none() {
-                return self.shade_surface(path, &vertex, hit.shape.t, lacks_photons);
+                path.throughput *= absorption(shot.world, path.medium, hit.shape.t);
+                path.medium = shot.without_open(path.medium);
+                return self.shade_surface(&path, &vertex, lacks_photons);
             }
-            let Crossing { sides, near, far, opaque } =
-                shot.crossing(&path, &vertex, hit.shape.t, &mut self.crossing);
+            let Crossing { sides, arrived, near, far, opaque } =
+                shot.crossing(&path, &vertex, &hit, &mut self.crossing);
+            path.throughput *= absorption(shot.world, arrived, hit.shape.t);
             path.medium = near;
             if let Some(touching) = opaque {
                 let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
-                return self.shade_surface(path, &vertex, hit.shape.t, lacks_photons);
+                return self.shade_surface(&path, &vertex, lacks_photons);
             }
-            path.throughput *= absorption(shot.world, near, hit.shape.t);
             if near.glass() != far.glass() {
                 return self.shade_glass(&path, &vertex.between(sides), far);
             }
@@ -237,9 +239,8 @@ impl Flight<'_> {
         }
     }
 
-    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, distance: f32, lacks_photons: bool) {
+    fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, lacks_photons: bool) {
         let shot = self.shooting.shot;
-        path.throughput *= absorption(shot.world, path.medium, distance);
         match &vertex.material.bsdf {
             // What comes straight is found by light samples.
             Bsdf::Phong(_) if lacks_photons => {}
@@ -248,7 +249,7 @@ impl Flight<'_> {
                 if bsdf.is_black() {
                     return;
                 }
-                self.store(&path, vertex.surface.point, vertex.normal);
+                self.store(path, vertex.surface.point, vertex.normal);
                 if !(path.history.is_seen && self.goes_on()) {
                     return;
                 }
@@ -262,15 +263,15 @@ impl Flight<'_> {
                     self.scatter_open();
                 }
                 let i = self.open.used.trailing_ones() as usize;
-                let lit = LitVertex { path: &path, place: 0, vertex, shading, bsdf };
+                let lit = LitVertex { path, place: 0, vertex, shading, bsdf };
                 self.open.put(i, shot, &lit, Measure::ALL, medium);
                 let counts = self.open.landed(i, vertex.to_eye);
                 set_lane(&mut self.open.throughput, i, path.throughput * counts);
             }
             Bsdf::Mirror(mirror) if self.goes_on() => {
                 let shading = vertex.shading(&mut self.counters);
-                let ray = reflected(&path, vertex, &shading, mirror.reflectance);
-                self.push(&path, vertex, (shading.normal, 1.0), ray);
+                let ray = reflected(path, vertex, &shading, mirror.reflectance);
+                self.push(path, vertex, (shading.normal, 1.0), ray);
             }
             Bsdf::Mirror(_) | Bsdf::Glass(_) => {}
         }

@@ -11,7 +11,6 @@ mod sphere;
 mod torus;
 mod triangle;
 
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::super::description::{Located, Object, Shape};
@@ -87,35 +86,7 @@ fn object(
         return None;
     }
     let shape = shape?;
-    if material.is_some_and(|index| materials.is_glass(index)) {
-        warn_about_no_inside(table, &shape, key.span());
-    }
     Some(Object { shape, material, name: name?, span: table.span.clone() })
-}
-
-/// Warns about glass that a ray enters and never leaves, or leaves and never entered; `span` is where the material is named.
-fn warn_about_no_inside(table: &Table<'_>, shape: &Shape, span: Option<Range<usize>>) {
-    let (what, help) = match shape {
-        Shape::Quad { .. } => ("a quad", "use a thin [[box]] for a pane"),
-        Shape::Triangle { .. } => ("a triangle", "use a [[box]], or a closed [[mesh]]"),
-        Shape::Disk { .. } => ("a disk", "use a flat [[cylinder]] for a round pane"),
-        Shape::Cylinder { caps: false, .. } => ("an open cylinder", "close it by `caps = true`"),
-        Shape::Cone { cap: false, .. } => ("an open cone", "close it by `cap = true`"),
-        // A plane bounds all that is behind it; whether a mesh is closed is not known before it is loaded.
-        Shape::Sphere { .. }
-        | Shape::Plane { .. }
-        | Shape::Box { .. }
-        | Shape::Cylinder { caps: true, .. }
-        | Shape::Cone { cap: true, .. }
-        | Shape::Torus { .. }
-        | Shape::Mesh { .. } => return,
-    };
-    let span = span.unwrap_or_else(|| table.span.clone());
-    table.context.report_with(|| {
-        Issue::warning(span, format!("{what} of glass has no inside"))
-            .label("glass refracts where a ray goes in and where it comes out")
-            .help(help)
-    });
 }
 
 /// A direction of any length but 0; `what` is wrong without it.

@@ -1,0 +1,274 @@
+//! Which surfaces of glass are one body.
+//!
+//! A ray that goes into glass by one object and out by another is told by both that it was in the same thing only if they are one
+//! body. Objects of glass that enclose nothing by themselves (meshes, quads, triangles, disks, tubes) are one where they close each
+//! other: where their rims are the same but for rounding, whole or cut by the ends of others, and the surface goes on from one
+//! front to the other. A piece whose front looks the other way than its neighbours' is turned, and so is a body whose front looks
+//! inwards. A body has the place of its last object in the order of the file.
+//!
+//! A body with a hole is open, unless something opaque is all around the hole. No ray can know whether it is in such glass: what is
+//! told by its surface holds on the ray that comes there or leaves from there, and no further (`integrators::crossing`).
+
+mod cover;
+mod pieces;
+mod seams;
+
+use std::collections::BTreeMap;
+
+use pieces::{Pieces, Rim};
+use seams::{OpenRim, Seam, Seams, root};
+
+use crate::assets::LoadedMesh;
+use crate::control::{CancelToken, Cancelled};
+use crate::math::DVec3;
+use crate::scene::description::Scene;
+
+/// The part of its surface that a body may lack and is still told about as if it were whole.
+const SMALL_HOLE: f64 = 1e-3;
+
+/// The part of its surface below which a hole is rounding.
+const NO_HOLE: f64 = 1e-7;
+
+/// The part of a rim that opaque surfaces are to cover, so that they close it.
+const COVERED: f64 = 0.95;
+
+/// The bodies of a scene's glass.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bodies {
+    /// One for each object; empty where each is a body of its own and none is open.
+    parts: Vec<Part>,
+    /// The pieces that stay open.
+    open: Vec<OpenGlass>,
+}
+
+/// What an object is of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Part {
+    place: u32,
+    is_turned: bool,
+    is_open: bool,
+}
+
+/// An object of glass that does not close a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenGlass {
+    /// The object.
+    pub object: u32,
+    /// Edges of it that nothing closes.
+    pub edges: usize,
+    /// The part of the body's surface that is missing; at most 1 is sensible, more is possible.
+    pub missing: f64,
+    /// Whether its edges have neighbours, but with the front on the other side.
+    pub disagrees: bool,
+    /// Whether opaque surfaces are around the hole.
+    pub is_covered: bool,
+}
+
+impl Bodies {
+    /// The bodies of a scene, whose mesh files are these.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
+        let pieces = Pieces::of(scene, meshes, token)?;
+        if pieces.list.is_empty() {
+            return Ok(Self::default());
+        }
+        let mut seams = Seams::between(&pieces.list, &pieces.rims, token)?;
+        let groups = Groups::of(&pieces, &seams);
+        // Where pieces do not agree with the rest of their border, nothing closes them.
+        let is_odd = |seam: &&Seam| groups.disagree(seam.pieces()) != seam.disagrees;
+        let odd: Vec<OpenRim> = seams.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
+        seams.open.extend(odd);
+        let mut bodies = Self::default();
+        let alone = |place| Part { place, is_turned: false, is_open: false };
+        bodies.parts = (0..scene.objects.len() as u32).map(alone).collect();
+        for members in groups.members() {
+            let hole = Hole::of(&pieces, &groups, &members, &seams);
+            let is_covered = hole.part > SMALL_HOLE
+                && cover::covered(scene, meshes, &pieces, &hole.rims, token)? >= COVERED;
+            let is_open = hole.part > SMALL_HOLE && !is_covered;
+            let turns = groups.turns(&pieces, &members, hole.part <= SMALL_HOLE);
+            let place = members.iter().map(|&piece| pieces.list[piece as usize].object).max();
+            for &piece in &members {
+                let object = pieces.list[piece as usize].object;
+                let is_turned = turns != groups.flips[piece as usize];
+                bodies.parts[object as usize] = Part { place: place.unwrap_or(object), is_turned, is_open };
+                bodies.open.extend(hole.at(piece, object, is_covered));
+            }
+        }
+        bodies.open.sort_by_key(|open| open.object);
+        let is_plain = |(object, part): (u32, &Part)| *part == alone(object);
+        if (0..).zip(&bodies.parts).all(is_plain) {
+            bodies.parts.clear();
+        }
+        Ok(bodies)
+    }
+
+    /// The place of an object's body in the order of the file.
+    pub fn place(&self, object: u32) -> u32 {
+        self.parts.get(object as usize).map_or(object, |part| part.place)
+    }
+
+    /// Whether the front of an object is on the inside of its body.
+    pub fn is_turned(&self, object: u32) -> bool {
+        self.parts.get(object as usize).is_some_and(|part| part.is_turned)
+    }
+
+    /// Whether the body at a place is open.
+    pub fn is_open(&self, place: u32) -> bool {
+        self.parts.get(place as usize).is_some_and(|part| part.is_open)
+    }
+
+    /// Whether any body is open.
+    pub fn has_open(&self) -> bool {
+        self.parts.iter().any(|part| part.is_open)
+    }
+
+    /// The objects with holes in their surface, in the order of the file.
+    pub fn open(&self) -> &[OpenGlass] {
+        &self.open
+    }
+}
+
+/// Pieces that are joined.
+struct Groups {
+    /// Of each piece, the first of its body.
+    roots: Vec<u32>,
+    /// Of each piece, whether its front looks the other way than that of the first.
+    flips: Vec<bool>,
+}
+
+impl Groups {
+    fn of(pieces: &Pieces, seams: &Seams) -> Self {
+        let mut same: Vec<u32> = (0..pieces.list.len() as u32).collect();
+        for seam in &seams.joined {
+            let [one, other] = seam.pieces().map(|piece| root(&mut same, piece));
+            same[one.max(other) as usize] = one.min(other);
+        }
+        let roots: Vec<u32> = (0..same.len() as u32).map(|piece| root(&mut same, piece)).collect();
+        // Two pieces agree if most of the border between them does.
+        let mut borders = BTreeMap::new();
+        for seam in &seams.joined {
+            let [one, other] = seam.pieces();
+            let length = seam.rims[0].0.ends[0].distance(seam.rims[0].0.ends[1]);
+            *borders.entry([one.min(other), one.max(other)]).or_insert(0.0) +=
+                if seam.disagrees { -length } else { length };
+        }
+        let mut neighbours = vec![Vec::new(); roots.len()];
+        for ([one, other], agreed) in borders.into_iter().filter(|([one, other], _)| one != other) {
+            neighbours[one as usize].push((other, agreed < 0.0));
+            neighbours[other as usize].push((one, agreed < 0.0));
+        }
+        // Tell each front from that of a neighbour, from the first piece on.
+        let mut flips = vec![None; roots.len()];
+        for first in 0..roots.len() {
+            if flips[first].is_some() {
+                continue;
+            }
+            flips[first] = Some(false);
+            let mut pending = vec![(first, false)];
+            while let Some((piece, is_flipped)) = pending.pop() {
+                for &(next, disagrees) in &neighbours[piece] {
+                    let own = &mut flips[next as usize];
+                    if own.is_none() {
+                        *own = Some(is_flipped != disagrees);
+                        pending.push((next as usize, is_flipped != disagrees));
+                    }
+                }
+            }
+        }
+        Self { roots, flips: flips.into_iter().map(Option::unwrap_or_default).collect() }
+    }
+
+    /// Whether the fronts of two pieces of one body look different ways.
+    fn disagree(&self, [one, other]: [u32; 2]) -> bool {
+        self.flips[one as usize] != self.flips[other as usize]
+    }
+
+    /// The pieces of each body.
+    fn members(&self) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); self.roots.len()];
+        for (piece, &root) in (0..).zip(&self.roots) {
+            members[root as usize].push(piece);
+        }
+        members.retain(|members| !members.is_empty());
+        members
+    }
+
+    /// Whether the front of a body's first piece is on the inside: of a closed body by its volume, of an open one by what most of its
+    /// surface says.
+    fn turns(&self, pieces: &Pieces, members: &[u32], is_closed: bool) -> bool {
+        let own = members.iter().map(|&piece| (&pieces.list[piece as usize], self.flips[piece as usize]));
+        let sign = |is_flipped: bool| if is_flipped { -1.0 } else { 1.0 };
+        let area: f64 = own.clone().map(|(piece, _)| piece.area).sum();
+        let volume: f64 = own.clone().map(|(piece, is_flipped)| sign(is_flipped) * piece.volume).sum();
+        if is_closed {
+            // Less than that is rounding.
+            return volume < -1e-9 * area * area.sqrt();
+        }
+        own.map(|(piece, is_flipped)| sign(is_flipped) * piece.area).sum::<f64>() < 0.0
+    }
+}
+
+/// What a body lacks.
+struct Hole {
+    rims: Vec<Rim>,
+    /// Of each rim, whether another one of its body lies on it that goes the same way.
+    disagree: Vec<bool>,
+    /// The missing part of the surface.
+    part: f64,
+}
+
+impl Hole {
+    fn of(pieces: &Pieces, groups: &Groups, members: &[u32], seams: &Seams) -> Self {
+        let is_own = |rim: &Rim| groups.roots[rim.piece as usize] == members[0];
+        let mut own: Vec<OpenRim> = seams.open.iter().filter(|(rim, _)| is_own(rim)).copied().collect();
+        if own.is_empty() {
+            return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };
+        }
+        // The way around each hole, which has the body on the left.
+        for (rim, sites) in own.iter_mut().filter(|(rim, _)| groups.flips[rim.piece as usize]) {
+            rim.ends.reverse();
+            sites.reverse();
+        }
+        let key = |[from, to]: [u32; 2]| [from.min(to), from.max(to)];
+        own.sort_by_key(|&(rim, sites)| (key(sites), rim.piece));
+        let disagree =
+            own.chunk_by(|a, b| key(a.1) == key(b.1)).flat_map(|same| vec![same.len() > 1; same.len()]);
+        let disagree = disagree.collect();
+        // Join rims with a place in common: twice the area that each way around spans is the sum of p × q.
+        let mut sites: Vec<u32> = own.iter().flat_map(|&(_, sites)| sites).collect();
+        sites.sort_unstable();
+        sites.dedup();
+        let number = |site: u32| sites.partition_point(|&other| other < site) as u32;
+        let mut same: Vec<u32> = (0..sites.len() as u32).collect();
+        for &(_, [from, to]) in &own {
+            let [one, other] = [from, to].map(|site| root(&mut same, number(site)));
+            same[one.max(other) as usize] = one.min(other);
+        }
+        let mut spans: Vec<Option<(DVec3, DVec3)>> = vec![None; sites.len()];
+        for &(rim, [from, _]) in &own {
+            let [p, q] = rim.ends;
+            let (start, sum) = spans[root(&mut same, number(from)) as usize].get_or_insert((p, DVec3::ZERO));
+            *sum += (p - *start).cross(q - *start);
+        }
+        let missing: f64 = spans.iter().flatten().map(|(_, sum)| sum.length() * 0.5).sum();
+        let area: f64 = members.iter().map(|&piece| pieces.list[piece as usize].area).sum();
+        Self { rims: own.into_iter().map(|(rim, _)| rim).collect(), disagree, part: missing / area }
+    }
+
+    /// What is said about a piece; `None` if it has no part in a hole that is more than rounding.
+    fn at(&self, piece: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
+        let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.piece == piece);
+        let edges = own().count();
+        let disagrees = own().all(|(_, disagrees)| *disagrees);
+        (edges > 0 && self.part > NO_HOLE).then_some(OpenGlass {
+            object,
+            edges,
+            missing: self.part,
+            disagrees,
+            is_covered,
+        })
+    }
+}

@@ -1,0 +1,303 @@
+//! The pieces that glass is made of: objects that enclose nothing by themselves, with the rims that nothing of theirs closes.
+
+use std::collections::HashMap;
+
+use super::super::lower::file_is_glass;
+use crate::assets::LoadedMesh;
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::mesh::TriangleMesh;
+use crate::math::DVec3;
+use crate::math::transform::Transform;
+use crate::scene::description::{Mesh, Object, Scene, Shape};
+
+/// Chords that stand for a circular rim: the same points for every rim on one circle.
+const CHORDS: usize = 32;
+
+/// Relative rounding of the coordinates in a file: single precision, or six digits.
+pub(super) const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
+
+/// An object of glass that encloses nothing by itself.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    /// Its number.
+    pub object: u32,
+    /// Area.
+    pub area: f64,
+    /// Integral of x·n/3 over it: the volume, if it is closed and its front looks outwards.
+    pub volume: f64,
+    /// What its points may be off.
+    pub tolerance: f64,
+}
+
+/// A straight piece of a border, in the direction that has the surface on its left, seen from the front.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rim {
+    /// The piece, by its place in the list.
+    pub piece: u32,
+    /// From here to there.
+    pub ends: [DVec3; 2],
+    /// A point of the surface beside it.
+    pub inner: DVec3,
+}
+
+/// All pieces of a scene, in coordinates that start at a point near them.
+#[derive(Debug, Default)]
+pub(super) struct Pieces {
+    pub list: Vec<Piece>,
+    pub rims: Vec<Rim>,
+    /// Where the coordinates start.
+    pub origin: DVec3,
+}
+
+impl Pieces {
+    /// The pieces of a scene, whose mesh files are these.
+    pub fn of(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
+        let mut pieces = Self::default();
+        let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
+        for (number, object) in (0_u32..).zip(&scene.objects) {
+            let Some(glass) = glass_of(scene, meshes, object) else { continue };
+            token.check()?;
+            if pieces.list.is_empty() {
+                pieces.origin = start(&object.shape, meshes);
+            }
+            match object.shape {
+                Shape::Mesh(mesh) => {
+                    let loaded = meshes[mesh.file];
+                    let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
+                    pieces.add_mesh(number, &mesh, loaded, glass, open);
+                }
+                Shape::Quad { corner, u, v } => {
+                    pieces.add_polygon(number, &[corner, corner + u, corner + u + v, corner + v]);
+                }
+                Shape::Triangle { a, b, c } => pieces.add_polygon(number, &[a, b, c]),
+                Shape::Disk { center, normal, radius } => {
+                    let normal = normal.normalize();
+                    let area = std::f64::consts::PI * radius * radius;
+                    let volume = area * (center - pieces.origin).dot(normal) / 3.0;
+                    pieces.begin(number, (area, volume), radius);
+                    pieces.add_circle(center, normal, radius, center);
+                }
+                Shape::Cylinder { a, b, radius, caps: false } => {
+                    let axis = (b - a).normalize();
+                    let area = std::f64::consts::TAU * radius * a.distance(b);
+                    pieces.begin(number, (area, area * radius / 3.0), radius.max(a.distance(b)));
+                    pieces.add_circle(b, -axis, radius, a);
+                    pieces.add_circle(a, axis, radius, b);
+                }
+                Shape::Cone { base, tip, radius, cap: false } => {
+                    let axis = (tip - base).normalize();
+                    let area = std::f64::consts::PI * radius * radius.hypot(tip.distance(base));
+                    let shown = axis * (std::f64::consts::PI * radius * radius);
+                    let volume = (tip - pieces.origin).dot(shown) / 3.0;
+                    pieces.begin(number, (area, volume), radius.max(tip.distance(base)));
+                    pieces.add_circle(base, axis, radius, tip);
+                }
+                Shape::Sphere { .. }
+                | Shape::Plane { .. }
+                | Shape::Box { .. }
+                | Shape::Torus { .. }
+                | Shape::Cylinder { caps: true, .. }
+                | Shape::Cone { cap: true, .. } => {}
+            }
+        }
+        Ok(pieces)
+    }
+
+    fn begin(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
+        self.list.push(Piece { object, area, volume, tolerance: ROUNDING * reach });
+        self.list.len() as u32 - 1
+    }
+
+    /// A flat shape by its corners, counter-clockwise as seen from the front.
+    fn add_polygon(&mut self, object: u32, corners: &[DVec3]) {
+        let own: Vec<DVec3> = corners.iter().map(|&corner| corner - self.origin).collect();
+        let halves = (1..own.len() - 1).map(|i| (own[i] - own[0]).cross(own[i + 1] - own[0]) * 0.5);
+        let normal: DVec3 = halves.sum();
+        let reach = own.iter().map(|corner| corner.distance(own[0])).fold(0.0, f64::max);
+        let piece = self.begin(object, (normal.length(), normal.dot(own[0]) / 3.0), reach);
+        let middle = own.iter().sum::<DVec3>() / own.len() as f64;
+        for i in 0..own.len() {
+            self.rims.push(Rim { piece, ends: [own[i], own[(i + 1) % own.len()]], inner: middle });
+        }
+    }
+
+    /// A circular rim of the last piece, counter-clockwise about a unit axis.
+    fn add_circle(&mut self, center: DVec3, axis: DVec3, radius: f64, inner: DVec3) {
+        let piece = self.list.len() as u32 - 1;
+        // Rims on one circle have the same points, whatever way they go round.
+        let lead = axis.to_array().into_iter().find(|part| part.abs() > 1e-9).unwrap_or(1.0);
+        let up = if lead < 0.0 { -axis } else { axis };
+        let away = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
+        let first = up.cross(away).normalize();
+        let second = up.cross(first);
+        let middle = center - self.origin;
+        let point = |i: usize| {
+            let angle = std::f64::consts::TAU * (i % CHORDS) as f64 / CHORDS as f64;
+            middle + (first * libm::cos(angle) + second * libm::sin(angle)) * radius
+        };
+        for i in 0..CHORDS {
+            let (from, to) = (point(i), point(i + 1));
+            let ends = if lead < 0.0 { [to, from] } else { [from, to] };
+            self.rims.push(Rim { piece, ends, inner: inner - self.origin });
+        }
+    }
+
+    fn add_mesh(
+        &mut self,
+        object: u32,
+        placed: &Mesh,
+        loaded: &LoadedMesh,
+        glass: MeshGlass,
+        open: &[[u32; 2]],
+    ) {
+        let mesh = &loaded.mesh;
+        let to_scene = Transform::scale_rotate_translate(placed.scale, placed.rotate, placed.translate);
+        let place = to_scene.between(mesh.origin, self.origin);
+        let mirrors = place.mirrors();
+        let is_glass = |triangle: usize| match glass {
+            MeshGlass::All => true,
+            MeshGlass::Some => mesh
+                .materials
+                .get(triangle)
+                .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(file_is_glass)),
+        };
+        // Area and volume, by triangles in world coordinates.
+        let (mut area, mut volume, mut reach) = (0.0, 0.0, DVec3::ZERO);
+        for (_, triangle) in mesh.triangles.iter().enumerate().filter(|&(i, _)| is_glass(i)) {
+            let [a, b, c] = triangle.map(|vertex| {
+                let own = mesh.positions[vertex as usize].as_dvec3();
+                reach = reach.max(own.abs());
+                place.point(own)
+            });
+            let normal = (b - a).cross(c - a) * 0.5;
+            area += normal.length();
+            volume += normal.dot(a) / 3.0;
+        }
+        if area == 0.0 {
+            return;
+        }
+        let volume = if mirrors { -volume } else { volume };
+        let piece = self.begin(object, (area, volume), place.reach(reach).max_element());
+        for &[triangle, edge] in open.iter().filter(|open| is_glass(open[0] as usize)) {
+            let corner = |i: u32| {
+                let vertex = mesh.triangles[triangle as usize][(i % 3) as usize];
+                place.point(mesh.positions[vertex as usize].as_dvec3())
+            };
+            let (from, to) = (corner(edge), corner(edge + 1));
+            let ends = if mirrors { [to, from] } else { [from, to] };
+            self.rims.push(Rim { piece, ends, inner: corner(edge + 2) });
+        }
+    }
+}
+
+/// A point of a shape.
+fn start(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
+    match *shape {
+        Shape::Sphere { center, .. }
+        | Shape::Box { center, .. }
+        | Shape::Disk { center, .. }
+        | Shape::Torus { center, .. } => center,
+        Shape::Quad { corner, .. } => corner,
+        Shape::Plane { point, .. } => point,
+        Shape::Triangle { a, .. } | Shape::Cylinder { a, .. } => a,
+        Shape::Cone { base, .. } => base,
+        Shape::Mesh(Mesh { file, scale, rotate, translate, .. }) => {
+            let mesh = &meshes[file].mesh;
+            let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
+            Transform::scale_rotate_translate(scale, rotate, translate).point(mesh.origin + first)
+        }
+    }
+}
+
+/// Which triangles of a mesh are of glass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MeshGlass {
+    /// All, or it is no mesh.
+    All,
+    /// Those that the file's own materials say.
+    Some,
+}
+
+/// Whether an object is of glass; `None` if no part of it is.
+pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Option<MeshGlass> {
+    match (object.material, object.shape.mesh()) {
+        (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
+        (None, Some(mesh)) => {
+            meshes[mesh.file].materials.iter().any(file_is_glass).then_some(MeshGlass::Some)
+        }
+        (None, None) => None,
+    }
+}
+
+/// Edges of triangles that no other triangle of the mesh closes, by triangle and number of the edge: those between the same
+/// places that go the same way as often as the other way close each other.
+fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
+    let all = (0..mesh.triangles.len() as u32).flat_map(|triangle| (0..3).map(move |edge| [triangle, edge]));
+    let open = unmatched(mesh, all, |vertex| vertex);
+    if open.is_empty() {
+        return open;
+    }
+    // Along a seam of a texture the same place is there twice.
+    let bits = |vertex: u32| mesh.positions[vertex as usize].to_array().map(|part| (part + 0.0).to_bits());
+    let mut order: Vec<u32> =
+        open.iter().flat_map(|&[triangle, _]| mesh.triangles[triangle as usize]).collect();
+    order.sort_unstable();
+    order.dedup();
+    order.sort_by_key(|&vertex| (bits(vertex), vertex));
+    let mut first = HashMap::with_capacity(order.len());
+    let mut last = None;
+    for vertex in order {
+        let own = match last {
+            Some((place, own)) if place == bits(vertex) => own,
+            Some(_) | None => vertex,
+        };
+        last = Some((bits(vertex), own));
+        first.insert(vertex, own);
+    }
+    unmatched(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
+}
+
+/// Those edges that no other one of them closes; `place` tells vertices at one place by one of them.
+fn unmatched(
+    mesh: &TriangleMesh,
+    edges: impl Iterator<Item = [u32; 2]> + Clone,
+    place: impl Fn(u32) -> u32,
+) -> Vec<[u32; 2]> {
+    let ends = |[triangle, edge]: [u32; 2]| {
+        let corners = mesh.triangles[triangle as usize];
+        [corners[edge as usize], corners[(edge as usize + 1) % 3]].map(&place)
+    };
+    // Sort the edges by the lower of their ends.
+    let mut starts = vec![0_u32; mesh.positions.len() + 1];
+    for edge in edges.clone() {
+        let [a, b] = ends(edge);
+        starts[a.min(b) as usize + 1] += 1;
+    }
+    for vertex in 0..mesh.positions.len() {
+        starts[vertex + 1] += starts[vertex];
+    }
+    let count = starts[mesh.positions.len()] as usize;
+    let mut next = starts.clone();
+    let mut sorted = vec![(0_u32, false, [0_u32; 2]); count];
+    for edge in edges {
+        let [a, b] = ends(edge);
+        let place = &mut next[a.min(b) as usize];
+        sorted[*place as usize] = (a.max(b), a > b, edge);
+        *place += 1;
+    }
+    // Of those with the same ends, as many close each other as go both ways.
+    let mut open = Vec::new();
+    for range in starts.windows(2).filter(|range| range[0] < range[1]) {
+        let own = &mut sorted[range[0] as usize..range[1] as usize];
+        own.sort_unstable();
+        for same in own.chunk_by(|one, other| one.0 == other.0) {
+            let down = same.iter().filter(|half| half.1).count();
+            let up = same.len() - down;
+            let both = up.min(down);
+            let of_up = same[..up].iter().skip(both);
+            let of_down = same[up..].iter().skip(both);
+            open.extend(of_up.chain(of_down).map(|half| half.2));
+        }
+    }
+    open
+}

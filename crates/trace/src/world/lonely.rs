@@ -1,0 +1,285 @@
+//! Where nothing is near a surface: a ray that crosses it there need not ask what touches it.
+//!
+//! It is found out where a ray first asks, of a triangle of a mesh or of a cell of the box around a shape, and kept in a byte each.
+//! What is found depends on the geometry alone, so that it does not matter who asks first. `World::contact` gives the same by it as
+//! by its own search.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use super::contact::Meeting;
+use super::{Geometry, Hit, MeshInstance, Object};
+use crate::geometry::{Aabb, Shape};
+use crate::math::{DVec3, Vec3};
+
+/// Nobody has asked yet.
+const UNKNOWN: u8 = 0;
+
+/// Something may be near anywhere.
+const NEVER: u8 = u8::MAX;
+
+/// Of a triangle, nothing is near where each barycentric coordinate is at least its byte of these parts.
+const PARTS: f32 = 256.0;
+
+/// Most of these parts.
+const MOST_PARTS: f64 = 64.0;
+
+/// How many margins the lonely part of a triangle is from the edges: neighbours at an angle of 30° and more are not near.
+const FROM_EDGES: f64 = 4.0;
+
+/// Margins between a point and what is not near: the box of a margin around the point, and room for the rounding of both.
+const APART: f64 = 1.9;
+
+/// Cells along a side of the box around a shape.
+const CELLS: usize = 16;
+
+/// What is known of all objects.
+#[derive(Debug, Default)]
+pub(super) struct Lonely {
+    /// The diagonal of the box around all objects that have an end.
+    reach: f32,
+    tables: Vec<OnceLock<Table>>,
+}
+
+/// What is known of an object.
+#[derive(Debug)]
+struct Table {
+    /// How near is near, at least.
+    margin: f32,
+    states: Box<[AtomicU8]>,
+}
+
+impl Lonely {
+    /// Nothing yet of the objects in these boxes.
+    pub fn new(boxes: &[Aabb]) -> Self {
+        let all = boxes.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
+        let reach = if all.is_empty() { 0.0 } else { all.extent().length() };
+        Self { reach, tables: boxes.iter().map(|_| OnceLock::new()).collect() }
+    }
+}
+
+impl Table {
+    fn new(margin: f32, count: usize) -> Self {
+        Self { margin, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
+    }
+
+    #[inline]
+    fn state(&self, number: usize, find: impl FnOnce() -> u8) -> u8 {
+        let state = &self.states[number];
+        let known = state.load(Ordering::Relaxed);
+        if known != UNKNOWN {
+            return known;
+        }
+        let found = find();
+        state.store(found, Ordering::Relaxed);
+        found
+    }
+}
+
+/// A part of a surface.
+enum Region {
+    /// A box around it, grown by the margin.
+    Cell(Aabb),
+    /// A part of a triangle.
+    Triangle {
+        corners: [DVec3; 3],
+        /// How far what is not near is away.
+        apart: f64,
+    },
+}
+
+impl Geometry {
+    /// Whether nothing but the object that was hit, and of a mesh nothing but its triangle, is near to a point of it.
+    pub(super) fn is_lonely(&self, hit: &Hit, at: &Meeting) -> bool {
+        let object = &self.objects()[hit.object as usize];
+        let table = self.lonely().tables[hit.object as usize].get_or_init(|| self.table(object));
+        if !(self.margin(at).max_element() <= table.margin) {
+            return false;
+        }
+        match object {
+            Object::Mesh(mesh) => {
+                let triangle = hit.shape.primitive;
+                let find = || self.parts_from_edges(hit.object, mesh, triangle, table.margin);
+                let state = table.state(triangle as usize, find);
+                state != NEVER && at.surface.barycentric.min_element() * PARTS >= f32::from(state)
+            }
+            Object::Shape(shape) => {
+                let Some(bounds) = shape.bounds() else { return false };
+                let cell = Cell::at(at.surface.point, &bounds);
+                let find = || {
+                    let around = cell.bounds(&bounds).grown(Vec3::splat(table.margin));
+                    if self.is_clear(&around, &Region::Cell(around), hit.object, None) { 1 } else { NEVER }
+                };
+                table.state(cell.number(), find) != NEVER
+            }
+        }
+    }
+
+    /// A table for an object whose margins are such as rays have that start in the scene or not too far from it.
+    fn table(&self, object: &Object) -> Table {
+        let of_rays = self.mesh_rounding() + 32.0 * f32::EPSILON * self.lonely().reach;
+        match object {
+            Object::Mesh(mesh) => {
+                let margin = of_rays.max(4.0 * mesh.rounding());
+                Table::new(margin, mesh.tree.loaded().mesh.triangles.len())
+            }
+            Object::Shape(shape) => match shape.bounds() {
+                Some(bounds) => {
+                    let size = bounds.min.abs().max(bounds.max.abs()).max_element();
+                    Table::new(of_rays.max(64.0 * f32::EPSILON * size), CELLS * CELLS * CELLS)
+                }
+                None => Table::new(0.0, 0),
+            },
+        }
+    }
+
+    /// The byte of a triangle.
+    fn parts_from_edges(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
+        let corners = mesh.world_corners(triangle);
+        let [a, b, c] = corners;
+        let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
+        let height = (b - a).cross(c - a).length() / longest;
+        let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(2.0);
+        let middle = (a + b + c) / 3.0;
+        // A part further from the edges where neighbours are at a small angle.
+        for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MOST_PARTS) {
+            // Barycentrics of at least this are a smaller triangle about the same middle.
+            let inner =
+                corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(PARTS)));
+            let region = Region::Triangle { corners: inner, apart: APART * f64::from(margin) };
+            let around = Aabb::around_f64(inner).grown(Vec3::splat(2.0 * margin));
+            if self.is_clear(&around, &region, object, Some(triangle)) {
+                return parts as u8;
+            }
+        }
+        NEVER
+    }
+
+    /// Whether nothing but an object, or its triangle, comes near to a region; what is near meets `around`.
+    fn is_clear(&self, around: &Aabb, region: &Region, own: u32, triangle: Option<u32>) -> bool {
+        let is_near = |id: u32| match &self.objects()[id as usize] {
+            Object::Shape(shape) => id != own && shape_is_near(shape, around, region),
+            Object::Mesh(mesh) => {
+                let own = triangle.filter(|_| id == own);
+                let mut is_near = false;
+                mesh.tree.triangles().meeting(&mesh.local_box(around), |other| {
+                    is_near |= Some(other) != own && region.is_near(mesh.world_corners(other), around);
+                });
+                is_near
+            }
+        };
+        if self.unbounded().iter().any(|&id| is_near(id)) {
+            return false;
+        }
+        let mut is_clear = true;
+        self.tree().meeting(around, |id| is_clear = is_clear && !is_near(id));
+        is_clear
+    }
+}
+
+/// Whether a shape may have a point near to a region, or encloses it.
+fn shape_is_near(shape: &Shape, around: &Aabb, region: &Region) -> bool {
+    if shape.bounds().is_some_and(|bounds| !bounds.meets(around)) {
+        return false;
+    }
+    match shape {
+        Shape::Plane(plane) => (0..8).any(|i| {
+            let pick = |axis: usize| if i & (1 << axis) == 0 { around.min[axis] } else { around.max[axis] };
+            plane.is_behind(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
+        }),
+        Shape::Sphere(sphere) => {
+            let nearest = sphere.center.clamp(around.min.as_dvec3(), around.max.as_dvec3());
+            nearest.distance(sphere.center) <= sphere.radius * (1.0 + 1e-6)
+        }
+        Shape::Quad(quad) => {
+            let (a, c) = (quad.corner, quad.corner + quad.u + quad.v);
+            region.is_near([a, a + quad.u, c], around) || region.is_near([a, c, a + quad.v], around)
+        }
+        Shape::Triangle(own) => region.is_near([own.a, own.b, own.c], around),
+        Shape::Box(_) | Shape::Disk(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => true,
+    }
+}
+
+impl Region {
+    /// Whether a triangle may be near; one that does not meet `around` is not.
+    fn is_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
+        match self {
+            Self::Cell(cell) => meets(triangle, cell),
+            Self::Triangle { corners, apart } => {
+                Aabb::around_f64(triangle).meets(around) && !are_apart(*corners, triangle, *apart)
+            }
+        }
+    }
+}
+
+/// A cell of the box around a shape, by its place along the axes.
+struct Cell([usize; 3]);
+
+impl Cell {
+    fn at(point: Vec3, bounds: &Aabb) -> Self {
+        let place = (point - bounds.min) / bounds.extent() * CELLS as f32;
+        // In a flat box, where that is no number, it is the first.
+        Self(place.to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
+    }
+
+    fn number(&self) -> usize {
+        let Self([x, y, z]) = *self;
+        (z * CELLS + y) * CELLS + x
+    }
+
+    /// Its box, and room for the rounding of places.
+    fn bounds(&self, all: &Aabb) -> Aabb {
+        let side = all.extent() / CELLS as f32;
+        let min = all.min + Vec3::from(self.0.map(|along| along as f32)) * side;
+        Aabb { min, max: min + side }.grown(side * 1e-3)
+    }
+}
+
+/// Whether a triangle has a point in a box, but for rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap Testing*, 2001).
+pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
+    if !Aabb::around_f64(corners).meets(bounds) {
+        return false;
+    }
+    let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+    let (middle, half) = ((min + max) * 0.5, (max - min) * 0.5);
+    let [a, b, c] = corners.map(|corner| corner - middle);
+    let edges = [b - a, c - b, a - c];
+    let parts = |axis: DVec3| {
+        let along = [a, b, c].map(|corner| corner.dot(axis));
+        let reach = half.dot(axis.abs()) * (1.0 + 1e-9);
+        let (low, high) = (along[0].min(along[1]).min(along[2]), along[0].max(along[1]).max(along[2]));
+        low > reach || high < -reach
+    };
+    let normal = edges[0].cross(edges[1]);
+    let across = |edge: DVec3| {
+        [DVec3::new(0.0, -edge.z, edge.y), DVec3::new(edge.z, 0.0, -edge.x), DVec3::new(-edge.y, edge.x, 0.0)]
+    };
+    !(parts(normal) || edges.into_iter().flat_map(across).any(parts))
+}
+
+/// Whether an axis shows that two triangles are so far from each other.
+fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
+    let edges = |[a, b, c]: [DVec3; 3]| [b - a, c - b, a - c];
+    let (own, others) = (edges(one), edges(other));
+    let range = |corners: [DVec3; 3], axis: DVec3| {
+        let [a, b, c] = corners.map(|corner| corner.dot(axis));
+        [a.min(b).min(c), a.max(b).max(c)]
+    };
+    let parts = |axis: DVec3| {
+        let ([a, b], [c, d]) = (range(one, axis), range(other, axis));
+        (c - b).max(a - d) > distance * axis.length()
+    };
+    // The edges in the first plane tell neighbours apart.
+    let normal = own[0].cross(own[1]);
+    if own.into_iter().any(|edge| parts(edge.cross(normal))) || parts(normal) {
+        return true;
+    }
+    let normal = others[0].cross(others[1]);
+    parts(normal)
+        || others.into_iter().any(|edge| parts(edge.cross(normal)))
+        || own.into_iter().any(|edge| others.into_iter().any(|other| parts(edge.cross(other))))
+}
+
+#[cfg(test)]
+#[path = "lonely_tests.rs"]
+mod tests;

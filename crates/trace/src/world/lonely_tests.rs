@@ -1,0 +1,288 @@
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::super::contact::{Meeting, Near, NearMemory, Sides};
+use super::super::{Geometry, Hit, Images, MeshTree, Parts, World, lights};
+use crate::assets::LoadedMesh;
+use crate::control::CancelToken;
+use crate::geometry::mesh::TriangleMesh;
+use crate::geometry::{Asked, Ray};
+use crate::math::{DVec3, Vec3};
+use crate::scene::description::{
+    Accel, Camera, ColorSource, EmissionSource, Integrator, Located, Material, MaterialKind, Mesh, Object,
+    Photons, PixelFilter, Render, Scene, Shadows, Shape, Tonemap,
+};
+
+fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64) / (1_u64 << 53) as f64
+    }
+
+    fn place(&mut self) -> DVec3 {
+        v(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
+    }
+}
+
+/// Some objects; material 0 is matte, 1 and 2 are glass.
+struct Build {
+    scene: Scene,
+    meshes: Vec<Arc<MeshTree>>,
+}
+
+impl Build {
+    fn new() -> Self {
+        let grey = ColorSource::Constant(Vec3::splat(0.5));
+        let matte =
+            MaterialKind::Phong { diffuse: grey.clone(), specular: grey, shininess: 1.0, ambient: None };
+        let glass = |ior| MaterialKind::Glass { ior, tint: DVec3::ONE };
+        let material =
+            |kind| Material { name: String::new(), kind, emission: EmissionSource::NONE, normal_map: None };
+        let render = Render {
+            error: 0.0,
+            width: 1,
+            height: 1,
+            samples: 1,
+            shadow_samples: 1,
+            max_depth: 8,
+            integrator: Integrator::Path,
+            shadows: Shadows::Soft,
+            clamp: 0.0,
+            ambient: Vec3::ZERO,
+            background: Vec3::ZERO,
+            filter: PixelFilter::Box,
+            exposure: 0.0,
+            tonemap: Tonemap::None,
+            accel: Accel::Bvh,
+            seed: 0,
+        };
+        let (position, look_at) = (v(0.0, -9.0, 2.0), DVec3::ZERO);
+        let camera = Camera::LookAt { position, look_at, up: DVec3::Z, fov: 40.0, aperture: 0.0, focus: 9.0 };
+        let scene = Scene {
+            render,
+            output: None,
+            camera,
+            photons: Photons { enabled: false, count: 1, radius: 0.0, bounces: 1 },
+            textures: Vec::new(),
+            materials: [matte, glass(1.5), glass(1.33)].into_iter().map(material).collect(),
+            mesh_files: Vec::new(),
+            objects: Vec::new(),
+            lights: Vec::new(),
+            environment: None,
+        };
+        Self { scene, meshes: Vec::new() }
+    }
+
+    fn shape(mut self, shape: Shape, material: usize) -> Self {
+        self.scene.objects.push(Object { shape, material: Some(material), name: None, span: 0..0 });
+        self
+    }
+
+    fn mesh(mut self, mesh: TriangleMesh, [scale, rotate, translate]: [DVec3; 3], material: usize) -> Self {
+        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+        self.meshes.push(Arc::new(tree));
+        self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
+        let file = self.meshes.len() - 1;
+        self.shape(Shape::Mesh(Mesh { file, scale, rotate, translate, smooth: false }), material)
+    }
+
+    fn world(self) -> World {
+        let token = CancelToken::new();
+        let geometry = Geometry::of_scene(&self.scene, &self.meshes, DVec3::ZERO, &token);
+        let geometry = Arc::new(geometry.expect("nobody cancels"));
+        let lights = lights(&self.scene, &geometry, &Images::new(), None, &token).expect("nobody cancels");
+        World::new(&self.scene, &Parts { meshes: self.meshes, ..Parts::default() }, geometry, lights)
+    }
+}
+
+/// A box from −1 to 1 whose sides are cut into squares.
+fn block(steps: u32) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    for axis in 0..3 {
+        for side in [-1.0_f32, 1.0] {
+            let first = mesh.positions.len() as u32;
+            for (i, j) in (0..=steps).flat_map(|i| (0..=steps).map(move |j| (i, j))) {
+                let along = |i: u32| 2.0 * i as f32 / steps as f32 - 1.0;
+                let mut place = Vec3::ZERO;
+                (place[axis], place[(axis + 1) % 3], place[(axis + 2) % 3]) = (side, along(i), along(j));
+                mesh.positions.push(place);
+            }
+            for (i, j) in (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j))) {
+                let at = |i: u32, j: u32| first + i * (steps + 1) + j;
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                let both = if side > 0.0 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
+                mesh.triangles.extend(both);
+            }
+        }
+    }
+    mesh
+}
+
+/// The block, blown up to a ball.
+fn ball(steps: u32) -> TriangleMesh {
+    let mut mesh = block(steps);
+    mesh.positions.iter_mut().for_each(|place| *place = place.normalize());
+    mesh
+}
+
+/// Scenes with what touches and what does not; places that rays are aimed at.
+fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
+    let floor = Shape::Quad { corner: v(-4.0, -4.0, -1.0), u: v(8.0, 0.0, 0.0), v: v(0.0, 8.0, 0.0) };
+    let cube = |x: f64, size: f64| Shape::Box {
+        center: v(x, 0.0, 0.0),
+        size: DVec3::splat(size),
+        rotate: DVec3::ZERO,
+    };
+    let globe = |center: DVec3, radius: f64| Shape::Sphere { center, radius };
+    let at = |place: DVec3| [DVec3::ONE, DVec3::ZERO, place];
+    let places = |mesh: &TriangleMesh, at: DVec3| -> Vec<DVec3> {
+        mesh.positions.iter().map(|own| own.as_dvec3() + at).collect()
+    };
+    let plane = Shape::Plane { point: v(0.0, 0.0, -1.0), normal: DVec3::Z };
+    let (fine, coarse) = (ball(9), block(3));
+    let corners = |half: f64| {
+        (0..8)
+            .map(|i| v(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * (2.0 * half) - half)
+            .collect::<Vec<_>>()
+    };
+    let turned = random.place() * 90.0;
+    let rotated = crate::math::transform::rotation_xyz(turned);
+    let scenes = vec![
+        // Blocks on a floor and side by side.
+        (
+            Build::new().shape(floor.clone(), 0).mesh(coarse.clone(), at(DVec3::ZERO), 1).mesh(
+                coarse.clone(),
+                at(v(2.0, 0.0, 0.0)),
+                2,
+            ),
+            places(&coarse, DVec3::ZERO),
+        ),
+        // A ball that floats, and one that touches it in a point.
+        (
+            Build::new().shape(floor.clone(), 0).mesh(fine.clone(), at(v(0.0, 0.0, 0.5)), 1).mesh(
+                fine.clone(),
+                at(v(2.0, 0.0, 0.5)),
+                1,
+            ),
+            places(&fine, v(0.0, 0.0, 0.5)),
+        ),
+        // Balls in balls, on a plane.
+        (
+            Build::new()
+                .shape(plane, 0)
+                .shape(globe(DVec3::ZERO, 1.0), 1)
+                .shape(globe(v(0.3, 0.0, 0.0), 0.5), 2)
+                .shape(globe(v(-0.6, 0.0, 0.0), 0.4), 1),
+            vec![v(0.0, 0.0, -1.0), v(-1.0, 0.0, 0.0), v(0.8, 0.0, 0.0)],
+        ),
+        // Boxes that share a face, one of a mesh; one of another size.
+        (
+            Build::new()
+                .shape(floor, 0)
+                .shape(cube(0.0, 2.0), 1)
+                .mesh(coarse.clone(), at(v(2.0, 0.0, 0.0)), 2)
+                .shape(cube(-1.7, 1.4), 1),
+            corners(1.0),
+        ),
+        // A ball of triangles in a ball and in a room; a patch of paper on it.
+        (
+            Build::new()
+                .shape(
+                    Shape::Quad { corner: v(-3.0, -3.0, -3.0), u: v(6.0, 0.0, 0.0), v: v(0.0, 6.0, 0.0) },
+                    0,
+                )
+                .shape(globe(DVec3::ZERO, 1.4), 2)
+                .mesh(fine.clone(), [DVec3::ONE, turned, DVec3::ZERO], 1)
+                .shape(
+                    Shape::Triangle {
+                        a: rotated * fine.positions[0].as_dvec3(),
+                        b: rotated * fine.positions[1].as_dvec3(),
+                        c: rotated * fine.positions[10].as_dvec3(),
+                    },
+                    0,
+                ),
+            fine.positions.iter().map(|own| rotated * own.as_dvec3()).collect(),
+        ),
+        // A crease: two sheets at a small angle, and a bent one.
+        (
+            Build::new().mesh(
+                TriangleMesh {
+                    positions: vec![
+                        Vec3::ZERO,
+                        Vec3::Y,
+                        Vec3::X,
+                        Vec3::new(1.0, 0.0, 0.02),
+                        Vec3::new(-1.0, 0.0, 0.9),
+                    ],
+                    triangles: vec![[0, 2, 1], [0, 1, 3], [1, 0, 4]],
+                    ..TriangleMesh::default()
+                },
+                at(DVec3::ZERO),
+                1,
+            ),
+            vec![DVec3::ZERO, v(0.0, 1.0, 0.0), v(0.0, 0.4, 0.0), v(0.0003, 0.4, 0.0)],
+        ),
+    ];
+    scenes.into_iter().map(|(build, places)| (build.world(), places)).collect()
+}
+
+#[test]
+fn what_is_lonely_is_what_a_search_finds_nothing_at() {
+    let mut random = Random(1);
+    let (mut lonely, mut asked, mut touching) = (0, 0, 0);
+    for (number, (world, places)) in scenes(&mut random).into_iter().enumerate() {
+        for round in 0..30_000 {
+            // To a place, to a point between two, near one, or anywhere.
+            let pick = |random: &mut Random| places[(random.unit() * places.len() as f64) as usize];
+            let (one, other) = (pick(&mut random), pick(&mut random));
+            let target = match round % 4 {
+                0 => one,
+                1 => one + (other - one) * random.unit(),
+                2 => one + random.place() * 0.1_f64.powf(1.0 + 5.0 * random.unit()),
+                _ => random.place() * 1.2,
+            };
+            let from = random.place().normalize()
+                * if round % 3 == 0 { 0.2 } else { 3.0 + 40.0 * random.unit().powi(4) };
+            let ray = Ray::new(from.as_vec3(), (target - from).normalize().as_vec3());
+            let Some(hit) = world.geometry.closest(&ray) else { continue };
+            if !world.is_glass(world.material_index(&hit) as u32) {
+                continue;
+            }
+            let surface = world.geometry.asked_surface(&ray, &hit, Asked::ALL);
+            let facing = surface.normal.dot(ray.direction);
+            let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
+            let at = Meeting { hit, surface, normal, lead: hit.shape.t * f32::EPSILON * facing.abs() };
+            let found = |only: bool| -> (Sides, Vec<Near>) {
+                let (mut memory, mut near) = (NearMemory::default(), Vec::new());
+                let error = if only {
+                    world.geometry.only(&at, &mut memory)
+                } else {
+                    world.geometry.search(&at, &mut memory)
+                };
+                (world.contact_of(&at, (&memory, error), |one| near.push(one)), near)
+            };
+            let searched = found(false);
+            let is_lonely = world.geometry.is_lonely(&hit, &at);
+            if is_lonely {
+                assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
+            }
+            let is_other = |near: &Near| match near {
+                Near::Around { object, .. } | Near::Surface { hit: Hit { object, .. }, .. } => {
+                    *object != hit.object
+                }
+            };
+            touching += usize::from(searched.1.iter().any(is_other));
+            lonely += usize::from(is_lonely && round % 4 == 3);
+            asked += usize::from(round % 4 == 3);
+        }
+    }
+    assert!(touching > 5000, "{touching}");
+    assert!(2 * lonely > asked, "{lonely} of {asked}");
+}

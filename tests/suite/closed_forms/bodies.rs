@@ -1,0 +1,396 @@
+//! Glass in several open parts: closed together they are one body; what stays open is named, and is the same by paths and photons.
+
+use glimt::assets::LoadedMesh;
+use glimt::control::CancelToken;
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{Integrator, Material, Shape};
+use glimt::world::Bodies;
+
+use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, scene, tinted};
+use super::{Random, v};
+
+/// The bodies of what is built.
+fn bodies(build: &Build) -> Bodies {
+    let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
+    Bodies::find(&build.scene, &meshes, &CancelToken::new()).expect("nobody cancels")
+}
+
+/// A prism over a polygon in the plane z = 0, counter-clockwise from +z, of which each side is cut into squares.
+fn prism(polygon: &[DVec3], caps: &[[usize; 3]], height: f64, steps: usize) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    let mut put = |corners: [DVec3; 3]| {
+        let ids = corners.map(|corner| {
+            let place = corner.as_vec3();
+            let known = mesh.positions.iter().position(|&own| own == place);
+            known.unwrap_or_else(|| {
+                mesh.positions.push(place);
+                mesh.positions.len() - 1
+            }) as u32
+        });
+        mesh.triangles.push(ids);
+    };
+    let up = |step: usize| v(0.0, 0.0, height * step as f64 / steps as f64);
+    for i in 0..polygon.len() {
+        let (a, b) = (polygon[i], polygon[(i + 1) % polygon.len()]);
+        for step in 0..steps {
+            put([a + up(step), b + up(step), b + up(step + 1)]);
+            put([a + up(step), b + up(step + 1), a + up(step + 1)]);
+        }
+    }
+    for &[a, b, c] in caps {
+        put([polygon[a], polygon[c], polygon[b]]);
+        put([a, b, c].map(|i| polygon[i] + up(steps)));
+    }
+    mesh
+}
+
+/// Closed bodies, about 1 in size and above z = 0.
+fn closed(round: usize) -> TriangleMesh {
+    let corner = |x: f64, y: f64| v(x, y, 0.0);
+    match round % 4 {
+        0 => lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9)),
+        // An L.
+        1 => prism(
+            &[
+                corner(-0.8, -0.8),
+                corner(0.8, -0.8),
+                corner(0.8, 0.0),
+                corner(0.0, 0.0),
+                corner(0.0, 0.8),
+                corner(-0.8, 0.8),
+            ],
+            &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]],
+            1.1,
+            3,
+        ),
+        2 => prism(
+            &[corner(-0.7, -0.6), corner(0.7, -0.6), corner(0.7, 0.6), corner(-0.7, 0.6)],
+            &[[0, 1, 2], [0, 2, 3]],
+            0.9,
+            4,
+        ),
+        _ => prism(&[corner(-0.8, -0.5), corner(0.8, -0.5), corner(0.0, 0.9)], &[[0, 1, 2]], 1.3, 2),
+    }
+}
+
+/// The triangles of a mesh that hold.
+fn part(mesh: &TriangleMesh, holds: impl Fn(usize) -> bool) -> TriangleMesh {
+    let own = mesh.triangles.iter().enumerate().filter(|&(i, _)| holds(i));
+    TriangleMesh { triangles: own.map(|(_, &own)| own).collect(), ..mesh.clone() }
+}
+
+/// Parts around points at random: each triangle is of the nearest.
+fn cut(mesh: &TriangleMesh, count: usize, random: &mut Random) -> Vec<TriangleMesh> {
+    let middle = |i: usize| mesh.corners(i as u32).iter().sum::<Vec3>() / 3.0;
+    let seeds: Vec<Vec3> =
+        (0..count).map(|_| middle((random.unit() * mesh.triangles.len() as f64) as usize)).collect();
+    let nearest = |i: usize| {
+        let off = |seed: usize| seeds[seed].distance_squared(middle(i));
+        (0..count).min_by(|&a, &b| off(a).total_cmp(&off(b))).expect("a seed")
+    };
+    let parts = (0..count).map(|seed| part(mesh, |i| nearest(i) == seed));
+    parts.filter(|part| !part.triangles.is_empty()).collect()
+}
+
+fn turned(mesh: &TriangleMesh) -> TriangleMesh {
+    TriangleMesh { triangles: mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(), ..mesh.clone() }
+}
+
+/// A floor and a large lamp above it, and what is between them.
+fn room(parts: &[TriangleMesh], material: &Material) -> Build {
+    let build = scene().quad(v(-6.0, -6.0, -0.1), v(12.0, 0.0, 0.0), v(0.0, 12.0, 0.0), matte(0.7)).quad(
+        v(-3.0, 3.0, 4.0),
+        v(6.0, 0.0, 0.0),
+        v(0.0, -6.0, 0.0),
+        emitter(1.0),
+    );
+    let build = parts.iter().fold(build, |build, part| build.mesh(part.clone(), AS_IT_IS, material.clone()));
+    build.pictured(v(0.9, -4.2, 2.6), v(0.0, 0.0, 0.4), 30.0, 12, 12).depth(12)
+}
+
+fn by_path(build: Build) -> Build {
+    build.with(|scene| scene.render.integrator = Integrator::Path)
+}
+
+#[test]
+fn a_body_in_parts_is_the_body() {
+    let mut random = Random(11);
+    for round in 0..12 {
+        let whole = closed(round);
+        let count = 2 + (random.unit() * 5.0) as usize;
+        let parts = cut(&whole, count, &mut random);
+        let material = tinted(1.5, v(0.6, 0.9, 0.8));
+        let (one, several) = (room(&[whole], &material), room(&parts, &material));
+        let found = bodies(&several);
+        assert!(!found.has_open() && found.open().is_empty(), "round {round}: {:?}", found.open());
+        let last = several.scene.objects.len() as u32 - 1;
+        for part in 2..=last {
+            assert_eq!(found.place(part), last, "round {round}");
+            assert!(!found.is_turned(part), "round {round}");
+        }
+        let [one_path, several_path] = [&one, &several].map(|build| by_path(build.clone()).picture(8, 5));
+        assert!(one_path == several_path, "round {round}: {} parts by path", parts.len());
+        // Photons are aimed at each object: they are others.
+        if round < 4 {
+            let [one, several] = [one, several].map(|build| build.photons(4000, 0.1));
+            assert_same(&format!("photons, round {round}"), &one, &several, 4, 3.5, 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_part_that_looks_the_other_way_is_turned() {
+    let mut random = Random(5);
+    for round in 0..8 {
+        let whole = closed(round);
+        let mut parts = cut(&whole, 4, &mut random);
+        let material = glass(1.5);
+        let right = by_path(room(&parts, &material)).picture(8, 3);
+        let flips: Vec<bool> = parts.iter().map(|_| random.unit() < 0.5).collect();
+        for (part, _) in parts.iter_mut().zip(&flips).filter(|(_, flip)| **flip) {
+            *part = turned(part);
+        }
+        let build = room(&parts, &material);
+        let found = bodies(&build);
+        assert!(found.open().is_empty(), "round {round}: {:?}", found.open());
+        for (object, flip) in (2..).zip(&flips) {
+            assert_eq!(found.is_turned(object), *flip, "round {round}");
+        }
+        // Corners in another order round otherwise, and few paths are others.
+        let sum = |picture: &[DVec3]| picture.iter().map(|pixel| pixel.y).sum::<f64>();
+        let (own, right) = (sum(&by_path(build).picture(8, 3)), sum(&right));
+        assert!((own - right).abs() < 1e-3 * right, "round {round}: {flips:?}: {own}, not {right}");
+    }
+}
+
+#[test]
+fn a_long_edge_closes_with_many_short_ones() {
+    // A box whose sides are cut into squares, and whose lids are not; in the world they stand askew.
+    let corners = [v(-0.7, -0.6, 0.0), v(0.7, -0.6, 0.0), v(0.7, 0.6, 0.0), v(-0.7, 0.6, 0.0)];
+    let side = |step: f64| v(0.0, 0.0, 0.9 * step);
+    let mut sides = TriangleMesh::default();
+    for i in 0..4 {
+        for step in 0..7 {
+            let (from, to) = (corners[i], corners[(i + 1) % 4]);
+            let at = |step: usize| from + (to - from) * (step as f64 / 7.0);
+            let first = sides.positions.len() as u32;
+            let own = [at(step), at(step + 1), at(step + 1) + side(1.0), at(step) + side(1.0)];
+            sides.positions.extend(own.map(|own| own.as_vec3()));
+            sides.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+    }
+    let lid = |height: f64| TriangleMesh {
+        positions: corners.map(|corner| (corner + side(height)).as_vec3()).to_vec(),
+        triangles: if height > 0.0 { vec![[0, 1, 2], [0, 2, 3]] } else { vec![[0, 2, 1], [0, 3, 2]] },
+        ..TriangleMesh::default()
+    };
+    let askew = [DVec3::splat(1.3), v(20.0, -35.0, 70.0), v(0.1, 0.2, 0.3)];
+    let build = |parts: &[TriangleMesh]| {
+        parts.iter().fold(scene(), |build, part| build.mesh(part.clone(), askew, glass(1.5)))
+    };
+    let closed = bodies(&build(&[lid(0.0), sides.clone(), lid(1.0)]));
+    assert!(closed.open().is_empty(), "{:?}", closed.open());
+    assert_eq!([0, 1, 2].map(|part| closed.place(part)), [2; 3]);
+    let without = bodies(&build(&[sides, lid(1.0)]));
+    assert!(without.has_open());
+    let [open] = without.open() else { panic!("{:?}", without.open()) };
+    assert_eq!((open.object, open.edges, open.disagrees, open.is_covered), (0, 28, false, false));
+    assert!((open.missing - 1.68 / (1.68 + 0.9 * 5.2)).abs() < 1e-5, "{}", open.missing);
+}
+
+/// The six quads of a box between two corners; `flips` says which look inwards.
+fn quads(low: DVec3, high: DVec3, flips: u32) -> Vec<Shape> {
+    let size = high - low;
+    let mut quads = Vec::new();
+    for axis in 0..3 {
+        let edge = |axis: usize| {
+            let mut edge = DVec3::ZERO;
+            edge[axis] = size[axis];
+            edge
+        };
+        let (u, w) = (edge((axis + 1) % 3), edge((axis + 2) % 3));
+        for (far, corner) in [(false, low), (true, low + edge(axis))] {
+            let is_flipped = flips >> quads.len() & 1 == 1;
+            let (u, v) = if far != is_flipped { (u, w) } else { (w, u) };
+            quads.push(Shape::Quad { corner, u, v });
+        }
+    }
+    quads
+}
+
+#[test]
+fn quads_and_disks_close_bodies() {
+    let of =
+        |shapes: Vec<Shape>| shapes.into_iter().fold(scene(), |build, shape| build.shape(shape, glass(1.5)));
+    for flips in 0..64 {
+        let own = bodies(&of(quads(v(0.1, 0.2, -0.3), v(1.4, 0.9, 0.7), flips)));
+        assert!(own.open().is_empty(), "{flips}: {:?}", own.open());
+        for quad in 0..6 {
+            assert_eq!((own.place(quad), own.is_turned(quad)), (5, flips >> quad & 1 == 1), "{flips}");
+        }
+    }
+    // One is missing.
+    let five = bodies(&of(quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0)[1..].to_vec()));
+    assert!(five.has_open() && five.open().len() == 4, "{:?}", five.open());
+    // Two boxes that share a face, whose edges meet four quads each, are two bodies.
+    let (one, other) =
+        (quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0), quads(v(1.0, 0.0, 0.0), v(2.0, 1.0, 1.0), 0));
+    let two = bodies(&of([one, other].concat()));
+    assert!(two.open().is_empty(), "{:?}", two.open());
+    assert_eq!((0..12).map(|quad| two.place(quad)).collect::<Vec<_>>(), [[5; 6], [11; 6]].concat());
+    // A tube with lids, one of which looks inwards; a cone on its base.
+    let (a, b) = (v(0.3, -0.2, 0.1), v(1.0, 0.5, -0.4));
+    let tube = Shape::Cylinder { a, b, radius: 0.4, caps: false };
+    let lid = |center: DVec3, normal: DVec3| Shape::Disk { center, normal, radius: 0.4 };
+    let own = bodies(&of(vec![tube.clone(), lid(a, b - a), lid(b, b - a)]));
+    assert!(own.open().is_empty(), "{:?}", own.open());
+    assert_eq!(
+        [0, 1, 2].map(|part| (own.place(part), own.is_turned(part))),
+        [(2, false), (2, true), (2, false)]
+    );
+    let hat = Shape::Cone { base: a, tip: b, radius: 0.4, cap: false };
+    assert!(bodies(&of(vec![lid(a, a - b), hat])).open().is_empty());
+    assert_eq!(bodies(&of(vec![tube, lid(a, a - b)])).open().len(), 1);
+}
+
+#[test]
+fn quads_of_glass_are_a_box() {
+    let (low, high) = (v(-0.7, -0.6, 0.0), v(0.7, 0.6, 0.9));
+    let material = tinted(1.5, v(0.6, 0.9, 0.8));
+    let whole =
+        by_path(room(&[], &material)).cuboid((low + high) * 0.5, high - low, DVec3::ZERO, material.clone());
+    let parts = quads(low, high, 0b10_0110).into_iter();
+    let parts = parts.fold(by_path(room(&[], &material)), |build, quad| build.shape(quad, material.clone()));
+    assert_same("quads", &whole, &parts, 64, 3.5, 0.0);
+}
+
+/// The same picture by its mean and that of its quarters: within so many standard errors and a part of the value.
+#[track_caller]
+fn assert_same(what: &str, one: &Build, other: &Build, samples: u32, errors: f64, part: f64) {
+    let means = |build: &Build, first: u32| -> Vec<[f64; 5]> {
+        (first..first + 16)
+            .map(|seed| {
+                let picture = build.picture(samples, seed);
+                let mut sums = [0.0; 5];
+                for (i, pixel) in picture.iter().enumerate() {
+                    let (x, y) = (i % 12, i / 12);
+                    sums[x / 6 + 2 * (y / 6)] += (pixel.x + pixel.y + pixel.z) / 108.0;
+                    sums[4] += (pixel.x + pixel.y + pixel.z) / 432.0;
+                }
+                sums
+            })
+            .collect()
+    };
+    let (one, other) = (means(one, 0), means(other, 100));
+    for quarter in 0..5 {
+        let of = |means: &[[f64; 5]]| {
+            let own: Vec<f64> = means.iter().map(|sums| sums[quarter]).collect();
+            super::mean_and_error(&own)
+        };
+        let ((a, a_error), (b, b_error)) = (of(&one), of(&other));
+        let allowed = errors * a_error.hypot(b_error) + part * a;
+        assert!(a > 0.0 && a_error < 0.02 * a, "{what}, {quarter}: {a} ± {a_error} says nothing");
+        assert!((a - b).abs() <= allowed, "{what}, {quarter}: {a} ± {a_error}, {b} ± {b_error}");
+    }
+}
+
+#[test]
+fn seams_of_textures_are_no_holes() {
+    // Every triangle has vertices of its own.
+    let whole = lat_long_sphere(12, 20, 0.7, v(0.1, 0.2, 0.9));
+    let positions: Vec<Vec3> =
+        whole.triangles.iter().flatten().map(|&i| whole.positions[i as usize]).collect();
+    let triangles = (0..whole.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let loose = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
+    let of = |mesh: TriangleMesh| bodies(&scene().mesh(mesh, AS_IT_IS, glass(1.5)));
+    assert_eq!(of(loose.clone()), Bodies::default());
+    assert_eq!(of(whole.clone()), Bodies::default());
+    // Its front looks inwards.
+    assert!(of(turned(&whole)).is_turned(0) && of(turned(&whole)).open().is_empty());
+    // A mirrored instance.
+    let mirrored =
+        scene().mesh(whole, [v(-1.0, 1.0, 2.0), v(10.0, 20.0, 30.0), v(5.0, 0.0, 1.0)], glass(1.5));
+    assert_eq!(bodies(&mirrored), Bodies::default());
+}
+
+#[test]
+fn glass_with_a_hole_is_named() {
+    let mut random = Random(3);
+    for round in 0..40 {
+        let whole = closed(round);
+        // Without a triangle; or one triangle is turned.
+        let lost = (random.unit() * whole.triangles.len() as f64) as usize;
+        let mut parts = cut(&part(&whole, |i| i != lost), 3, &mut random);
+        let open = bodies(&room(&parts, &glass(1.5)));
+        let area = |mesh: &TriangleMesh| {
+            let area = |corners: [Vec3; 3]| (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
+            (0..mesh.triangles.len() as u32).map(|i| area(mesh.corners(i))).sum::<f32>() * 0.5
+        };
+        let missing = area(&part(&whole, |i| i == lost));
+        let expected = f64::from(missing / (area(&whole) - missing));
+        assert!(!open.open().is_empty(), "round {round}");
+        assert_eq!(open.open().iter().map(|open| open.edges).sum::<usize>(), 3, "round {round}");
+        for one in open.open() {
+            assert!(
+                (one.missing - expected).abs() < 1e-4 * expected,
+                "round {round}: {one:?}, not {expected}"
+            );
+            assert!(!one.disagrees && !one.is_covered, "round {round}: {one:?}");
+            assert_eq!(open.is_open(open.place(one.object)), expected > 1e-3, "round {round}");
+        }
+        // Put back the wrong way round.
+        parts[0].triangles.push({
+            let [a, b, c] = whole.triangles[lost];
+            [a, c, b]
+        });
+        let odd = bodies(&room(&parts, &glass(1.5)));
+        assert!(!odd.open().is_empty(), "round {round}");
+    }
+}
+
+#[test]
+fn a_sheet_between_opaque_walls_closes_with_them() {
+    // The surface of a pool: to the walls, and through them.
+    let wall = |build: Build, corner: DVec3, u: DVec3, w: DVec3| build.quad(corner, u, w, matte(0.5));
+    let pool = |reach: f64| {
+        let (x, y, z) = (v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), v(0.0, 0.0, 1.0));
+        let build = wall(scene(), v(-1.0, -1.0, 0.0), x, y);
+        let build = wall(wall(build, v(-1.0, -1.0, 0.0), x, z), v(-1.0, 1.0, 0.0), x, z);
+        let build = wall(wall(build, v(-1.0, -1.0, 0.0), y, z), v(1.0, -1.0, 0.0), y, z);
+        build.quad(v(-reach, -reach, 0.7), v(2.0 * reach, 0.0, 0.0), v(0.0, 2.0 * reach, 0.0), glass(1.33))
+    };
+    for reach in [1.0, 1.2] {
+        let own = bodies(&pool(reach));
+        assert!(
+            !own.has_open() && own.open().iter().all(|open| open.is_covered),
+            "{reach}: {:?}",
+            own.open()
+        );
+    }
+    for reach in [0.5, 0.98] {
+        let own = bodies(&pool(reach));
+        assert!(
+            own.has_open() && own.open().iter().all(|open| !open.is_covered),
+            "{reach}: {:?}",
+            own.open()
+        );
+    }
+}
+
+#[test]
+fn open_glass_is_the_same_by_paths_and_photons() {
+    let material = tinted(1.8, v(0.5, 0.9, 0.7));
+    let sphere = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
+    let middle = |i: usize| sphere.corners(i as u32).iter().sum::<Vec3>() / 3.0;
+    let (bowl, dome) = (part(&sphere, |i| middle(i).z < 0.9), part(&sphere, |i| middle(i).z > 0.95));
+    // Two parts of one body that do not meet: each of them is open.
+    let block = closed(2);
+    let height = |i: usize| block.corners(i as u32).iter().map(|corner| corner.z).sum::<f32>() / 3.0;
+    let apart = [part(&block, |i| height(i) > 0.89), part(&block, |i| height(i) < 0.6)];
+    for (what, parts) in [("bowl", vec![bowl]), ("dome", vec![dome]), ("apart", apart.to_vec())] {
+        let build = room(&parts, &material);
+        assert!(bodies(&build).has_open(), "{what}");
+        assert_same(what, &by_path(build.clone()), &build.photons(20_000, 0.05), 24, 3.5, 0.006);
+    }
+}
