@@ -47,6 +47,12 @@ pub trait Mapped {
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
 }
 
+impl Default for SurfaceRow {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl SurfaceRow {
     /// Nothing known.
     pub const EMPTY: Self = Self {

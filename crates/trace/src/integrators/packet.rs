@@ -7,13 +7,14 @@ use super::queues::PathRay;
 use super::shot::Shot;
 use super::vertices::way_up;
 use super::view::Measure;
+use crate::geometry::SurfacePoint;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::phong::PhongBsdf;
 use crate::materials::{Material, Phong};
-use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, truths};
+use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Loops, Object, PACKET};
@@ -79,6 +80,8 @@ pub struct Met {
     pub plain: u32,
     /// A bit for each plain surface that sends out light towards the ray.
     pub shining: u32,
+    /// A bit for each other surface that is in the row of surfaces.
+    found: u32,
     /// Look-ups of textures of plain surfaces.
     pub lookups: u64,
     /// [`Environment::arriving_row`](crate::lights::Environment::arriving_row) where any ray meets nothing.
@@ -89,6 +92,29 @@ impl Met {
     /// What a ray hits.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
+    }
+
+    /// The surface at a hit, if it is in the row of surfaces that these rays met and no plain one.
+    pub fn surface(&self, surfaces: &SurfaceRow, lane_of_ray: usize) -> Option<SurfacePoint> {
+        let (i, bit) = (lane_of_ray, 1 << lane_of_ray);
+        if self.found & bit == 0 {
+            return None;
+        }
+        let (point, normal) = (lane(&surfaces.point, i), lane(&surfaces.normal, i));
+        let is_smooth = surfaces.smooth & bit != 0;
+        let smooth = |of: &Lanes3, flat: Vec3| if is_smooth { lane(of, i) } else { flat };
+        let (u, v) = (self.hits.u[i], self.hits.v[i]);
+        Some(SurfacePoint {
+            point,
+            shadow_point: smooth(&surfaces.shadow_point, point),
+            error: lane(&surfaces.error, i),
+            normal,
+            shading_normal: smooth(&surfaces.shading_normal, normal),
+            uv: DVec2::ZERO,
+            dpdu: Vec3::ZERO,
+            dpdv: Vec3::ZERO,
+            barycentric: Vec3::new(1.0 - u - v, u, v),
+        })
     }
 
     /// The object that a ray hits; none has this number where it hits nothing.
@@ -113,9 +139,22 @@ impl Met {
 
 impl Shot<'_> {
     /// What at most [`PACKET`] rays meet. The plain surfaces are put into the row, ready to be lit if they are to be; those that
-    /// reflect light are `used` in it.
-    pub fn meet(&self, rays: Rays<'_>, measure: Measure, are_lit: bool, row: &mut LitRow) -> Met {
-        self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, are_lit, row })
+    /// reflect light are `used` in it. Others are put into the row of surfaces, as far as there are loops for them.
+    pub fn meet(
+        &self,
+        rays: Rays<'_>,
+        measure: Measure,
+        are_lit: bool,
+        (row, surface): (&mut LitRow, &mut SurfaceRow),
+    ) -> Met {
+        self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, are_lit, row, surface })
+    }
+
+    /// Whether rows of surfaces hold all that an object that is not plain is shaded by.
+    #[inline(always)]
+    fn is_held_by_rows(&self, object: u32) -> bool {
+        // Beams ask for tangents and curvatures.
+        self.pixel_spread == 0.0 && self.world.untextured(object).is_some()
     }
 
     /// The material of an object, and its Phong, where the object is plain.
@@ -134,6 +173,7 @@ struct Meeting<'a> {
     measure: Measure,
     are_lit: bool,
     row: &'a mut LitRow,
+    surface: &'a mut SurfaceRow,
 }
 
 impl Loops for Meeting<'_> {
@@ -141,7 +181,7 @@ impl Loops for Meeting<'_> {
 
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Met {
-        let Self { shot, rays, measure, are_lit, row } = self;
+        let Self { shot, rays, measure, are_lit, row, surface } = self;
         let world = shot.world;
         row.reset();
         let (of_paths, traced);
@@ -178,7 +218,7 @@ impl Loops for Meeting<'_> {
                 (hits, object)
             }
         };
-        let mut surface = SurfaceRow::EMPTY;
+        *surface = SurfaceRow::EMPTY;
         let any = hits.any(folds);
         let (mut left, mut plain, mut shining) = (any, 0, 0);
         let (mut seen, mut from_gloss, mut lookups) = (!0, 0, 0);
@@ -213,7 +253,7 @@ impl Loops for Meeting<'_> {
                         surface.fill_uv(shape, rows, &hits, of);
                     }
                 }
-                Object::Mesh(mesh) => mesh.fill_surfaces(&mut surface, rows, &hits, of, texture.is_some()),
+                Object::Mesh(mesh) => mesh.fill_surfaces(surface, rows, &hits, of, texture.is_some()),
             }
             plain |= of;
             shining |= if material.emission.shines() { of } else { 0 };
@@ -241,13 +281,46 @@ impl Loops for Meeting<'_> {
             Shadows::Off => Lifts::All,
             Shadows::Hard | Shadows::Soft => Lifts::IfFree(seen),
         };
-        let front = if plain == 0 { 0 } else { row.place(&rays, rows, &surface, lifts, folds) };
+        let front = if plain == 0 { 0 } else { row.place(&rays, rows, surface, lifts, folds) };
+        let found = shot.fill_others(surface, rows, (&hits, &object), any & !plain, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
         };
-        Met { hits, object, any, plain, shining: shining & front, lookups, sky }
+        Met { hits, object, any, plain, shining: shining & front, found, lookups, sky }
+    }
+}
+
+impl Shot<'_> {
+    /// Put the surfaces of hits that are not plain into the row; a bit for each that is there then.
+    #[inline(always)]
+    fn fill_others(
+        &self,
+        surface: &mut SurfaceRow,
+        rows: &RayRows,
+        (hits, object): (&HitRows, &[u32; PACKET]),
+        mut left: u32,
+        folds: impl Folds,
+    ) -> u32 {
+        let mut found = 0;
+        while left != 0 {
+            let id = object[left.trailing_zeros() as usize % PACKET];
+            let mut of = [0; PACKET];
+            for lane in 0..PACKET {
+                of[lane] = if object[lane] == id { TRUE } else { 0 };
+            }
+            let of = folds.bits(&of) & left;
+            left &= !of;
+            if !self.is_held_by_rows(id) {
+                continue;
+            }
+            if let Object::Mesh(mesh) = &self.world.geometry.objects()[id as usize] {
+                mesh.fill_surfaces(surface, rows, hits, of, false);
+                found |= of;
+            }
+        }
+        found
     }
 }
 

@@ -9,6 +9,7 @@ use super::lit_queue::LitQueue;
 use super::medium::Medium;
 use super::view::Ways;
 use crate::geometry::Ray;
+use crate::geometry::surface_rows::SurfaceRow;
 use crate::math::Vec3;
 use crate::world::Hit;
 
@@ -99,6 +100,8 @@ pub struct Queues {
     pub camera: Vec<CameraRow>,
     /// Vertices of this round that are not lit yet.
     pub lit: LitQueue,
+    /// Surfaces that a packet of rays met.
+    pub surfaces: SurfaceRow,
     /// What the rays of this round hit.
     pub hits: Vec<Option<Hit>>,
     /// Their order by what they hit.

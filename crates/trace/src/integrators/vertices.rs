@@ -50,6 +50,12 @@ impl<'a> Vertex<'a> {
         Self::shaded(shot, path, (&path.ray, hit), hit.shape.t)
     }
 
+    /// The same where the surface is known.
+    pub fn on(shot: &Shot<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
+        let material = &shot.world.materials[shot.world.material_index(hit)];
+        Self::met(shot, path, (material, surface), hit, hit.shape.t)
+    }
+
     /// What touches the surface that a ray hits at a distance, as the way between the sides of both meets it.
     pub fn touching(shot: &Shot<'a>, path: &PathRay, (sides, hit): (Sides, &Hit), distance: f32) -> Self {
         Self { sides: Some(sides), ..Self::shaded(shot, path, (&sides.ray(), hit), distance) }

@@ -19,7 +19,8 @@ use super::vertices::{LitVertex, Vertex};
 use super::view::Measure;
 use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes};
-use crate::geometry::{Ray, ShapeHit};
+use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::materials::{Bsdf, Mirror, Phong};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
@@ -46,7 +47,7 @@ pub fn trace(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, crossing, camera, hits, by_object } = queues;
+    let Queues { rays, next, lit, surfaces, crossing, camera, hits, by_object } = queues;
     next.clear();
     let is_path = match shot.settings.render.integrator {
         Integrator::Whitted => false,
@@ -60,6 +61,7 @@ pub fn trace(
         onward: None,
         shot,
         lit,
+        surfaces,
         sink,
         next,
         crossing,
@@ -112,6 +114,8 @@ struct Wave<'a, 's> {
     shot: &'a Shot<'a>,
     /// Vertices of this round that are not lit yet.
     lit: &'a mut LitQueue,
+    /// Surfaces that the packet at hand met.
+    surfaces: &'a mut SurfaceRow,
     sink: Sink<'s>,
     /// Rays of the next round.
     next: &'a mut Vec<PathRay>,
@@ -150,7 +154,7 @@ impl Wave<'_, '_> {
             shot.token.check()?;
         }
         let are_lit = self.depth < shot.settings.render.max_depth && self.sink.takes_reflected();
-        let met = shot.meet(rays, self.sink.measure, are_lit, self.lit.spare());
+        let met = shot.meet(rays, self.sink.measure, are_lit, (self.lit.spare(), self.surfaces));
         self.counters.texture_lookups += met.lookups;
         if self.sink.measure == Measure::Work {
             for lane in 0..rays.count() {
@@ -184,7 +188,8 @@ impl Wave<'_, '_> {
                 Some(hit) if met.plain & bit != 0 => self.add_own_light(path, &hit, met.shining & bit != 0),
                 Some(hit) => {
                     self.place = rays.place(lane);
-                    self.shade(*path, hit);
+                    let surface = met.surface(self.surfaces, lane);
+                    self.shade(*path, hit, surface);
                 }
                 None => {
                     let sky = shot.world.lights.environment().map(|_| met.sky(lane));
@@ -279,11 +284,14 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// Shade the first thing that is no mere change between parts of one glass.
-    fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
+    /// Shade the first thing that is no mere change between parts of one glass. `surface` is that of the hit, if it is known.
+    fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
         let shot = self.shot;
         for _ in 0..MOST_HIDDEN {
-            let vertex = Vertex::to_shade(shot, &path, &hit);
+            let vertex = match surface.take() {
+                Some(surface) => Vertex::on(shot, &path, &hit, surface),
+                None => Vertex::to_shade(shot, &path, &hit),
+            };
             if vertex.material.bsdf.glass().is_none() {
                 let weight = if vertex.emits() { shot.lamp_weight(&path, &hit) } else { 1.0 };
                 let after = shot.without_open(path.medium);

@@ -152,6 +152,17 @@ impl World {
         }
     }
 
+    /// The material of all of an object, if it asks for no more of a surface than rows of surfaces hold: no texture coordinates or
+    /// tangents.
+    pub fn untextured(&self, object: u32) -> Option<&Material> {
+        match self.object_materials[object as usize] {
+            ObjectMaterial::One(index) => {
+                Some(&self.materials[index as usize]).filter(|material| !material.is_textured())
+            }
+            ObjectMaterial::OfFile { .. } => None,
+        }
+    }
+
     /// Whether any material has a texture with levels, for which rays must know how wide their beams are.
     pub fn is_mipmapped(&self) -> bool {
         self.is_mipmapped

@@ -21,6 +21,7 @@ use super::map::Photon;
 use crate::control::Cancelled;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::lanes;
+use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::Bsdf;
@@ -80,11 +81,11 @@ impl Shooting<'_> {
         };
         let mut rays = Vec::new();
         flight.start(count, &mut rays);
-        let mut row = LitRow::EMPTY;
+        let (mut row, mut surfaces) = (LitRow::EMPTY, SurfaceRow::EMPTY);
         while !rays.is_empty() {
             for packet in rays.chunks(PACKET) {
                 self.shot.token.check()?;
-                flight.meet(packet, &mut row);
+                flight.meet(packet, &mut row, &mut surfaces);
             }
             flight.scatter_open();
             flight.media.truncate(1);
@@ -176,9 +177,9 @@ impl Flight<'_> {
     }
 
     /// What each photon of a packet meets.
-    fn meet(&mut self, rays: &[PathRay], row: &mut LitRow) {
+    fn meet(&mut self, rays: &[PathRay], row: &mut LitRow, surfaces: &mut SurfaceRow) {
         let shot = self.shooting.shot;
-        let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, true, row);
+        let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, true, (row, surfaces));
         self.counters.texture_lookups += met.lookups;
         // What comes straight is found by light samples.
         if self.depth > 0 {
@@ -195,7 +196,7 @@ impl Flight<'_> {
         }
         for i in lanes(met.any & !met.plain) {
             if let Some(hit) = met.hit(i) {
-                self.shade(rays[i], hit);
+                self.shade(rays[i], hit, met.surface(surfaces, i));
             }
         }
     }
@@ -208,12 +209,16 @@ impl Flight<'_> {
         kept.push(photon);
     }
 
-    /// What a photon does at the first thing that is no mere change between parts of one glass.
-    fn shade(&mut self, mut path: PathRay, mut hit: Hit) {
+    /// What a photon does at the first thing that is no mere change between parts of one glass. `surface` is that of the hit, if it
+    /// is known.
+    fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
         let shot = self.shooting.shot;
         let mut lacks_photons = self.depth == 0;
         for _ in 0..MOST_HIDDEN {
-            let vertex = Vertex::to_shade(shot, &path, &hit);
+            let vertex = match surface.take() {
+                Some(surface) => Vertex::on(shot, &path, &hit, surface),
+                None => Vertex::to_shade(shot, &path, &hit),
+            };
             if vertex.material.bsdf.glass().is_none() {
                 path.throughput *= absorption(shot.world, path.medium, hit.shape.t);
                 path.medium = shot.without_open(path.medium);
