@@ -228,7 +228,7 @@ impl Geometry {
 
 impl MeshInstance {
     /// A box of the world in the mesh's coordinates.
-    fn local_box(&self, bounds: &Aabb) -> Aabb {
+    pub(super) fn local_box(&self, bounds: &Aabb) -> Aabb {
         let corner = |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { bounds.min[axis] } else { bounds.max[axis] };
             self.transform.inverse_point(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())

@@ -1,6 +1,7 @@
 //! Everything ready to trace: immutable, shared by `Arc`.
 
 mod along;
+mod around;
 mod assemble;
 pub mod camera;
 pub mod contact;
