@@ -261,13 +261,13 @@ fn long_floor() -> Build {
 fn light_is_even_up_to_the_edges_of_a_floor() {
     let whole = mirrored(small_floor(), (-2.1, -0.9), (0.0, 1.2));
     let whole = strip(whole, v(-1.5, 0.0, 0.0), (0.999, 0.999));
-    assert_even("the whole floor", &whole, (5000, 0.2), even());
+    assert_even("the whole floor", &whole, (2500, 0.2), even());
     let edge = mirrored(small_floor(), (-1.25, -0.95), (0.0, 0.6));
     let edge = strip(edge, v(-1.05, 0.0, 0.0), (0.099, 0.3));
-    assert_even("a strip along an edge", &edge, (8000, 0.1), even());
+    assert_even("a strip along an edge", &edge, (3500, 0.1), even());
     let corner = mirrored(small_floor(), (-1.25, -0.95), (0.4, 0.3));
     let corner = strip(corner, v(-1.05, 0.0, 0.45), (0.099, 0.099));
-    assert_even("a corner", &corner, (12_000, 0.1), even());
+    assert_even("a corner", &corner, (5000, 0.1), even());
 }
 
 #[test]
@@ -277,15 +277,15 @@ fn light_is_even_where_a_wall_meets_a_floor() {
     for (what, floor) in [("at its edge", small_floor()), ("on it", long_floor())] {
         let room = mirrored(wall(floor), (-2.2, -1.75), (0.0, 0.6));
         let foot = strip(room.clone(), v(-1.95, 0.0, 0.0), (0.099, 0.3));
-        assert_even(&format!("a floor before a wall {what}"), &foot, (12_000, 0.1), even());
+        assert_even(&format!("a floor before a wall {what}"), &foot, (5000, 0.1), even());
         // On the wall, seen from the mirror's side, from the floor upwards.
         let low = room.pictured(v(-1.0, 0.05, 0.0), v(-2.0, 0.05, 0.0), 5.65, 48, 16).depth(3);
-        assert_even(&format!("a wall {what}"), &low, (12_000, 0.1), even());
+        assert_even(&format!("a wall {what}"), &low, (5000, 0.1), even());
     }
     // Nothing comes through: behind the wall is its shadow.
     let behind =
         strip(mirrored(wall(long_floor()), (-2.2, -1.75), (0.0, 0.6)), v(-2.06, 0.0, 0.0), (0.1, 0.3));
-    assert!(behind.photons(12_000, 0.1).picture(4, 1).iter().all(|color| *color == DVec3::ZERO));
+    assert!(behind.photons(5000, 0.1).picture(4, 1).iter().all(|color| *color == DVec3::ZERO));
 }
 
 /// A flat ring about (−1.5, 0, 0) of so many steps, from one radius to another, in `rows` of triangles.
@@ -318,7 +318,7 @@ fn light_is_even_up_to_the_rims_of_rings_and_disks() {
         // A square that ends 4·10⁻³ before the rim.
         let lit = mirrored(build, (-1.16, -0.99), (0.0, 0.2));
         let rim = strip(lit, v(-1.024, 0.0, 0.0), (0.04, 0.06));
-        assert_even(&format!("the rim of {what}"), &rim, (12_000, 0.05), even());
+        assert_even(&format!("the rim of {what}"), &rim, (6000, 0.05), even());
     }
 }
 
@@ -328,14 +328,14 @@ fn light_is_even_around_a_box_that_stands_on_a_floor() {
     let standing = long_floor().cuboid(v(-1.7, 0.1, 0.0), v(0.2, 0.2, 0.6), DVec3::ZERO, matte(0.5));
     let before = mirrored(standing.clone(), (-1.75, -1.4), (0.0, 0.6));
     let before = strip(before, v(-1.55, 0.0, 0.0), (0.099, 0.4));
-    assert_even("before a box", &before, (10_000, 0.08), even());
+    assert_even("before a box", &before, (4500, 0.08), even());
     let beside = mirrored(standing, (-1.9, -1.5), (0.35, 0.35));
     let beside = strip(beside, v(-1.7, 0.0, 0.35), (0.18, 0.099));
-    assert_even("beside a box", &beside, (10_000, 0.08), even());
+    assert_even("beside a box", &beside, (4500, 0.08), even());
     // On top of one so low that kernels reach the floor beside it, in whose plane nothing is reached.
     let low = long_floor().cuboid(v(-1.7, 0.01, 0.0), v(0.2, 0.02, 0.6), DVec3::ZERO, matte(0.7));
     let top = strip(mirrored(low, (-1.95, -1.45), (0.0, 0.85)), v(-1.7, 0.02, 0.0), (0.199, 0.599));
-    assert_even("on a low box", &top, (8000, 0.08), even());
+    assert_even("on a low box", &top, (4500, 0.08), even());
 }
 
 #[test]

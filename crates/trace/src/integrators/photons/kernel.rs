@@ -11,9 +11,10 @@ pub fn weight_over(corners: &[DVec2]) -> f64 {
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();
     let (mut is_around, mut is_beside) = (true, false);
     for (a, b) in edges() {
-        let inside = turn * a.perp_dot(b) / (b - a).length();
-        is_around &= inside >= 1.0;
-        is_beside |= inside <= -1.0;
+        let inside = turn * a.perp_dot(b);
+        let is_beyond_disc = inside * inside >= (b - a).length_squared();
+        is_around &= inside > 0.0 && is_beyond_disc;
+        is_beside |= inside < 0.0 && is_beyond_disc;
     }
     match (is_around, is_beside) {
         (_, true) => 0.0,
