@@ -1,4 +1,4 @@
-//! What lies around a small part of a surface.
+//! Objects and triangles around a small part of a surface.
 
 use super::{Geometry, Hit, MeshInstance, Object};
 use crate::geometry::{Aabb, Ray};

@@ -1,5 +1,5 @@
-//! The part of a kernel that lies on surface which receives photons together with its middle. It is told exactly where what is around is
-//! flat and little, and by trials elsewhere.
+//! Closed form of the part p of a kernel that receives photons: of surface with about the middle's normal, to which the way from the middle
+//! is free. Few flat pieces have one; anything else is left to trials.
 
 use arrayvec::ArrayVec;
 
@@ -11,14 +11,14 @@ use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
 use crate::world::{Hit, MeshInstance, Object, World};
 
-/// What edges and walls leave of a kernel.
+/// Part of a kernel that edges and walls leave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Clip {
-    /// This part of its weight, all of it reached from the middle.
+    /// This part of its weight; nothing stands between its points.
     Part(f32),
-    /// A part that trials are to tell.
+    /// Unknown: edges or walls are near.
     Cut,
-    /// A part that trials are to tell, which is all of it nearly everywhere.
+    /// Unknown, among many triangles, most of which are far from an edge.
     Crowded,
 }
 
@@ -28,19 +28,19 @@ const FLAT: f64 = 4e-3;
 /// Least cosine between the normals of two pieces of one plane.
 const SAME_PLANE: f64 = 1.0 - 1e-6;
 
-/// What walls may be off from the border of what they stand on, in radii.
+/// Distance in radii between a wall and the border of the piece that it stands on.
 const BORDER: f64 = 2e-3;
 
 /// The largest cosine between a wall and the normal of what it stands on.
 const UPRIGHT: f64 = 0.3;
 
-/// What is farther from the middle than this, in radii, is not in the way: √(1 + REACH²) and some more.
+/// Distance in radii from which on a surface is not in the way: √(1 + REACH²) and some more.
 const FAR: f64 = 1.05;
 
 /// Spheres have as large a radius at least, in radii of the kernel, where it follows them all around its middle.
 const WIDE: f64 = 2.0;
 
-/// The least part that is told exactly.
+/// Smallest part that the closed form gives; below it its rounding counts.
 const LEAST_PART: f64 = 1e-3;
 
 /// Room for triangles of a mesh near a kernel, pieces of its plane, and walls.
@@ -48,7 +48,7 @@ const TRIANGLES: usize = 32;
 const PIECES: usize = 8;
 const WALLS: usize = 4;
 
-/// The part of the kernel of a look that receives photons.
+/// Computes the part of the kernel of a look that receives photons.
 pub fn clip(world: &World, look: &Look, radius: f32) -> Clip {
     let mut around = Around::new(look, radius);
     let mut is_crowded = false;
@@ -97,7 +97,7 @@ impl Wall {
 /// A flat piece by its corners in order.
 type Piece = ArrayVec<DVec3, 4>;
 
-/// What is around the middle of a kernel.
+/// Surfaces around the middle of a kernel.
 struct Around {
     point: DVec3,
     normal: DVec3,
@@ -137,7 +137,7 @@ impl Around {
         piece.iter().map(|&corner| self.along(corner - self.point)).collect()
     }
 
-    /// The part of the kernel on the pieces; none where it is not told by them.
+    /// Computes the part of the kernel on the pieces; `None` if a wall parts them or they overlap.
     fn part(&self) -> Option<f64> {
         if !self.walls.is_empty() && self.whole > 0 {
             return None;
@@ -153,7 +153,7 @@ impl Around {
         (LEAST_PART..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
 
-    /// Adds a shape; whether what is left of the kernel can still be told.
+    /// Adds a shape; whether the part still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
         let point = self.point;
         let is_far = |distance: f64| distance > FAR * self.radius;
@@ -219,7 +219,7 @@ impl Around {
         })
     }
 
-    /// Adds a flat piece; whether what is left of the kernel can still be told.
+    /// Adds a flat piece; whether the part still has a closed form.
     fn add_piece(&mut self, piece: &Piece, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
@@ -276,7 +276,7 @@ mod tests {
     use crate::geometry::sphere::Sphere;
     use crate::math::Vec3;
 
-    /// What is told of a kernel of radius .1 at (x, 0, z), which faces up, among shapes.
+    /// Part of a kernel of radius .1 at (x, 0, z), which faces up, among shapes.
     fn told(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
         let look = Look { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
         let mut around = Around::new(&look, 0.1);
@@ -310,10 +310,10 @@ mod tests {
         assert_eq!(told(0.25, 0.5, &[floor, cuboid]), Some(1.0));
         let sheet = quad(DVec3::new(0.4, 0.01, 0.4), DVec3::Z * 0.2, DVec3::X * 0.2);
         assert_eq!(told(0.35, 0.5, &[floor, sheet]), None);
-        let ball = |radius| Shape::Sphere(Sphere { center: DVec3::new(0.5, radius, 0.5), radius });
+        let ball = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, radius, 0.5), radius });
         assert_eq!(told(0.45, 0.5, &[floor, ball(0.1)]), None);
         // On balls, wide and small.
-        let under = |radius| Shape::Sphere(Sphere { center: DVec3::new(0.5, -radius, 0.5), radius });
+        let under = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, -radius, 0.5), radius });
         assert_eq!((told(0.5, 0.5, &[under(1.0)]), told(0.5, 0.5, &[under(0.15)])), (Some(1.0), None));
     }
 }

@@ -79,8 +79,8 @@ impl Loops for Gathering<'_> {
     }
 }
 
-/// By how much more photons bring than those that are around, one of which is given: nothing of a kernel counts that is behind a wall, and
-/// what hangs over edges is made up for.
+/// Factor on what the photons of a kernel bring, one of which is given: 0 if that is behind a wall, else one over the part of the kernel
+/// that receives photons, or an estimate of it.
 #[inline(never)]
 fn reached(
     shot: &Shot<'_>,

@@ -58,7 +58,7 @@ fn angle(from: DVec2, to: DVec2) -> f64 {
 /// within ρ are 2ρ² − ρ⁴, of the disc ρ².
 pub fn sample(on_disk: Vec2) -> Vec2 {
     let squared = on_disk.length_squared().min(1.0);
-    // ρ² = 1 − √(1 − u), u the square on the disc, over which it is told without a difference of near numbers.
+    // ρ² = 1 − √(1 − u), u the square on the disc, written without a difference of near numbers: ρ²/u = 1/(1 + √(1 − u)).
     on_disk * (1.0 + (1.0 - squared).sqrt()).recip().sqrt()
 }
 

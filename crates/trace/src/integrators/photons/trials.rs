@@ -1,4 +1,4 @@
-//! One over the part of a kernel that receives photons, where that is not known: by trials, which are unbiased.
+//! Unbiased estimate of one over the part of a kernel that receives photons, by trials.
 
 use super::chosen::{Place, is_apart};
 use super::clip::{Clip, material, receives};
@@ -98,10 +98,13 @@ mod tests {
     fn trials_tell_one_over_a_chance_without_bias() {
         let mut next = unit(7);
         for chance in [0.03_f32, 0.1, 0.3, 0.5, 0.9, 1.0] {
-            for way in [mean_trials::<&mut dyn FnMut(u32) -> bool>, after_first] {
+            for is_crowded in [false, true] {
                 const RUNS: u32 = 100_000;
-                let mut succeeds = |_: u32| next() < chance;
-                let values: Vec<f64> = (0..RUNS).map(|_| f64::from(way(&mut succeeds))).collect();
+                let mut value = || {
+                    let succeeds = |_: u32| next() < chance;
+                    f64::from(if is_crowded { after_first(succeeds) } else { mean_trials(succeeds) })
+                };
+                let values: Vec<f64> = (0..RUNS).map(|_| value()).collect();
                 let mean = values.iter().sum::<f64>() / f64::from(RUNS);
                 let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
                 let error = (squares / f64::from(RUNS)).sqrt() / f64::from(RUNS).sqrt();
