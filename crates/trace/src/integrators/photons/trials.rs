@@ -37,7 +37,7 @@ pub fn inverse_part(
     };
     match clip {
         Clip::Part(part) => 1.0 / part,
-        Clip::Cut => mean_trials(|number| succeeds(number)),
+        Clip::Cut => mean_trials(&mut succeeds),
         Clip::Crowded => after_first(succeeds),
     }
 }
