@@ -285,7 +285,7 @@ const BROKEN: &[(&str, &[Said])] = &[
         "photons",
         &[
             (3, 11, r#"`enabled` must be true or false; found the string "yes""#),
-            (4, 9, "`count` must be a whole number between 1 and 1000000000000; found 0"),
+            (4, 9, "`count` must be a whole number between 0 and 1000000000000; found -1"),
             (5, 10, "`radius` must be at least 0; found -1"),
             (6, 11, "`bounces` must be a whole number; found 1e3"),
         ],

@@ -31,6 +31,8 @@ pub enum Decision {
     Spared,
     /// Whether photons are looked up where many look-ups are on the way.
     Gather,
+    /// Where in a kernel the trial of this number looks for surface.
+    Trial(u32),
     /// Which light a photon starts at, and which piece of it.
     Lamp,
     /// Whether a photon is aimed, and at what.
@@ -62,6 +64,7 @@ impl Decision {
             Self::Sent => u32::MAX - 12,
             Self::Spared => u32::MAX - 13,
             Self::Gather => u32::MAX - 14,
+            Self::Trial(number) => (1 << 31) + number,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }

@@ -187,6 +187,17 @@ impl Cone {
         self.capped
     }
 
+    /// Distance of a point from the surface.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let local = self.frame.local(point);
+        let point = DVec2::new(local.truncate().length(), local.z);
+        let rim = DVec2::new(self.radius, self.height);
+        let along = (point.dot(rim) / rim.length_squared()).clamp(0.0, 1.0);
+        let side = (point - rim * along).length();
+        let cap = DVec2::new((point.x - self.radius).max(0.0), point.y - self.height).length();
+        if self.capped { side.min(cap) } else { side }
+    }
+
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let p = self.frame.local(point);

@@ -163,6 +163,19 @@ impl Cylinder {
         self.capped
     }
 
+    /// Distance of a point from the surface.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let local = self.frame.local(point);
+        let (across, along) = (local.truncate().length(), local.z.abs());
+        let from = |dx: f64, dy: f64| DVec2::new(dx, dy).length();
+        let side = from(across - self.radius, (along - self.half_length).max(0.0));
+        if self.capped {
+            side.min(from((across - self.radius).max(0.0), along - self.half_length))
+        } else {
+            side
+        }
+    }
+
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let p = self.frame.local(point);

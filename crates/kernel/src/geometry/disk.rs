@@ -113,6 +113,12 @@ impl Disk {
         AreaPoint { point: self.point(warp::disk(u).as_dvec2()), normal: self.normal() }
     }
 
+    /// Distance of a point from it.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let local = self.frame.local(point);
+        DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
+    }
+
     /// Whether a point is inside, where nothing is.
     pub fn contains(&self, _: DVec3) -> bool {
         false

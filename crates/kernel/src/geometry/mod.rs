@@ -315,6 +315,34 @@ mod tests {
     }
 
     #[test]
+    fn the_distance_of_a_point_is_that_of_the_nearest_place() {
+        let distance = |shape: &Shape, point: DVec3| match shape {
+            Shape::Sphere(sphere) => Some(sphere.distance(point)),
+            Shape::Plane(plane) => Some(plane.distance(point)),
+            Shape::Disk(disk) => Some(disk.distance(point)),
+            Shape::Cylinder(cylinder) => Some(cylinder.distance(point)),
+            Shape::Cone(cone) => Some(cone.distance(point)),
+            Shape::Torus(torus) => Some(torus.distance(point)),
+            Shape::Quad(_) | Shape::Box(_) | Shape::Triangle(_) => None,
+        };
+        for shape in shapes() {
+            let parts = (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0);
+            let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
+            let places: Vec<DVec3> = parts
+                .flat_map(|(part, _)| (0..SIDE * SIDE).map(move |i| (part, grid(i))))
+                .map(|(part, u)| shape.place(part, u).point)
+                .collect();
+            for i in 0..12_u32 {
+                let u = |factor: f64| (f64::from(i) + 0.5) * factor % 1.0 * 3.0 - 1.5;
+                let point = shape.middle() + DVec3::new(u(0.618_034), u(0.754_878), u(0.569_84));
+                let Some(told) = distance(&shape, point).filter(|_| !places.is_empty()) else { continue };
+                let nearest = places.iter().map(|place| (*place - point).length()).fold(f64::MAX, f64::min);
+                assert!((told - 1e-9..told + 0.03).contains(&nearest), "{shape:?}: {told}, {nearest}");
+            }
+        }
+    }
+
+    #[test]
     fn a_ray_goes_in_where_it_meets_a_front_and_out_where_it_meets_a_back() {
         for shape in shapes() {
             let mut seen = 0;

@@ -91,6 +91,16 @@ impl Plane {
         self.point
     }
 
+    /// Unit normal of its front.
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    /// Distance of a point from it.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        (point - self.point).dot(self.normal).abs()
+    }
+
     /// Whether a point is inside, where nothing is.
     pub fn contains(&self, _: DVec3) -> bool {
         false

@@ -114,6 +114,11 @@ impl Sphere {
         self.center
     }
 
+    /// Distance of a point from the surface.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        ((point - self.center).length() - self.radius).abs()
+    }
+
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);

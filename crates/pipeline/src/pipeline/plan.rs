@@ -1,5 +1,6 @@
 //! From a scene and what the command line changes of it to the settings that hold.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -50,7 +51,10 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         render,
         dof: overrides.dof != Some(false) && aperture > 0.0,
         view: overrides.view.unwrap_or(View::Beauty),
-        photons: overrides.photons.unwrap_or(scene.photons.enabled).then(|| photons(&scene.photons)),
+        photons: overrides
+            .photons
+            .unwrap_or(scene.photons.enabled)
+            .then(|| photons(&scene.photons, (render.width, render.height))),
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
@@ -76,10 +80,19 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
 /// Photons that a pass may send: what it stores must have room.
 pub(super) const MOST_PHOTONS: u64 = 4_000_000;
 
-/// How photons are sent and gathered.
-fn photons(asked: &Photons) -> PhotonSettings {
-    let Photons { enabled: _, count, radius, bounces } = *asked;
-    PhotonSettings { count: count.clamp(1, MOST_PHOTONS) as u32, radius: radius as f32, bounces }
+/// Photons of a pass where the scene leaves their number open: as many as the picture has pixels, within these bounds. Fewer leave more
+/// error than they save time, and more take time in which another pass brings more; the first picture waits for the first pass.
+const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
+
+/// How photons are sent and gathered for a picture of a size.
+fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
+    let Photons { enabled: _, count, radius, bounces } = *requested;
+    let by_pixels = || {
+        let pixels = u64::from(width) * u64::from(height);
+        pixels.clamp(*PHOTONS_BY_PIXELS.start(), *PHOTONS_BY_PIXELS.end())
+    };
+    let count = if count == 0 { by_pixels() } else { count.min(MOST_PHOTONS) };
+    PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
 /// A scene may be large: it is copied only where it has to be another one.
@@ -192,6 +205,28 @@ mod tests {
         let changed = planned(text, &overrides);
         assert_eq!(size(&changed), (8, 24, 2));
         assert_eq!((changed.threads, changed.settings.render.seed, changed.effective.width), (3, 9, 8));
+    }
+
+    #[test]
+    fn photons_are_as_many_as_pixels_within_bounds_unless_the_scene_says_how_many() {
+        let count = |table: &str, width, height, crop| {
+            let overrides =
+                Overrides { width: Some(width), height: Some(height), crop, ..Default::default() };
+            let text = format!("[photons]\nenabled = true\n{table}");
+            planned(&text, &overrides).settings.photons.expect("they are on").count
+        };
+        let part = Some(Rect { x: 7, y: 9, width: 5, height: 3 });
+        for (table, width, height, photons) in [
+            ("", 320, 240, 76_800),
+            ("count = 0", 320, 240, 76_800),
+            ("", 16, 16, 8192),
+            ("", 1920, 1080, 200_000),
+            ("count = 500", 320, 240, 500),
+            ("count = 9_000_000", 320, 240, MOST_PHOTONS as u32),
+        ] {
+            assert_eq!(count(table, width, height, None), photons, "{table} at {width}×{height}");
+            assert_eq!(count(table, width, height, part), photons, "whatever part is rendered");
+        }
     }
 
     #[test]

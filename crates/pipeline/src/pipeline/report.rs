@@ -100,6 +100,8 @@ pub struct LightsReport {
 /// The photons of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PhotonsReport {
+    /// Photons that a pass sends out.
+    pub count: u64,
     /// Passes that were sent; others were kept from before.
     pub passes: u64,
     /// Photons that were sent.

@@ -37,7 +37,7 @@ fn a_scene_that_says_nothing_has_the_documented_defaults() {
     assert_eq!(scene.render.shadows, Shadows::Soft);
     assert_eq!((scene.render.filter, scene.render.tonemap), (PixelFilter::Box, Tonemap::None));
     assert_eq!((scene.render.exposure, &scene.output), (0.0, &None));
-    assert_eq!(scene.photons, Photons { enabled: false, count: 200_000, radius: 0.0, bounces: 16 });
+    assert_eq!(scene.photons, Photons { enabled: false, count: 0, radius: 0.0, bounces: 16 });
     let camera = Camera::LookAt {
         position: DVec3::new(0.0, 1.0, 4.0),
         look_at: DVec3::Y,

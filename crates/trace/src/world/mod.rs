@@ -1,6 +1,7 @@
 //! Everything ready to trace: immutable, shared by `Arc`.
 
 mod along;
+mod around;
 mod assemble;
 mod bodies;
 pub mod camera;

@@ -82,6 +82,14 @@ impl TriangleTree {
         }
     }
 
+    /// The same until `visit` says that it has seen enough; whether it saw all of them.
+    pub fn meeting_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
+        match self {
+            Self::Boxes(tree) => tree.meeting_while(bounds, visit),
+            Self::Planes(tree) => tree.meeting_while(bounds, visit),
+        }
+    }
+
     /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays up to their ends.
     pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
         match self {

@@ -71,6 +71,14 @@ impl KdTree {
 
     /// Visit every triangle that has a point in a box, and maybe others near it; one in several leaves maybe more than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
+        self.meeting_while(other, |triangle| {
+            visit(triangle);
+            true
+        });
+    }
+
+    /// The same until `visit` says that it has seen enough; whether it saw all of them.
+    pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
         let mut pending = [0_u32; traverse::STACK_SIZE];
         let mut size = usize::from(!self.nodes.is_empty() && self.bounds.meets(other));
         while size > 0 {
@@ -80,7 +88,9 @@ impl KdTree {
                 match self.nodes[place as usize].kind() {
                     Kind::Leaf { first, count } => {
                         let own = &self.references[first as usize..][..count as usize];
-                        own.iter().for_each(|&own| visit(self.triangles[own as usize].id));
+                        if !own.iter().all(|&own| visit(self.triangles[own as usize].id)) {
+                            return false;
+                        }
                         break;
                     }
                     Kind::Inner { axis, at, right } if other.min[axis] > at => place = right,
@@ -93,6 +103,7 @@ impl KdTree {
                 }
             }
         }
+        true
     }
 
     /// Visit the nodes whose cells a ray meets, parents first, in an order that depends on the tree alone; `visit` says whether to go

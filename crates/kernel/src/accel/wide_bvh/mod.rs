@@ -180,22 +180,27 @@ impl WideBvh {
 
     /// Visit every triangle that has a point in a box, and maybe others near it; one in pieces maybe more than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
-        if !self.nodes.is_empty() {
-            self.meeting_below(0, other, &mut visit);
-        }
+        self.meeting_while(other, |triangle| {
+            visit(triangle);
+            true
+        });
     }
 
-    fn meeting_below(&self, place: u32, other: &Aabb, visit: &mut impl FnMut(u32)) {
+    /// The same until `visit` says that it has seen enough; whether it saw all of them.
+    pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
+        self.nodes.is_empty() || self.meeting_below(0, other, &mut visit)
+    }
+
+    fn meeting_below(&self, place: u32, other: &Aabb, visit: &mut impl FnMut(u32) -> bool) -> bool {
         let node = &self.nodes[place as usize];
-        for slot in (0..node::WIDTH).filter(|&slot| node.bounds(slot).is_some_and(|own| own.meets(other))) {
-            match node.child(slot) {
-                node::Child::Inner(child) => self.meeting_below(child, other, visit),
-                node::Child::Leaf { first, count } => {
-                    let packs = &self.packs[first as usize..(first + count) as usize];
-                    packs.iter().flat_map(TrianglePack::ids).for_each(&mut *visit);
-                }
+        let mut met = (0..node::WIDTH).filter(|&slot| node.bounds(slot).is_some_and(|own| own.meets(other)));
+        met.all(|slot| match node.child(slot) {
+            node::Child::Inner(child) => self.meeting_below(child, other, visit),
+            node::Child::Leaf { first, count } => {
+                let packs = &self.packs[first as usize..(first + count) as usize];
+                packs.iter().flat_map(TrianglePack::ids).all(&mut *visit)
             }
-        }
+        })
     }
 
     /// Walks the tree and says what is wrong with it.

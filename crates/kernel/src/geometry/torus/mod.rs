@@ -148,6 +148,13 @@ impl Torus {
         self.frame.origin
     }
 
+    /// Distance of a point from the surface.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let local = self.frame.local(point);
+        let from_circle = DVec2::new(local.truncate().length() - self.radius, local.z).length();
+        (from_circle - self.tube).abs()
+    }
+
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         self.signed_distance(point) < 0.0

@@ -1,6 +1,6 @@
 //! Photon maps. The stage makes what all passes have in common and the first of them; the others are sent during the render, when
-//! their samples are due. Maps are kept while there is room: pictures that differ in the camera, the exposure or the size alone find
-//! them again.
+//! their samples are due. Maps are kept while there is room: pictures that differ in the camera or the exposure alone find them
+//! again, and those of another size if the scene says how many photons a pass has.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
@@ -150,6 +150,7 @@ impl PhotonStore {
         let Sent { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
         let [caustic, bounced] = self.photons.radii();
         PhotonsReport {
+            count: self.photons.count(),
             passes,
             emitted,
             stored,

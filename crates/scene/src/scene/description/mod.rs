@@ -60,7 +60,7 @@ pub struct Located<T> {
 pub struct Photons {
     /// Whether the scene asks for them.
     pub enabled: bool,
-    /// Photons emitted in a pass, ≥ 1.
+    /// Photons emitted in a pass; 0 = about one for each pixel.
     pub count: u64,
     /// First gather radius; 0 = chosen from the scene's size.
     pub radius: f64,

@@ -5,11 +5,11 @@ use super::limits::Limits;
 use super::table::Table;
 
 pub(super) fn read(root: &Table<'_>) -> Option<Photons> {
-    let default = Photons { enabled: false, count: 200_000, radius: 0.0, bounces: 16 };
+    let default = Photons { enabled: false, count: 0, radius: 0.0, bounces: 16 };
     let Some(table) = root.table("photons") else { return Some(default) };
     let photons = Photons {
         enabled: table.optional("enabled").flag().unwrap_or(default.enabled),
-        count: table.optional("count").whole(1..=1_000_000_000_000).unwrap_or(default.count),
+        count: table.optional("count").whole(0..=1_000_000_000_000).unwrap_or(default.count),
         radius: table.optional("radius").number(Limits::LengthOrZero).unwrap_or(default.radius),
         bounces: table.optional("bounces").whole(0..=u32::MAX.into()).unwrap_or(default.bounces),
     };

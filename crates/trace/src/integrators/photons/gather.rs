@@ -6,7 +6,9 @@ use super::super::shot::Shot;
 use super::super::view::{Measure, Ways};
 use super::PhotonMaps;
 use super::chosen::{Place, is_apart};
+use super::clip::{Clip, clip};
 use super::map::{Look, PhotonMap};
+use super::trials::inverse_part;
 use crate::geometry::rows::lanes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
@@ -68,15 +70,34 @@ impl Loops for Gathering<'_> {
                     // What is left of the random number is random again.
                     let random = [choices[i], looks[i] / chance];
                     let (light, photon) = brought((row, i), (map, &look), measure, random, folds);
-                    let geometry = &shot.world.geometry;
-                    if !photon.is_some_and(|photon| is_apart(geometry, &look, &photon, map.radius())) {
-                        sum += light / chance;
-                    }
+                    sum += light * (reached(shot, (row, i), &look, photon, map.radius()) / chance);
                 }
             }
             set_lane(&mut sums, i, sum);
         }
         sums
+    }
+}
+
+/// Factor on what the photons of a kernel bring, one of which is given: 0 if that is behind a wall, else one over the part of the kernel
+/// that receives photons, or an estimate of it.
+#[inline(never)]
+fn reached(
+    shot: &Shot<'_>,
+    (row, i): (&LitRow, usize),
+    look: &Look,
+    photon: Option<Place>,
+    radius: f32,
+) -> f32 {
+    let Some(photon) = photon else { return 1.0 };
+    match clip(shot.world, look, radius) {
+        Clip::Part(part) => 1.0 / part,
+        Clip::Cut | Clip::Crowded if is_apart(&shot.world.geometry, look, &photon, radius) => 0.0,
+        by_trials @ (Clip::Cut | Clip::Crowded) => {
+            let sampler = shot.sampler(row.slot[i]);
+            let pair = |number| sampler.pair(row.path[i], Decision::Trial(number));
+            inverse_part(shot.world, look, radius, by_trials, pair)
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 use super::chosen::{Choices, Place};
 use super::packed::{self, Packed};
 use crate::control::{CancelToken, Cancelled};
+use crate::geometry::Aabb;
 use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane};
@@ -62,10 +63,10 @@ pub struct PhotonMap {
 }
 
 /// Least cosine between the normals of surfaces that a kernel reaches over.
-const LEAST_COSINE: f32 = 0.7;
+pub(super) const LEAST_COSINE: f32 = 0.7;
 
 /// How far from a tangent plane photons are taken, in radii.
-const REACH: f32 = 0.3;
+pub(super) const REACH: f32 = 0.3;
 
 /// The length of a cell in radii: more than that of the box around any kernel, 2·√(1 + REACH²), so that it meets two cells along an
 /// axis at most.
@@ -80,6 +81,22 @@ pub struct Look {
     pub normal: Vec3,
     /// Most scatterings of the photons.
     pub most_depth: u32,
+}
+
+impl Look {
+    /// The box around a kernel of this radius.
+    pub fn kernel_box(&self, radius: f32) -> Aabb {
+        let half = self.half_box() * radius;
+        Aabb { min: self.point - half, max: self.point + half }
+    }
+
+    /// Half the sides of the box around a kernel of radius 1.
+    #[inline(always)]
+    fn half_box(&self) -> Vec3 {
+        let own = self.normal.abs();
+        let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
+        Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * REACH
+    }
 }
 
 /// Ranges of photons among which those of a kernel are.
@@ -275,11 +292,7 @@ impl PhotonMap {
         if self.count == 0 {
             return ranges;
         }
-        // The box around the kernel.
-        let own = look.normal.abs();
-        let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
-        let along = Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt());
-        let half = (along + own * REACH) * self.radius;
+        let half = look.half_box() * self.radius;
         let first = cell_of(look.point - half, self.cells);
         let last = cell_of(look.point + half, self.cells);
         let more = |axis: usize| u32::from(first[axis] != last[axis]);
@@ -333,6 +346,8 @@ impl PhotonMap {
                 & (cosine * cosine > (LEAST_COSINE * LEAST_COSINE) * squared)
                 & (arriving > 0.0);
             near[i] &= if faces { TRUE } else { 0 };
+            // Surface that is inclined has more photons over a part of the plane.
+            weights[i] *= cosine / squared.sqrt();
         }
         if most_depth < self.most_depth {
             let depths = &self.depths[number];

@@ -19,16 +19,22 @@
 //! a small place that paths hardly ever find: hence the photons that are thrown back. Scatterings of the eye's path, the vertex at which photons are
 //! gathered among them, and those of the photon are at most `max_depth` together.
 //!
-//! Photons behind a wall of a point bring nothing: one of those in the kernel, chosen by what it brings, tells whether they are.
+//! Light at a point is what its kernel weighs over the part p of the kernel that receives photons: that on surface with about the point's
+//! normal, to which the way from the point is free. So even light comes out even up to edges, rims and walls. Which estimator tells p:
 //!
-//! Kernels that hang over an edge of a surface lose what is beyond it: in a strip of width W along the edge 8r/15πW of the light, in the
-//! mean over the passes with their r, which goes to 0.
+//! | around the kernel | estimator |
+//! | --- | --- |
+//! | flat pieces of its plane, walls at their borders, wide spheres | p in closed form; all of it is reached |
+//! | anything else | one photon of the kernel, chosen by what it brings, tells whether what it holds is reached; trials, places chosen by the kernel, give 1/p |
 
 mod chosen;
+mod clip;
 pub(super) mod gather;
+mod kernel;
 mod map;
 mod packed;
 mod shoot;
+mod trials;
 
 use crate::math::lanes::PlainFolds;
 use std::ops::Range;
@@ -168,6 +174,11 @@ impl Photons {
         self.radii
     }
 
+    /// Photons that a pass sends out; 0 if none are sent.
+    pub fn count(&self) -> u64 {
+        if self.are_sent() { self.settings.count.into() } else { 0 }
+    }
+
     /// Whether any photons are sent: there are mirrors or glass, and lights that shine on them.
     pub fn are_sent(&self) -> bool {
         self.emission.is_some() && self.most_depth > 0
@@ -195,8 +206,7 @@ impl Photons {
         let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
         let (caustic, bounced) =
             rayon::join(|| map(&sent.caustic, of_caustic), || map(&sent.bounced, of_bounced));
-        let emitted = if self.are_sent() { self.settings.count.into() } else { 0 };
-        Ok(PhotonPass { caustic: caustic?, bounced: bounced?, emitted, lookups: sent.lookups })
+        Ok(PhotonPass { caustic: caustic?, bounced: bounced?, emitted: self.count(), lookups: sent.lookups })
     }
 
     /// The passes of some samples.

@@ -1,0 +1,319 @@
+//! Closed form of the part p of a kernel that receives photons: of surface with about the middle's normal, to which the way from the middle
+//! is free. Few flat pieces have one; anything else is left to trials.
+
+use arrayvec::ArrayVec;
+
+use super::kernel::weight_over;
+use super::map::{LEAST_COSINE, Look, REACH};
+use crate::geometry::{Aabb, Shape, ShapeHit};
+use crate::materials::{Bsdf, Material};
+use crate::math::frame::Frame;
+use crate::math::{DVec2, DVec3};
+use crate::world::{Hit, MeshInstance, Object, World};
+
+/// Part of a kernel that edges and walls leave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Clip {
+    /// This part of its weight; nothing stands between its points.
+    Part(f32),
+    /// Unknown: edges or walls are near.
+    Cut,
+    /// Unknown, among many triangles, most of which are far from an edge.
+    Crowded,
+}
+
+/// Distances in radii that tell one plane from another.
+const FLAT: f64 = 4e-3;
+
+/// Least cosine between the normals of two pieces of one plane.
+const SAME_PLANE: f64 = 1.0 - 1e-6;
+
+/// Distance in radii between a wall and the border of the piece that it stands on.
+const BORDER: f64 = 2e-3;
+
+/// The largest cosine between a wall and the normal of what it stands on.
+const UPRIGHT: f64 = 0.3;
+
+/// Distance in radii from which on a surface is not in the way: √(1 + REACH²) and some more.
+const FAR: f64 = 1.05;
+
+/// Spheres have as large a radius at least, in radii of the kernel, where it follows them all around its middle.
+const WIDE: f64 = 2.0;
+
+/// Smallest part that the closed form gives; below it its rounding counts.
+const LEAST_PART: f64 = 1e-3;
+
+/// Room for triangles of a mesh near a kernel, pieces of its plane, and walls.
+const TRIANGLES: usize = 32;
+const PIECES: usize = 8;
+const WALLS: usize = 4;
+
+/// Computes the part of the kernel of a look that receives photons.
+pub fn clip(world: &World, look: &Look, radius: f32) -> Clip {
+    let mut around = Around::new(look, radius);
+    let mut is_crowded = false;
+    let bounds = look.kernel_box(radius);
+    let is_told = world.geometry.around(&bounds, |id, object| match object {
+        Object::Shape(shape) => around.add_shape(shape, || receives(material(world, id, 0))),
+        Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
+    });
+    match around.part().filter(|_| is_told) {
+        Some(part) => Clip::Part(part as f32),
+        None if is_crowded => Clip::Crowded,
+        None => Clip::Cut,
+    }
+}
+
+/// The material of a part of an object.
+pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
+    let shape = ShapeHit { primitive, ..ShapeHit::at(0.0) };
+    &world.materials[world.material_index(&Hit { shape, object })]
+}
+
+/// Whether photons are kept on a material.
+pub fn receives(material: &Material) -> bool {
+    match &material.bsdf {
+        Bsdf::Phong(phong) => phong.constant().is_none_or(|bsdf| !bsdf.is_black()),
+        Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
+    }
+}
+
+/// A wall that stands on the plane of a kernel, before which its middle is: of points before it the product with the normal is at most
+/// the distance.
+struct Wall {
+    normal: DVec2,
+    distance: f64,
+}
+
+impl Wall {
+    /// Whether corners are all on the side of the middle.
+    fn is_beyond(&self, corners: &[DVec2]) -> bool {
+        corners
+            .iter()
+            .all(|corner| self.normal.dot(*corner) <= self.distance + BORDER + 1e-6 * corner.length())
+    }
+}
+
+/// A flat piece by its corners in order.
+type Piece = ArrayVec<DVec3, 4>;
+
+/// Surfaces around the middle of a kernel.
+struct Around {
+    point: DVec3,
+    normal: DVec3,
+    radius: f64,
+    /// Tangents, over the radius.
+    tangents: [DVec3; 2],
+    /// Pieces of its plane that receive photons.
+    pieces: ArrayVec<Piece, PIECES>,
+    /// Surfaces that hold all of the kernel.
+    whole: u32,
+    walls: ArrayVec<Wall, WALLS>,
+}
+
+impl Around {
+    fn new(look: &Look, radius: f32) -> Self {
+        let Frame { s, t, n } = Frame::from_normal(look.normal);
+        let radius = f64::from(radius);
+        Self {
+            point: look.point.as_dvec3(),
+            normal: n.as_dvec3(),
+            radius,
+            tangents: [s, t].map(|axis| axis.as_dvec3() / radius),
+            pieces: ArrayVec::new(),
+            whole: 0,
+            walls: ArrayVec::new(),
+        }
+    }
+
+    /// A vector along the plane, in radii.
+    #[inline]
+    fn along(&self, vector: DVec3) -> DVec2 {
+        DVec2::new(self.tangents[0].dot(vector), self.tangents[1].dot(vector))
+    }
+
+    /// The corners of a piece in the plane, in radii from the middle.
+    fn flat(&self, piece: &Piece) -> ArrayVec<DVec2, 4> {
+        piece.iter().map(|&corner| self.along(corner - self.point)).collect()
+    }
+
+    /// Computes the part of the kernel on the pieces; `None` if a wall parts them or they overlap.
+    fn part(&self) -> Option<f64> {
+        if !self.walls.is_empty() && self.whole > 0 {
+            return None;
+        }
+        let mut part = f64::from(self.whole);
+        for piece in &self.pieces {
+            let corners = self.flat(piece);
+            if !self.walls.iter().all(|wall| wall.is_beyond(&corners)) {
+                return None;
+            }
+            part += weight_over(&corners);
+        }
+        (LEAST_PART..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
+    }
+
+    /// Adds a shape; whether the part still has a closed form.
+    fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
+        let point = self.point;
+        let is_far = |distance: f64| distance > FAR * self.radius;
+        let parallelogram = |c: DVec3, u: DVec3, v: DVec3| Piece::from([c, c + u, c + u + v, c + v]);
+        match shape {
+            Shape::Quad(quad) => self.add_piece(&parallelogram(quad.corner, quad.u, quad.v), receives),
+            Shape::Triangle(triangle) => {
+                self.add_piece(&[triangle.a, triangle.b, triangle.c].into_iter().collect(), receives)
+            }
+            Shape::Box(cuboid) => (0..6).all(|face| {
+                let (corner, u, v) = cuboid.face(face);
+                self.add_piece(&parallelogram(corner, u, v), &receives)
+            }),
+            Shape::Plane(plane) => {
+                let distance = plane.distance(point);
+                is_far(distance) || self.add_surface(plane.normal(), distance, receives)
+            }
+            Shape::Disk(disk) => {
+                let from = point - disk.middle();
+                let is_around = disk.radius() - from.length() > FAR * self.radius;
+                is_far(disk.distance(point))
+                    || is_around && self.add_surface(disk.normal(), from.dot(disk.normal()).abs(), receives)
+            }
+            Shape::Sphere(sphere) => {
+                let distance = sphere.distance(point);
+                let out = (point - sphere.center).normalize_or_zero();
+                is_far(distance)
+                    || sphere.radius > WIDE * self.radius && self.add_surface(out, distance, receives)
+            }
+            Shape::Cylinder(cylinder) => is_far(cylinder.distance(point)),
+            Shape::Cone(cone) => is_far(cone.distance(point)),
+            Shape::Torus(torus) => is_far(torus.distance(point)),
+        }
+    }
+
+    /// Adds a surface that reaches over the kernel if it has its normal in the middle, at a distance from there.
+    fn add_surface(&mut self, normal: DVec3, distance: f64, receives: impl Fn() -> bool) -> bool {
+        let is_own = normal.dot(self.normal).abs() > SAME_PLANE && distance < FLAT * self.radius;
+        self.whole += u32::from(is_own && receives());
+        is_own
+    }
+
+    /// Adds the triangles of a mesh.
+    fn add_mesh(
+        &mut self,
+        (world, id): (&World, u32),
+        mesh: &MeshInstance,
+        bounds: &Aabb,
+        is_crowded: &mut bool,
+    ) -> bool {
+        let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
+        if !mesh.around(bounds, |triangle| near.try_push(triangle).is_ok()) {
+            *is_crowded = true;
+            return false;
+        }
+        // Some are visited more than once.
+        near.sort_unstable();
+        let mut last = None;
+        near.iter().all(|&triangle| {
+            let is_new = last.replace(triangle) != Some(triangle);
+            let piece = || mesh.world_corners(triangle).into_iter().collect();
+            !is_new || self.add_piece(&piece(), || receives(material(world, id, triangle)))
+        })
+    }
+
+    /// Adds a flat piece; whether the part still has a closed form.
+    fn add_piece(&mut self, piece: &Piece, receives: impl Fn() -> bool) -> bool {
+        let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
+        let from = piece[0] - self.point;
+        let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
+        let is_within =
+            |radii: f64| distance * distance < (radii * self.radius) * (radii * self.radius) * size;
+        // What is nowhere near, or nowhere.
+        if !(size > 0.0 && is_within(FAR)) {
+            return true;
+        }
+        if cosine * cosine > SAME_PLANE * SAME_PLANE * size && is_within(FLAT) {
+            return !receives() || self.pieces.try_push(piece.clone()).is_ok();
+        }
+        let heights = piece.iter().map(|&corner| self.normal.dot(corner - self.point));
+        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+        let (reach, rises) = (f64::from(REACH) * self.radius, high > FLAT * self.radius);
+        let is_steep = cosine * cosine <= f64::from(LEAST_COSINE * LEAST_COSINE) * size;
+        if high < -reach
+            || low > reach
+            || !rises && (is_steep || !receives())
+            || !meets_disc(&self.flat(piece))
+        {
+            return true;
+        }
+        rises && self.add_wall(normal / size.sqrt(), distance / size.sqrt())
+    }
+
+    /// Adds the plane of a wall, by its normal and its distance from the middle along that.
+    fn add_wall(&mut self, normal: DVec3, distance: f64) -> bool {
+        let along = self.along(normal) * (self.radius * distance.signum());
+        let length = along.length();
+        let wall = Wall { normal: along / length, distance: distance.abs() / (length * self.radius) };
+        normal.dot(self.normal).abs() < UPRIGHT && wall.distance > FLAT && self.walls.try_push(wall).is_ok()
+    }
+}
+
+/// Whether a polygon has a point in the unit disc.
+fn meets_disc(corners: &[DVec2]) -> bool {
+    let edges = || corners.iter().zip(corners.iter().cycle().skip(1));
+    let is_near = |a: DVec2, b: DVec2| {
+        let way = b - a;
+        let along = (-a.dot(way) / way.length_squared()).clamp(0.0, 1.0);
+        (a + way * along).length_squared() < 1.0
+    };
+    let left = edges().filter(|(a, b)| a.perp_dot(**b) > 0.0).count();
+    left == 0 || left == corners.len() || edges().any(|(&a, &b)| is_near(a, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::cuboid::Cuboid;
+    use crate::geometry::parallelogram::Parallelogram;
+    use crate::geometry::sphere::Sphere;
+    use crate::math::Vec3;
+
+    /// Part of a kernel of radius .1 at (x, 0, z), which faces up, among shapes.
+    fn told(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
+        let look = Look { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
+        let mut around = Around::new(&look, 0.1);
+        let are_told = shapes.iter().all(|shape| around.add_shape(shape, || true));
+        around.part().filter(|_| are_told)
+    }
+
+    fn quad(corner: DVec3, u: DVec3, v: DVec3) -> Shape {
+        Shape::Quad(Parallelogram::new(corner, u, v))
+    }
+
+    #[test]
+    fn flat_pieces_and_walls_at_their_borders_are_told_and_nothing_else() {
+        let floor = quad(DVec3::ZERO, DVec3::Z, DVec3::X);
+        let other = quad(DVec3::X, DVec3::Z, DVec3::X);
+        let wall = quad(DVec3::ZERO, DVec3::Y, DVec3::Z);
+        let back = quad(DVec3::ZERO, DVec3::X, DVec3::Y);
+        let near = |told: Option<f64>, exact: f64| told.is_some_and(|told| (told - exact).abs() < 1e-5);
+        assert_eq!(told(0.5, 0.5, &[floor, wall]), Some(1.0));
+        assert!(near(told(1.0, 0.5, &[floor]), 0.5), "{:?}", told(1.0, 0.5, &[floor]));
+        assert!(near(told(1.0, 0.5, &[floor, other]), 1.0));
+        assert!(near(told(0.05, 0.5, &[floor, wall]), 1.0 - told(-0.05, 0.5, &[floor]).expect("flat")));
+        assert!(near(
+            told(0.0005, 0.0005, &[floor, wall, back]),
+            told(0.0005, 0.0005, &[floor]).expect("flat")
+        ));
+        // A wall between two pieces, a box on the floor, a sheet over it, a ball at rest.
+        assert_eq!(told(0.95, 0.5, &[floor, other, quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
+        let cuboid = Shape::Box(Cuboid::new(DVec3::new(0.5, 0.1, 0.5), DVec3::splat(0.2), DVec3::ZERO));
+        assert_eq!(told(0.35, 0.5, &[floor, cuboid]), None);
+        assert_eq!(told(0.25, 0.5, &[floor, cuboid]), Some(1.0));
+        let sheet = quad(DVec3::new(0.4, 0.01, 0.4), DVec3::Z * 0.2, DVec3::X * 0.2);
+        assert_eq!(told(0.35, 0.5, &[floor, sheet]), None);
+        let ball = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, radius, 0.5), radius });
+        assert_eq!(told(0.45, 0.5, &[floor, ball(0.1)]), None);
+        // On balls, wide and small.
+        let under = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, -radius, 0.5), radius });
+        assert_eq!((told(0.5, 0.5, &[under(1.0)]), told(0.5, 0.5, &[under(0.15)])), (Some(1.0), None));
+    }
+}

@@ -1,0 +1,118 @@
+//! Unbiased estimate of one over the part of a kernel that receives photons, by trials.
+
+use super::chosen::{Place, is_apart};
+use super::clip::{Clip, material, receives};
+use super::kernel::sample;
+use super::map::{LEAST_COSINE, Look, REACH};
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Asked, Ray};
+use crate::math::frame::Frame;
+use crate::math::{Vec2, Vec3};
+use crate::sampling::warp;
+use crate::world::World;
+
+/// Trials that succeed before the last.
+const SUCCESSES: u32 = 4;
+
+/// Most trials: where less than a tenth of a kernel receives photons, a part of its light that is no more than (1 − p)⁶⁵ is lost.
+const MOST: u32 = 64;
+
+/// Surfaces above each other that are looked at below a place in a kernel.
+const LAYERS: usize = 8;
+
+/// A number whose mean is one over the part of the kernel that receives photons, by trials at places that pairs of random numbers
+/// choose, which are independent of each other.
+#[inline(never)]
+pub fn inverse_part(
+    world: &World,
+    look: &Look,
+    radius: f32,
+    clip: Clip,
+    mut pair: impl FnMut(u32) -> Vec2,
+) -> f32 {
+    let frame = Frame::from_normal(look.normal);
+    let mut succeeds = |number: u32| {
+        let Vec2 { x, y } = sample(warp::disk(pair(number))) * radius;
+        is_reached(world, look, look.point + frame.s * x + frame.t * y, radius)
+    };
+    match clip {
+        Clip::Part(part) => 1.0 / part,
+        Clip::Cut => mean_trials(&mut succeeds),
+        Clip::Crowded => after_first(succeeds),
+    }
+}
+
+/// One where the first trial succeeds, with the chance p, and else 1 + 1/p in the mean: p + (1 − p)·(1 + 1/p) = 1/p.
+fn after_first(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
+    if succeeds(0) { 1.0 } else { 1.0 + mean_trials(|number| succeeds(number + 1)) }
+}
+
+/// Trials for each that succeeds, until some did: 1/p in the mean. Where the trials end before, they are taken to be one more, and so are
+/// those that succeed: the mean is (1 − (1 − p)^(MOST + 1))/p over both ends together, as Σ C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ over the first and
+/// Σ C(MOST + 1, s + 1)·pˢ(1 − p)^(MOST − s) over the second are the chances of more than, and of 1 to m, that succeed of MOST + 1, over p.
+fn mean_trials(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
+    let mut successes = 0;
+    for number in 0..MOST {
+        successes += u32::from(succeeds(number));
+        if successes == SUCCESSES {
+            return (number + 1) as f32 / SUCCESSES as f32;
+        }
+    }
+    (MOST + 1) as f32 / (successes + 1) as f32
+}
+
+/// Whether a place in the tangent plane has surface above or below it that photons of the kernel may be on, and nothing stands between.
+fn is_reached(world: &World, look: &Look, place: Vec3, radius: f32) -> bool {
+    let above = REACH * radius * look.normal;
+    let end = place - above;
+    let mut start = place + above;
+    let may_receive = |id: u32| world.materials_of(id).any(receives);
+    for _ in 0..LAYERS {
+        let ray = Ray::segment(start, end);
+        let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
+        let bare = Asked { uv: false, shadow_point: false };
+        let surface = world.geometry.asked_surface(&ray, &hit, bare);
+        let cosine = surface.normal.dot(look.normal);
+        let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
+        let photon = Place { point: surface.point, normal };
+        if cosine.abs() > LEAST_COSINE
+            && receives(material(world, hit.object, hit.shape.primitive))
+            && !is_apart(&world.geometry, look, &photon, radius)
+        {
+            return true;
+        }
+        start = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
+        if (end - start).dot(look.normal) >= 0.0 {
+            return false;
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::unit;
+
+    #[test]
+    fn trials_tell_one_over_a_chance_without_bias() {
+        let mut next = unit(7);
+        for chance in [0.03_f32, 0.1, 0.3, 0.5, 0.9, 1.0] {
+            for is_crowded in [false, true] {
+                const RUNS: u32 = 100_000;
+                let mut value = || {
+                    let succeeds = |_: u32| next() < chance;
+                    f64::from(if is_crowded { after_first(succeeds) } else { mean_trials(succeeds) })
+                };
+                let values: Vec<f64> = (0..RUNS).map(|_| value()).collect();
+                let mean = values.iter().sum::<f64>() / f64::from(RUNS);
+                let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+                let error = (squares / f64::from(RUNS)).sqrt() / f64::from(RUNS).sqrt();
+                let p = f64::from(chance);
+                let lost = (1.0 - p).powi(MOST as i32 + 1) / p;
+                let off = (mean - 1.0 / p).abs();
+                assert!(off < 4.0 * error + lost + 1e-9, "{chance}: {mean} ± {error}");
+            }
+        }
+    }
+}
