@@ -16,7 +16,7 @@ ROOT = HERE.parent.parent
 
 # Each picture has the name of its scene.
 PICTURES = {
-    "path": "--width 400 --height 400 --samples 256",
+    "cornell": "--width 400 --height 400 --samples 256 --integrator path",
     "photons": "--width 400 --height 400 --samples 96",
     "water": "--width 480 --height 360 --samples 128",
     "stairs": "--width 480 --height 360 --samples 224",
