@@ -16,11 +16,11 @@ ROOT = HERE.parent.parent
 
 # Each picture has the name of its scene.
 PICTURES = {
-    "path.png": "--width 320 --height 320 --samples 1024",
+    "path.jpg": "--width 320 --height 320 --samples 1024",
     "photons.jpg": "--width 400 --height 400 --samples 96",
     "water.jpg": "--width 480 --height 360 --samples 128",
-    "lamps.png": "--width 480 --height 300 --samples 64",
-    "environment.png": "--width 480 --height 300 --samples 128",
+    "lamps.jpg": "--width 480 --height 300 --samples 64",
+    "environment.jpg": "--width 480 --height 300 --samples 128",
     "textures.png": "--width 320 --height 240 --samples 128",
     "ring.png": "--width 480 --height 320 --samples 64",
     "shapes.png": "--width 480 --height 300 --samples 96",
