@@ -61,7 +61,7 @@ const TABLES: &[(&str, &[Key])] = &[
         "[photons]",
         &[
             ("enabled", "false", Default),
-            ("count", "200_000", Default),
+            ("count", "0", Default),
             ("radius", "0.0", Default),
             ("bounces", "16", Default),
         ],

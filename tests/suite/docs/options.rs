@@ -10,10 +10,12 @@ fn help(command: &str) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// The long options that a help lists, but for those of every program.
+/// The long options that a help lists, but for those of every program; what it says of them stands further in.
 fn listed(help: &str) -> BTreeSet<String> {
-    let lines = help.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
-    let words = lines.filter_map(|line| line.split([' ', ',']).find(|word| word.starts_with("--")));
+    let lines = help.lines().filter(|line| !line.starts_with("        ")).map(str::trim_start);
+    let words = lines
+        .filter(|line| line.starts_with('-'))
+        .filter_map(|line| line.split([' ', ',']).find(|word| word.starts_with("--")));
     without_common(words.map(str::to_owned))
 }
 

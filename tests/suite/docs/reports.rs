@@ -69,6 +69,6 @@ fn the_page_has_every_key_of_progress() {
             events.insert(name);
         }
     }
-    let expected = ["done", "failed", "progress", "stage", "written"].map(str::to_owned);
+    let expected = ["asset", "done", "failed", "progress", "stage", "written"].map(str::to_owned);
     assert_eq!(events, BTreeSet::from(expected));
 }
