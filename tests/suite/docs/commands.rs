@@ -62,7 +62,7 @@ fn run(folder: &Path, script: &str) -> Result<(), String> {
     if output.status.success() { Ok(()) } else { Err(said.concat()) }
 }
 
-/// What is run of a block, and how many calls of glimt.
+/// The commands of a block that are run, and how many of them call glimt.
 fn script(text: &str) -> (String, usize) {
     let (mut script, mut count) = (String::new(), 0);
     let mut end: Option<&str> = None;

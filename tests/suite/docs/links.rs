@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::{codes, page, pages, root};
 
-/// What links of a page lead to, without those into the web.
+/// The targets of links, without those in the web.
 fn targets(text: &str) -> Vec<String> {
     let ends = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
     ends.filter(|target| !target.starts_with("https://")).map(str::to_owned).collect()

@@ -40,8 +40,9 @@ fn pages() -> Vec<Page> {
 }
 
 fn page(name: &str) -> Page {
-    let text = fs::read_to_string(root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
-    Page { name: name.to_owned(), text }
+    let path = root().join(name);
+    assert!(path.is_file(), "there is no page {name}");
+    Page { name: name.to_owned(), text: fs::read_to_string(path).expect("a text") }
 }
 
 impl Page {
@@ -97,8 +98,8 @@ impl Page {
     /// The rows below a heading.
     fn rows(&self, heading: &str) -> Vec<Vec<String>> {
         let found = self.tables().into_iter().find(|(name, _)| name == heading);
-        let (_, rows) = found.unwrap_or_else(|| panic!("{} has no heading {heading:?}", self.name));
-        assert!(!rows.is_empty(), "{}: {heading:?} has no table", self.name);
+        let rows = found.map(|(_, rows)| rows).unwrap_or_default();
+        assert!(!rows.is_empty(), "{}: no table below {heading:?}", self.name);
         rows
     }
 }
@@ -110,7 +111,7 @@ fn cells(row: &str) -> Vec<String> {
     inner.split('|').map(|cell| cell.trim().replace('\u{0}', "|")).collect()
 }
 
-/// What stands between backquotes.
+/// The texts between backquotes.
 fn codes(text: &str) -> BTreeSet<String> {
     text.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
