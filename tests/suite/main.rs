@@ -8,6 +8,7 @@ mod closed_forms;
 mod compare;
 mod contract;
 mod desk;
+mod docs;
 mod extremes;
 mod hostile;
 mod house;

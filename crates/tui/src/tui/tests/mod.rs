@@ -5,6 +5,7 @@ mod flow;
 mod following;
 mod keys;
 mod layout;
+mod manual;
 mod noise;
 mod overlay;
 mod pointer;

@@ -1,0 +1,43 @@
+#!/usr/bin/env python3
+"""Renders the pictures of README and docs from the bundled scenes.
+
+    python3 assets/pictures/make.py [FILE…] [--glimt BINARY]
+
+By itself all of them, which takes some ten minutes on two cores. `benches/terminal/screen.py` and `benches/terminal/moving.py` make
+screen.png and save.png; `glimt bench scenes/cornell.toml scenes/cornell_glass.toml --plot` made bench.svg.
+"""
+
+import argparse
+import subprocess
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+
+# Each picture has the name of its scene.
+PICTURES = {
+    "path.jpg": "--width 320 --height 320 --samples 1024",
+    "photons.jpg": "--width 400 --height 400 --samples 96",
+    "water.jpg": "--width 480 --height 360 --samples 128",
+    "lamps.jpg": "--width 480 --height 300 --samples 64",
+    "environment.jpg": "--width 480 --height 300 --samples 128",
+    "textures.png": "--width 320 --height 240 --samples 128",
+    "ring.png": "--width 480 --height 320 --samples 64",
+    "shapes.png": "--width 480 --height 300 --samples 96",
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="*", metavar="FILE", choices=[*PICTURES, []])
+    parser.add_argument("--glimt", type=Path, default=ROOT / "target" / "release" / "glimt")
+    asked = parser.parse_args()
+    for file in asked.files or PICTURES:
+        picture = HERE / file
+        scene, options = ROOT / "scenes" / f"{picture.stem}.toml", PICTURES[file].split()
+        subprocess.run([asked.glimt.absolute(), scene, "--once", *options, "-o", picture], check=True)
+        print(f"{picture.name}: {picture.stat().st_size // 1000} kB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+//! The tables of options, beside what the program's help says.
+
+use std::collections::BTreeSet;
+
+use super::{codes, page, pages};
+use crate::desk::Desk;
+
+fn help(command: &str) -> String {
+    let output = Desk::new().run(&format!("{command} --help"));
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+/// The long options that a help lists, but for those of every program; what it says of them stands further in.
+fn listed(help: &str) -> BTreeSet<String> {
+    let lines = help.lines().filter(|line| !line.starts_with("        ")).map(str::trim_start);
+    let words = lines
+        .filter(|line| line.starts_with('-'))
+        .filter_map(|line| line.split([' ', ',']).find(|word| word.starts_with("--")));
+    without_common(words.map(str::to_owned))
+}
+
+fn without_common(options: impl Iterator<Item = String>) -> BTreeSet<String> {
+    options.filter(|option| option != "--help" && option != "--version").collect()
+}
+
+#[test]
+fn the_tables_of_options_have_those_of_the_program() {
+    let page = page("docs/command-line.md");
+    for (heading, command) in [
+        ("Options of a render", ""),
+        ("Options of check", "check"),
+        ("Options of compare", "compare"),
+        ("Options of bench", "bench"),
+    ] {
+        let rows = page.rows(heading);
+        let cells = rows.iter().flat_map(|row| codes(&row[0]));
+        let options = cells.filter_map(|code| Some(code.split_whitespace().next()?.to_owned()));
+        let documented = without_common(options.filter(|option| option.starts_with("--")));
+        assert_eq!(documented, listed(&help(command)), "{heading}");
+    }
+}
+
+#[test]
+fn every_command_is_documented() {
+    let help = help("");
+    let commands = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next());
+    let names = commands.expect("commands").lines().filter_map(|line| line.split_whitespace().next());
+    let rows = page("docs/command-line.md").rows("Commands");
+    for name in names {
+        let is_there = rows.iter().any(|row| row[0].starts_with(&format!("`glimt {name}")));
+        assert!(is_there, "{name}");
+    }
+}
+
+#[test]
+fn every_value_of_an_option_is_documented() {
+    let documented: BTreeSet<String> =
+        pages().iter().flat_map(|page| page.prose().flat_map(codes).collect::<Vec<_>>()).collect();
+    let plain = |code: &String| code.trim_matches('"').to_owned();
+    let documented: BTreeSet<String> = documented.iter().map(plain).collect();
+    for command in ["", "compare", "bench"] {
+        let help = help(command);
+        let values = help.lines().filter_map(|line| line.trim_start().strip_prefix("- ")?.split_once(':'));
+        for (value, _) in values {
+            assert!(documented.contains(value), "{command}: {value}");
+        }
+    }
+}

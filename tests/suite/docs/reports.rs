@@ -1,0 +1,74 @@
+//! The keys of the report and of progress as JSON, beside what a render writes.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::{codes, page};
+use crate::desk::Desk;
+
+/// A glass ball, so that photons have somewhere to go.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    let scene = crate::desk::SCENE.replace("type = \"phong\"\ndiffuse = [0.8, 0.2, 0.1]", "type = \"glass\"");
+    let floor =
+        "[materials.floor]\n[[plane]]\nmaterial = \"floor\"\n[photons]\nenabled = true\ncount = 1000\n";
+    desk.write("glass.toml", format!("{scene}{floor}"));
+    desk
+}
+
+/// The paths of all values, with dots; those of the tables between, apart.
+fn paths(value: &Value, path: &str, ends: &mut BTreeSet<String>, tables: &mut BTreeSet<String>) {
+    let inner: Vec<(String, &Value)> = match value {
+        Value::Object(map) => {
+            let dot = if path.is_empty() { "" } else { "." };
+            map.iter().map(|(key, value)| (format!("{path}{dot}{key}"), value)).collect()
+        }
+        Value::Array(list) if list.iter().any(Value::is_object) => {
+            list.iter().map(|value| (path.to_owned(), value)).collect()
+        }
+        _ => Vec::new(),
+    };
+    if inner.is_empty() {
+        ends.insert(path.to_owned());
+    } else {
+        tables.insert(path.to_owned());
+    }
+    inner.into_iter().for_each(|(path, value)| paths(value, &path, ends, tables));
+}
+
+#[test]
+fn the_page_has_every_key_of_the_report() {
+    let (mut ends, mut tables) = (BTreeSet::new(), BTreeSet::new());
+    paths(&desk().report("glass.toml"), "", &mut ends, &mut tables);
+    let rows = page("docs/report.md").rows("The report");
+    let documented: BTreeSet<String> = rows.iter().flat_map(|row| codes(&row[0])).collect();
+    let missing: Vec<_> = ends.difference(&documented).collect();
+    assert!(missing.is_empty(), "not on the page: {missing:?}");
+    let known = ends.union(&tables).cloned().collect();
+    let unknown: Vec<_> = documented.difference(&known).collect();
+    assert!(unknown.is_empty(), "not in the report: {unknown:?}");
+}
+
+#[test]
+fn the_page_has_every_key_of_progress() {
+    let rows = page("docs/report.md").rows("Progress as JSON");
+    let desk = desk();
+    desk.write("broken.toml", "[render]\nheigth = 1\n");
+    let mut events = BTreeSet::new();
+    for scene in ["glass.toml", "broken.toml"] {
+        let output = desk.run(&format!("{scene} --once --progress json"));
+        for line in String::from_utf8(output.stderr).expect("UTF-8").lines() {
+            let event: Value = serde_json::from_str(line).expect("JSON");
+            let name = event["event"].as_str().expect("a name").to_owned();
+            let row = rows.iter().find(|row| codes(&row[0]).contains(&name));
+            let keys = codes(&row.unwrap_or_else(|| panic!("{name} is not on the page"))[1]);
+            for key in event.as_object().expect("an object").keys().filter(|key| *key != "event") {
+                assert!(keys.contains(key), "{name}: {key}");
+            }
+            events.insert(name);
+        }
+    }
+    let expected = ["asset", "done", "failed", "progress", "stage", "written"].map(str::to_owned);
+    assert_eq!(events, BTreeSet::from(expected));
+}
