@@ -6,12 +6,12 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::color::ColorDepth;
+use super::event::FrameReport;
 use super::graphics::{Images, Placement};
-use super::input::Answer;
+use super::known::Answer;
 use super::known::Ask;
 use super::line::{Line, Question};
 use super::paint::{Fidelity, Painter};
-use super::state::FrameReport;
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
 const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";

@@ -2,7 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use nix::errno::Errno;
@@ -10,20 +10,11 @@ use nix::sys::signal::Signal;
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 
+use super::event::FilePlace;
 use super::signals;
 
 /// Where nothing says which editor it is.
 const DEFAULT: &str = "vi";
-
-/// A place in a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct FilePlace {
-    pub path: PathBuf,
-    /// From 1.
-    pub line: usize,
-    /// From 1.
-    pub column: usize,
-}
 
 /// The editor that the environment names: words for a shell.
 pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {

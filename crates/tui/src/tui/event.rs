@@ -3,13 +3,12 @@
 use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::editor::FilePlace;
-use super::input::Answer;
+use super::known::Answer;
 use super::options::{Changed, News};
-use super::state::FrameReport;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, Section};
 
@@ -177,6 +176,24 @@ pub(super) enum Effect {
     Edit(FilePlace),
     /// Ask how large the window is.
     Measure,
+}
+
+/// A place in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct FilePlace {
+    pub path: PathBuf,
+    /// From 1.
+    pub line: usize,
+    /// From 1.
+    pub column: usize,
+}
+
+/// Cost of the last picture on its way to the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FrameReport {
+    pub bytes: usize,
+    /// Time until the terminal answers. `None` if it does not.
+    pub round_trip: Option<Duration>,
 }
 
 /// Why a picture is not on disk although it is to be.

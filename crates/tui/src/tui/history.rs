@@ -1,12 +1,27 @@
 //! The last pictures, within bounds.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::state::Shown;
+use crate::film::Picture;
+use crate::pipeline::protocol::Section;
 
 /// Bytes that all of them take, at most.
 const MOST_BYTES: usize = 16 << 20;
+
+/// A picture and the request that it shows.
+#[derive(Clone, Debug)]
+pub(in crate::tui) struct Shown {
+    pub generation: u64,
+    pub picture: Arc<Picture>,
+    /// Least and greatest number of the view, if the picture is stretched to them.
+    pub range: Option<[f32; 2]>,
+    /// The part of the image that is shown pixel by pixel. `None` if all of the image is shown.
+    pub section: Option<Section>,
+    /// Whether it lacks the light of photons, which are still being traced.
+    pub lacks_photons: bool,
+}
 
 /// The last pictures, and which of them is looked at.
 #[derive(Debug, Default)]

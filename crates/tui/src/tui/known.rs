@@ -35,6 +35,27 @@ impl Blocks {
     }
 }
 
+/// A report of the terminal, to a question or of its own accord.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// To a status report (DSR 5): all that was sent before has been processed.
+    Ready,
+    /// To a question for the primary device attributes (DA1).
+    Attributes,
+    /// Whether mode 2026 is known, by which large changes appear at once.
+    Synchronized { is_known: bool },
+    /// Its name (XTVERSION), as far as it says which blocks it draws.
+    Blocks(Blocks),
+    /// It has 24 bits of colour (XTGETTCAP).
+    TrueColor,
+    /// Its background, in sRGB (OSC 11).
+    Background([u8; 3]),
+    /// One of its palette, in sRGB (OSC 4).
+    Ink { index: u8, rgb: [u8; 3] },
+    /// Any other report: the cursor's position, modes, colours, names, focus.
+    Other,
+}
+
 /// What the terminal is asked of itself: what is of use, and where it is the terminal that answers. An answer to what was not
 /// asked is not believed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

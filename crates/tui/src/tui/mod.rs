@@ -24,6 +24,7 @@ mod parting;
 mod presenter;
 mod preview_kind;
 mod printed;
+mod rescale;
 mod run;
 mod signals;
 mod state;

@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 
 use super::color::{self, ColorDepth};
 use super::display::{Display, Way};
-use super::editor::{self, FilePlace};
+use super::editor;
 use super::environment::{ask, way};
+use super::event::FilePlace;
 use super::event::{Effect, Event, Source};
 use super::graphics::Images;
 use super::input;
@@ -151,8 +152,8 @@ impl Ui {
             }
             None => ExitStatus::QUIT,
         };
-        let (summary, is_unwritten) = (parting::words(&self.state), self.state.write_failed.is_some());
-        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write, summary, is_unwritten })
+        let (summary, is_unwritten) = (parting::words(&self.state), self.state.saving.write_failed.is_some());
+        Ok(Ended { status, is_write_unanswered: self.state.saving.is_write_requested, summary, is_unwritten })
     }
 
     /// Gives the screen back and waits a little for the answers that the terminal owes: a shell would take them for

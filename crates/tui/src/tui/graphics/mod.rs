@@ -7,6 +7,7 @@ mod base64;
 mod iterm;
 mod kitty;
 mod palette;
+mod png;
 mod seen;
 mod sixel;
 
@@ -143,7 +144,7 @@ impl Images {
             Protocol::Sixel => wanted.picture.clone(),
             Protocol::Kitty | Protocol::Iterm => {
                 let (width, height) = (side(wanted.picture.width), side(wanted.picture.height));
-                Arc::new(super::view::preview::resized(&wanted.picture, width, height))
+                Arc::new(super::rescale::resized(&wanted.picture, width, height))
             }
         };
         self.is_coarse = scale < 1.0 && !self.is_still;
@@ -192,22 +193,6 @@ fn wrapped(body: &[u8]) -> Vec<u8> {
         bytes.push(byte);
     }
     bytes.extend_from_slice(b"\x1b\\");
-    bytes
-}
-
-/// The picture as PNG, quickly; empty where that is not possible.
-fn png(picture: &Picture) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, picture.width, picture.height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
-    let outcome = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(picture.pixels.as_flattened()).and_then(|()| writer.finish())
-    });
-    if outcome.is_err() {
-        bytes.clear();
-    }
     bytes
 }
 

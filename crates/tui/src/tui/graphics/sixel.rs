@@ -4,7 +4,7 @@ use ratatui::layout::Rect;
 
 use super::palette::Palette;
 use crate::film::Picture;
-use crate::tui::view::preview::resized;
+use crate::tui::rescale::resized;
 
 /// The register of the first colour: those below are the terminal's own.
 const FIRST: u8 = 16;

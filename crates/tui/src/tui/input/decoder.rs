@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use crossterm::event::KeyCode;
 
-use super::Input;
 use super::keys::Meaning;
 use super::paste::Paste;
+use super::sent::Input;
 use crate::tui::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;

@@ -4,8 +4,9 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
 
 use super::reports::{self, Report};
-use super::{Answer, Input};
+use super::sent::Input;
 use crate::tui::event::{KeyPress, Mouse, MouseKind};
+use crate::tui::known::Answer;
 
 /// What the parser calls back; it holds the meaning of what was read last.
 #[derive(Debug, Default)]

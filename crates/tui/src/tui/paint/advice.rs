@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::Fidelity;
+use super::fidelity::Fidelity;
 
 /// What is known when there is a picture that was not aimed at.
 #[derive(Clone, Copy, Debug, PartialEq)]

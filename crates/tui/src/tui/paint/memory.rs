@@ -6,7 +6,7 @@
 
 use ratatui::layout::Rect;
 
-use super::Fidelity;
+use super::fidelity::Fidelity;
 use super::look::{Look, Mosaic};
 use super::moves::Place;
 use super::screen::Screen;

@@ -13,6 +13,7 @@
 mod abilities;
 mod advice;
 mod candidates;
+mod fidelity;
 mod lines;
 mod look;
 mod memory;
@@ -35,25 +36,13 @@ use ratatui::layout::Rect;
 
 pub use self::abilities::can_repeat;
 pub use self::advice::{Advice, Moment, advise};
+pub use self::fidelity::Fidelity;
 pub use self::lines::in_lines;
 use self::memory::Memory;
 use self::picture::Budget;
 use self::screen::{Screen, Slice, Stroke};
 use self::wanted::Wanted;
 use super::color::ColorDepth;
-
-/// How near to the picture the cells have to come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fidelity {
-    /// The first picture of a request, to be refined soon: at most 12 bytes a cell.
-    First,
-    /// A picture of the same request that better ones will follow.
-    Moving,
-    /// The same on a terminal that can follow the render: every colour.
-    Following,
-    /// A picture that stays: every colour to 1/255.
-    Still,
-}
 
 /// Leads the screen to what is wanted.
 #[derive(Debug)]

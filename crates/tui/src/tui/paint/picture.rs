@@ -1,6 +1,6 @@
 //! The picture: as near to what is wanted as the bytes allow.
 
-use super::Fidelity;
+use super::fidelity::Fidelity;
 use super::look::Look;
 use super::memory::Memory;
 use super::moves::Place;

@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::Fidelity;
+use super::fidelity::Fidelity;
 use super::look::{Look, Mosaic};
 use crate::tui::color::ColorDepth;
 

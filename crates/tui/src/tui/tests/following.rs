@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::super::display::{Display, Way};
 use super::super::graphics::{Images, PixelScreen, Protocol};
-use super::super::input::Answer;
+use super::super::known::Answer;
 use super::super::presenter::Presenter;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, LatestPreview, PreviewSlot};
@@ -152,11 +152,11 @@ impl Watch {
     fn new(line: Line, preview: PreviewKind, depth: ColorDepth) -> Self {
         let mut desk = Desk::with(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
         let begin = desk.now;
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         desk.worker(protocol::Event::Started { generation });
         let settings = Box::new(settings());
         desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0 });
-        let size = desk.state.requested.expect("previews are asked for");
+        let size = desk.state.request.preview_size.expect("previews are asked for");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {
             PreviewKind::Pixels(protocol) => Some(Images::new(protocol, false)),
@@ -190,7 +190,7 @@ impl Watch {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
         let end = self.desk.now + time;
-        let (mut key, mut last) = (self.desk.now, self.desk.state.generation);
+        let (mut key, mut last) = (self.desk.now, self.desk.state.request.generation);
         // The last step of a key that was held before may have no picture yet.
         let mut asked = Some(self.desk.now);
         while self.desk.now < end {
@@ -206,15 +206,15 @@ impl Watch {
                 self.desk.press('l');
             }
             // A step that waited is asked for when the one before has its picture.
-            if self.desk.state.generation > last {
-                (asked, last) = (Some(self.desk.now), self.desk.state.generation);
+            if self.desk.state.request.generation > last {
+                (asked, last) = (Some(self.desk.now), self.desk.state.request.generation);
             }
         }
     }
 
     /// The last picture, until all of it has arrived.
     fn finish(&mut self) {
-        let generation = self.desk.state.generation;
+        let generation = self.desk.state.request.generation;
         self.put_picture(SAMPLES);
         self.desk.worker(done(generation, Vec::new(), false));
         self.go_on(self.desk.now + Duration::from_secs(5), false);
@@ -252,7 +252,7 @@ impl Watch {
             self.presenter.display.answered(answer, now);
         }
         let done = (now - self.begin).as_secs_f64() / SECONDS;
-        let generation = self.desk.state.generation;
+        let generation = self.desk.state.request.generation;
         if is_at_work && now >= self.next[0] {
             self.next[0] = now + PROGRESS;
             let progress = progress(done, Some((1.0 - done) * SECONDS));
@@ -271,7 +271,7 @@ impl Watch {
     }
 
     fn put_picture(&mut self, samples: f64) {
-        let generation = self.desk.state.generation;
+        let generation = self.desk.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
         *self.slot.lock().expect("whole") =
             Some(LatestPreview { generation, picture, range: None, section: None, lacks_photons: false });

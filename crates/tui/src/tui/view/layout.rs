@@ -25,6 +25,8 @@ pub(in crate::tui) struct Layout {
     pub pane: Rect,
 }
 
+/// The block of the state has this many columns, so that the name beside it stands still.
+pub(super) const BLOCK: usize = 13;
 /// Fewer rows than this hold one line of words beside the picture.
 const TWO_LINES: u16 = 6;
 /// Fewer rows than this hold two.
@@ -45,20 +47,21 @@ const PANE_HEIGHT: u16 = 12;
 impl Layout {
     /// For the state's window and picture.
     pub(in crate::tui) fn of(state: &State) -> Self {
-        let shape = state.aspect() * state.window.cell_aspect;
-        let shape = (state.preview != PreviewKind::None).then_some(shape);
-        Self::new(state.window.columns, state.window.rows, shape, state.is_alone)
+        let shape = state.request.aspect() * state.display.window.cell_aspect;
+        let shape = (state.display.kind != PreviewKind::None).then_some(shape);
+        Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
     }
 
     /// The preview that the window has room for: a box of square pixels, as many in the width of a cell as are drawn.
     pub(in crate::tui) fn preview_size(state: &State) -> Option<PreviewSize> {
         let area = Self::of(state).preview;
-        let across = state.pixels_across();
-        let height = (f32::from(area.height) * state.window.cell_aspect * across as f32).round() as u32;
+        let across = state.display.pixels_across();
+        let height =
+            (f32::from(area.height) * state.display.window.cell_aspect * across as f32).round() as u32;
         (area.width > 0 && height > 0).then_some(PreviewSize {
             width: u32::from(area.width) * across,
             height,
-            around: state.close_up,
+            around: state.picture.close_up,
         })
     }
 
