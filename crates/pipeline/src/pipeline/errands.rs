@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::inputs::Inputs;
 use super::protocol::{Event, Kept, Picked, Spot, Thing, Viewpoint};
+use super::render::film_state::FilmState;
 use super::sink::Sink;
-use super::stages::canvas::Canvas;
 use super::stages::parse::Parsed;
 use crate::control::CancelToken;
 use crate::film::Quantity;
@@ -48,7 +48,7 @@ pub(super) struct AtHand {
 }
 
 impl AtHand {
-    pub(super) fn run(&self, errand: &Errand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
+    pub(super) fn run(&self, errand: &Errand, canvas: Option<&FilmState>, inputs: &Inputs, sink: &Sink) {
         let generation = sink.generation;
         sink.send(match errand {
             Errand::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, canvas)) },
@@ -59,7 +59,7 @@ impl AtHand {
     }
 
     /// What the ray through the middle of a pixel meets.
-    fn pick(&self, spot: Spot, canvas: Option<&Canvas>) -> Picked {
+    fn pick(&self, spot: Spot, canvas: Option<&FilmState>) -> Picked {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));

@@ -6,15 +6,18 @@
 //! another content.
 
 mod answers;
+mod assembly;
 mod cache;
 mod cautions;
 mod check;
 mod engine;
 mod errands;
 mod inputs;
+mod keys;
 mod pace;
 mod plan;
 pub mod protocol;
+mod render;
 mod report;
 pub mod session;
 pub mod settings;

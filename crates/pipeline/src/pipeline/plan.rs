@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::settings::{Effective, Overrides, View};
-use super::targets::NamedBy;
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
@@ -33,6 +32,17 @@ pub(super) struct Plan {
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
     pub(super) effective: Effective,
+}
+
+/// Who named the files for the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NamedBy {
+    /// `-o`.
+    Call,
+    /// `output` in `[render]`.
+    Scene,
+    /// Nobody: the scene's name with `.png`.
+    Nobody,
 }
 
 /// Put scene and overrides together.

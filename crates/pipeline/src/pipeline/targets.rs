@@ -5,23 +5,12 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::inputs::{Input, Inputs};
-use super::plan::Plan;
+use super::plan::{NamedBy, Plan};
 use super::report::Marks;
 use super::sink::Sink;
 use crate::output::write::Guard;
 use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-
-/// Who named the files for the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum NamedBy {
-    /// `-o`.
-    Call,
-    /// `output` in `[render]`.
-    Scene,
-    /// Nobody: the scene's name with `.png`.
-    Nobody,
-}
 
 /// A file to be written.
 #[derive(Clone, Copy, PartialEq, Eq)]

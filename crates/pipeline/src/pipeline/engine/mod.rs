@@ -18,33 +18,36 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub(super) use self::orders::{Meanwhile, Orders};
 use self::outcome::Outcome;
+pub use self::outcome::{Rendered, Unrendered};
 use self::unfinished::Good;
+use super::assembly::{Eye, Keyed, world};
 use super::cache::{Memo, Pool};
 use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
+use super::keys;
 use super::pace::Stopwatch;
-use super::plan::{Plan, cores, plan};
+use super::plan::{NamedBy, Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
-use super::report::{Finished, report};
+use super::render::film_cache::FilmCache;
+use super::render::film_state::FilmState;
+use super::render::first_picture::FirstPictures;
+use super::render::preview::Screen;
+use super::render::scheduler::Rendering;
+use super::report::finish::{Finished, report};
 use super::settings::Overrides;
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
-use super::stages::canvas::Canvas;
-use super::stages::coarse::Coarse;
-use super::stages::films::Films;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
-use super::stages::preview::Screen;
-use super::stages::render::{Rendering, render};
+use super::stages::render::render;
 use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::world::{Eye, Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
-use super::stages::{Findings, Reading, Staged, Stop, keys};
+use super::stages::{Findings, Reading, Staged, Stop};
 use super::table::StageTable;
-use super::targets::{NamedBy, conflicts};
+use super::targets::conflicts;
 use super::trace::{Kernel, Tracer};
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
@@ -89,7 +92,7 @@ pub(super) struct Engine {
     sky: SkyMemo,
     world: Memo<Arc<World>>,
     photons: PhotonCache,
-    films: Films,
+    films: FilmCache,
     written: Written,
     /// What the current film is rendered by.
     plan: Option<Plan>,
@@ -134,7 +137,7 @@ impl Engine {
             sky: SkyMemo::default(),
             world: Memo::default(),
             photons: PhotonCache::default(),
-            films: Films::default(),
+            films: FilmCache::default(),
             written: Written::default(),
             plan: None,
             at_hand: None,
@@ -284,7 +287,7 @@ impl Engine {
         // A person sees the scene while the first photons are traced.
         let of_film = keys::render(ready.world.0, &plan.settings, plan.crop);
         let is_new = request.force || !self.films.holds(of_film);
-        let coarse = Coarse {
+        let coarse = FirstPictures {
             tracer: tracer(self.means.kernel, &pool, ready, meanwhile.token),
             plan,
             is_moved: request.overrides.camera.is_any(),
@@ -421,7 +424,7 @@ impl Engine {
         let (plan, orders) = (&ready.plan, meanwhile.orders);
         let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
         let written = std::cell::RefCell::new(&mut self.written);
-        let pulse = |canvas: &Canvas, is_covered: bool| {
+        let pulse = |canvas: &FilmState, is_covered: bool| {
             if !is_covered {
                 meanwhile.postpone_write(sink);
             } else if orders.take_write() {

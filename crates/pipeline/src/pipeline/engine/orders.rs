@@ -6,8 +6,8 @@ use crate::control::CancelToken;
 use crate::pipeline::errands::{AtHand, Errand};
 use crate::pipeline::inputs::Inputs;
 use crate::pipeline::protocol::{Event, PreviewSize};
+use crate::pipeline::render::film_state::FilmState;
 use crate::pipeline::sink::Sink;
-use crate::pipeline::stages::canvas::Canvas;
 
 /// Orders that come while a request is under way.
 pub(in crate::pipeline) trait Orders {
@@ -48,7 +48,13 @@ impl<'a> Meanwhile<'a> {
     }
 
     /// Do the next thing that is asked of the picture at hand.
-    pub(super) fn run_errand(&self, at_hand: &AtHand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
+    pub(super) fn run_errand(
+        &self,
+        at_hand: &AtHand,
+        canvas: Option<&FilmState>,
+        inputs: &Inputs,
+        sink: &Sink,
+    ) {
         if let Some(errand) = self.orders.take_errand() {
             at_hand.run(&errand, canvas, inputs, sink);
         }

@@ -3,12 +3,34 @@
 use std::path::Path;
 
 use super::super::protocol::{Failure, Report, Request};
-use super::super::session::{Rendered, Unrendered};
 use super::super::sink::Sink;
 use super::super::stages::Stop;
 use super::{Engine, Meanwhile};
-use crate::film::Quantity;
+use crate::film::{Quantity, RadianceImage};
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::fingerprint::Key;
+
+/// A picture in memory.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// Linear light, unexposed.
+    pub image: RadianceImage,
+    /// What it took.
+    pub report: Box<Report>,
+    /// What is probably not meant.
+    pub warnings: Vec<Diagnostic>,
+    /// All that its sums depend on, apart from the number of samples.
+    pub key: Key,
+}
+
+/// Why there is no picture.
+#[derive(Clone, Debug)]
+pub enum Unrendered {
+    /// The scene is wrong, or the work failed.
+    Failed(Failure),
+    /// The work was told to stop.
+    Cancelled,
+}
 
 /// Of a request that was done.
 pub(super) struct Outcome {

@@ -2,9 +2,9 @@
 
 use super::super::plan::Plan;
 use super::super::protocol::{Report, Request, Writing};
-use super::super::report::write_report;
+use super::super::render::film_state::FilmState;
+use super::super::report::finish::write_report;
 use super::super::sink::Sink;
-use super::super::stages::canvas::Canvas;
 use super::super::stages::write::{Destination, write_by_hand, write_if_wanted};
 use super::super::stages::{Findings, Staged, Stop};
 use super::super::targets::conflicts;
@@ -15,7 +15,7 @@ use crate::output::OutputError;
 impl Engine {
     /// Whether there is a picture without holes.
     pub(in crate::pipeline) fn can_write(&self) -> bool {
-        self.films.current().is_some_and(Canvas::is_covered)
+        self.films.current().is_some_and(FilmState::is_covered)
     }
 
     /// Write the picture as it is, outside of a request.

@@ -4,8 +4,9 @@
 use std::sync::Arc;
 
 use super::super::cache::{Pool, Spare};
+use super::super::keys;
 use super::meshes::Meshes;
-use super::{Reading, Staged, Stop, keys};
+use super::{Reading, Staged, Stop};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};

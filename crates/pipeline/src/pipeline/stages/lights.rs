@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::super::cache::Memo;
+use super::super::keys;
+use super::Staged;
 use super::textures::Textures;
-use super::{Staged, keys};
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::{Lights, Receivers, SkyMap};
 use crate::scene::description::{Scene, TextureUse};

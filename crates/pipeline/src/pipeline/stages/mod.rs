@@ -1,22 +1,12 @@
 //! The stages, one file each: a function of its inputs and of what is kept from before.
 
 pub(super) mod accel;
-mod adaptive;
-pub(super) mod canvas;
-pub(super) mod coarse;
-mod cost;
-pub(super) mod films;
-pub(super) mod keys;
 pub(super) mod lights;
 pub(super) mod meshes;
-mod outlook;
 pub(super) mod parse;
 pub(super) mod photons;
-pub(super) mod preview;
 pub(super) mod render;
-mod spread;
 pub(super) mod textures;
-pub(super) mod world;
 pub(super) mod write;
 
 use std::collections::HashSet;

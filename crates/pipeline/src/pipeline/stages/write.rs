@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
 use super::super::protocol::{Failure, Writing};
+use super::super::render::film_state::FilmState;
 use super::super::sink::Sink;
 use super::super::targets::{conflicts, guarded};
 use super::super::watch::content::{Content, Contents};
-use super::canvas::Canvas;
 use super::{Staged, Stop};
 use crate::choice::Choice;
 use crate::control::CancelToken;
@@ -95,7 +95,7 @@ fn find_targets(
 /// What went wrong, where the picture must be written.
 pub(in crate::pipeline) fn write_if_wanted(
     writing: Writing,
-    canvas: &Canvas,
+    canvas: &FilmState,
     to: Destination<'_>,
     written: &mut Written,
     token: &CancelToken,
@@ -118,7 +118,7 @@ pub(in crate::pipeline) fn write_if_wanted(
 /// # Errors
 /// What went wrong with the last of those that could not be written; the others are said. Cancelled.
 pub(in crate::pipeline) fn write(
-    canvas: &Canvas,
+    canvas: &FilmState,
     to: Destination<'_>,
     written: &mut Written,
     token: &CancelToken,
@@ -164,7 +164,7 @@ pub(in crate::pipeline) fn write(
 }
 
 /// [`write`] for a person who asked for it, whatever is on disk. What goes wrong is said.
-pub(in crate::pipeline) fn write_by_hand(canvas: &Canvas, to: Destination<'_>, written: &mut Written) {
+pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>, written: &mut Written) {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
         return to.sink.refused(conflicts);
@@ -178,7 +178,7 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &Canvas, to: Destination<'_>, w
 
 fn write_one(
     image: &RadianceImage,
-    canvas: &Canvas,
+    canvas: &FilmState,
     Destination { plan, inputs, sink, .. }: Destination<'_>,
     path: &Path,
     token: &CancelToken,
@@ -195,7 +195,7 @@ fn write_one(
 }
 
 /// What a picture says of itself: enough to make it again.
-fn metadata(canvas: &Canvas, plan: &Plan, range: Option<Range>) -> Vec<(String, String)> {
+fn metadata(canvas: &FilmState, plan: &Plan, range: Option<Range>) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let SampleStats { min, mean, max } = canvas.film.samples();
     let samples = if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
@@ -214,7 +214,7 @@ fn metadata(canvas: &Canvas, plan: &Plan, range: Option<Range>) -> Vec<(String, 
     pairs.into_iter().chain(range).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
-fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
+fn key(canvas: &FilmState, plan: &Plan, path: &Path) -> Key {
     let SampleStats { min, mean, max } = canvas.film.samples();
     let mut key = Fingerprint::new("write");
     key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());

@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::pace::Work;
-use super::super::protocol::NoiseProgress;
-use super::adaptive::LEAST;
+use super::pace::Work;
 use crate::film::{Film, PictureNoise};
+use crate::pipeline::protocol::NoiseProgress;
+use crate::pipeline::render::noise_goals::LEAST;
 
 /// Before that nobody reads it, and afterwards it is told as seldom: it is the sum of all pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
@@ -14,19 +14,19 @@ const STEP: f64 = 1.5;
 
 /// The noise as it was told last.
 #[derive(Debug)]
-pub(super) struct Outlook {
+pub(in crate::pipeline) struct NoiseForecast {
     due: Instant,
     /// And the work that was done.
     told: Option<(PictureNoise, f64)>,
 }
 
-impl Outlook {
-    pub(super) fn new() -> Self {
+impl NoiseForecast {
+    pub(in crate::pipeline) fn new() -> Self {
         Self { due: Instant::now() + INTERVAL, told: None }
     }
 
     /// Look again, where it is time: pixels have `samples` at least, a power of two of them.
-    pub(super) fn look(&mut self, film: &Film, samples: u32, done: f64) {
+    pub(in crate::pipeline) fn look(&mut self, film: &Film, samples: u32, done: f64) {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
@@ -35,7 +35,7 @@ impl Outlook {
     }
 
     /// What is to be expected, where something was told.
-    pub(super) fn at(&self, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
+    pub(in crate::pipeline) fn at(&self, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
         let (PictureNoise { relative_error, power }, done) = self.told.filter(|(_, done)| *done > 0.0)?;
         // The part of the noise that so many times the samples leave.
         let fall = |times: f64| libm::pow(times, -0.5 * power);

@@ -3,7 +3,7 @@
 //! Parts of the picture, both halves of each cell, get twice the samples that they have, those first whose error falls most by each
 //! sample of these. Between powers of two the points of a pixel leave gaps: there a third more samples may be worth nothing.
 //!
-//! What is rare and bright must not get more samples where it was met: the picture would be too dark. As for [`super::adaptive`], one
+//! What is rare and bright must not get more samples where it was met: the picture would be too dark. As for [`super::noise_goals`], one
 //! half goes by the noise of the other one; and by that of samples which the other half has in any case, so that it does not tell
 //! either how many the first one asked for.
 
@@ -23,7 +23,12 @@ const BESIDE: f64 = 1.0;
 
 /// Samples that the halves of each cell are to have next, at most `most`, by those that they have and the rays that these took; none
 /// where it is too early to tell.
-pub(super) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32) -> Option<Vec<[u32; 2]>> {
+pub(in crate::pipeline) fn next_round(
+    film: &Film,
+    done: &[[u32; 2]],
+    rays: &[u64],
+    most: u32,
+) -> Option<Vec<[u32; 2]>> {
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
     // What every half has had, whatever was asked for.
     let known = 1 << least.ilog2();

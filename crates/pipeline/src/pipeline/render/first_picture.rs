@@ -3,14 +3,13 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use super::super::plan::Plan;
-use super::super::trace::{Job, Tracer};
-use super::Stop;
 use super::preview::Screen;
-use super::render::Rendering;
 use crate::film::stretch::Stretch;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{PhotonMaps, RenderSettings};
+use crate::pipeline::plan::Plan;
+use crate::pipeline::stages::Stop;
+use crate::pipeline::trace::{Job, Tracer};
 use crate::scene::description::Render;
 
 /// What the first picture of a moved camera may take.
@@ -18,7 +17,7 @@ const HASTE: Duration = Duration::from_millis(6);
 
 /// What first pictures are traced by.
 #[derive(Clone, Copy)]
-pub(in crate::pipeline) struct Coarse<'a> {
+pub(in crate::pipeline) struct FirstPictures<'a> {
     pub(in crate::pipeline) tracer: Tracer<'a>,
     pub(in crate::pipeline) plan: &'a Plan,
     /// Whether somebody is moving the camera.
@@ -27,15 +26,10 @@ pub(in crate::pipeline) struct Coarse<'a> {
     pub(in crate::pipeline) rate: &'a Cell<Option<f64>>,
 }
 
-impl<'a> Coarse<'a> {
-    pub(super) fn of(rendering: &Rendering<'a>) -> Self {
-        let Rendering { tracer, plan, is_moved, coarse_rate: rate, .. } = *rendering;
-        Self { tracer, plan, is_moved, rate }
-    }
-
+impl<'a> FirstPictures<'a> {
     /// Columns and rows of the first pictures at about the preview's own resolution, of those that are much less work than one pass: of
     /// a moved camera a hasty one before.
-    pub(super) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
+    pub(in crate::pipeline) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
         let usual = self.usual_size(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
         let hasty = rate.and_then(|rate| hasty_size(usual, rate));
@@ -58,7 +52,7 @@ impl<'a> Coarse<'a> {
     }
 
     /// Traces a first picture of this size; notes how many pixels are traced in a second. `tick` is called every now and then.
-    pub(super) fn picture(
+    pub(in crate::pipeline) fn picture(
         &self,
         photons: Option<&PhotonMaps>,
         (width, height): (u32, u32),

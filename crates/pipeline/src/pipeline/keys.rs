@@ -8,21 +8,17 @@ use crate::scene::description::{Accel, Camera, Render, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
 /// What the descriptions of a scene refer to by index.
-pub(in crate::pipeline) fn referents<'a>(
-    scene: &'a Scene,
-    meshes: &'a [Key],
-    orbiter: Option<&'a str>,
-) -> Referents<'a> {
+pub(super) fn referents<'a>(scene: &'a Scene, meshes: &'a [Key], orbiter: Option<&'a str>) -> Referents<'a> {
     Referents { textures: &scene.textures, meshes, orbiter }
 }
 
 /// What a mesh's tree is built of.
-pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
+pub(super) fn tree(mesh: &Key, accel: Accel) -> Key {
     Fingerprint::new("tree").key(mesh).choice(accel).finish()
 }
 
 /// What trees are built over, and which.
-pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
+pub(super) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
     in_trees(&from(&shapes(scene, of), origin), scene.render.accel)
 }
 
@@ -32,7 +28,7 @@ fn from(of: &Key, origin: DVec3) -> Key {
 }
 
 /// What is made of these things with trees of a kind.
-pub(in crate::pipeline) fn in_trees(of: &Key, accel: Accel) -> Key {
+pub(super) fn in_trees(of: &Key, accel: Accel) -> Key {
     Fingerprint::new("in trees").key(of).choice(accel).finish()
 }
 
@@ -46,7 +42,7 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
 
 /// What gives light, where it is, and which objects it is. `sky` is the map of the environment, `patterns` are the images that
 /// lamps may have on them.
-pub(in crate::pipeline) fn lights(
+pub(super) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
     origin: DVec3,
@@ -85,17 +81,12 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
 }
 
 /// Everything that a world is made of but the kind of its trees, which all have the same hits: views that show the trees add it.
-pub(in crate::pipeline) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
+pub(super) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
     Fingerprint::new("world").key(surfaces).add(camera, of).finish()
 }
 
 /// Everything that photons depend on: what they meet, in coordinates that start somewhere, how they are sent and how far they go.
-pub(in crate::pipeline) fn photons(
-    surfaces: &Key,
-    origin: DVec3,
-    render: &Render,
-    photons: PhotonSettings,
-) -> Key {
+pub(super) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
     let PhotonSettings { count, radius, bounces } = photons;
     let mut key = Fingerprint::new("photons");
     key.key(&from(surfaces, origin)).u64(count.into()).f32(radius).u64(bounces.into());
@@ -103,7 +94,7 @@ pub(in crate::pipeline) fn photons(
 }
 
 /// Everything that light meets.
-pub(in crate::pipeline) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
+pub(super) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
     let mut key = Fingerprint::new("surfaces");
     key.key(&shapes(scene, of)).key(&described_lights(scene, of));
     for object in &scene.objects {
@@ -119,7 +110,7 @@ pub(in crate::pipeline) fn surfaces(scene: &Scene, of: &Referents<'_>, textures:
 }
 
 /// Everything that a film's sums depend on, apart from the number of samples.
-pub(in crate::pipeline) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
+pub(super) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
     let mut key = Fingerprint::new("render");
     key.key(&world).add(settings, &Referents::default());
     if let Some(rect) = crop {
