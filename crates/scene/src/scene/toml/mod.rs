@@ -4,6 +4,21 @@
 //! other expression is cut out by [`expression`], read by the events of `toml_parser` and made into values by
 //! [`events`]. [`assembly`] puts the keys and values into tables by the rules of TOML, [`tree`] holds them. Nothing here
 //! knows what a scene is. Documents with errors are read as far as they can be understood.
+//!
+//! ## Why the tree is not that of the crate `toml`
+//!
+//! `toml::de::DeTable::parse_recoverable` (1.2) has spans and recovery too. Both were measured on a scene of a million spheres,
+//! 77 MB of text, on the same machine in turns:
+//!
+//! | | this tree | `DeTable` |
+//! | --- | --- | --- |
+//! | processor time, user + system | 0.21 + 0.18 s | 1.5 + 1.4 s or more |
+//! | memory of the tree | 192 MB | 985 MB |
+//! | most memory at once, beside the text | 192 MB | 2.67 GB |
+//! | errors in `tests/broken` | | the same messages and places, but no place where dotted keys are too deep |
+//!
+//! So the library stays what tests compare this tree with: both have the grammar of `toml_parser`, and therefore its errors. A
+//! scene of that size is a use that counts: its file would take more memory than the spheres that are rendered.
 
 mod assembly;
 mod brackets;
