@@ -18,7 +18,10 @@ pub use material::{
     ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,
     TextureRole, TextureUse, Wrap,
 };
-pub use render::{Accel, Integrator, MOST_SCATTERINGS, PixelFilter, Render, Shadows, Tonemap};
+pub use render::{
+    Accel, Integrator, KeyRange, MOST_SCATTERINGS, PixelFilter, Render, RenderKey, Shadows, Tonemap,
+    render_keys,
+};
 pub use shape::{Lowered, Mesh, Object, Shape};
 
 /// A whole scene.
