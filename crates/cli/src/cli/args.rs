@@ -1,4 +1,4 @@
-//! What can be typed.
+//! Arguments of the command line.
 
 mod bench;
 
@@ -25,7 +25,7 @@ Examples:
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
   glimt compare a.exr reference.exr       the error of one picture against another
-  glimt bench ball.toml --plot plot.svg   what time buys: the error of each method against its seconds
+  glimt bench ball.toml --plot plot.svg   measure the error of each method against its seconds
 
 The scene that `glimt new` writes has every key, with comments.
 A scene that is named like a command is given with its folder: glimt ./check
@@ -47,7 +47,7 @@ pub struct Args {
     /// A command other than rendering.
     #[command(subcommand)]
     pub command: Option<Subcommand>,
-    /// What is rendered and how.
+    /// Scene and options of a render.
     #[command(flatten)]
     pub render: RenderArgs,
 }
@@ -86,7 +86,7 @@ pub enum Subcommand {
     /// Measure the error of a picture against a reference
     #[command(after_help = COMPARE_HELP)]
     Compare(CompareArgs),
-    /// Measure what time buys: the error of methods against their seconds, over several seeds
+    /// Benchmark error against time: the error of methods against their seconds, over several seeds
     #[command(after_help = bench::HELP)]
     Bench(Box<BenchArgs>),
 }
@@ -181,14 +181,14 @@ pub struct RenderArgs {
     /// Render these pixels only (left, top, width, height); the rest stays black
     #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
     pub crop: Option<Rect>,
-    /// What the picture shows
+    /// The view to render: the beauty picture or an AOV
     #[arg(long, value_parser = one_of::<View>(), value_name = "NAME", help_heading = "Picture")]
     pub view: Option<View>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Picture")]
     pub seed: Option<u32>,
 
-    /// How light is followed
+    /// Rendering algorithm
     #[arg(long, value_parser = one_of::<Integrator>(), value_name = "NAME", help_heading = "Method")]
     pub integrator: Option<Integrator>,
     /// Scatterings along one path; 0: emitted light only, 1: direct light
@@ -212,14 +212,14 @@ pub struct RenderArgs {
     /// Threads that render; 0: one per core
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Method")]
     pub threads: Option<usize>,
-    /// How far rendering gives way to other programs, from 0, not at all, to 19 [default: 0 with --once, else 10]
+    /// Give way to other programs, from 0, not at all, to 19 [default: 0 with --once, else 10]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, help_heading = "Method")]
     pub nice: Option<u8>,
 
-    /// How progress is said on stderr with --once
+    /// Progress on stderr with --once
     #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: Progress,
-    /// How the preview is drawn
+    /// Kind of preview
     #[arg(long, value_parser = one_of::<PreviewChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub preview: PreviewChoice,
     /// Colours of the preview and of messages; auto looks at the terminal and at NO_COLOR
@@ -231,7 +231,7 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// What they change of a scene.
+    /// Overrides of a scene by these options.
     pub(super) fn overrides(&self) -> Overrides {
         let mut overrides = Overrides {
             sets: self.sets.clone(),

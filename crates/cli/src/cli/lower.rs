@@ -1,4 +1,4 @@
-//! From what was typed to what it means.
+//! Meaning of the arguments.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,10 @@ use crate::tui::{ColorChoice, PreviewChoice};
 /// Standard output, where it stands for a file.
 pub(super) const STANDARD: &str = "-";
 
-/// How far the terminal's renders give way to the front end and to all other programs.
+/// Nice value by which the terminal's renders give way to the front end and to all other programs.
 const POLITE: u8 = 10;
 
-/// What is to be done.
+/// An order of the call.
 #[derive(Clone, Debug)]
 pub(super) struct Order {
     pub(super) scene: PathBuf,
@@ -24,7 +24,7 @@ pub(super) struct Order {
     pub(super) preview: PreviewChoice,
     pub(super) color: ColorChoice,
     pub(super) poll: bool,
-    /// By how much the nice value is raised: with `is_once` that of the program, else that of the render threads.
+    /// Increase of the nice value: with `is_once` that of the program, else that of the render threads.
     pub(super) nice: u8,
 }
 
@@ -162,7 +162,7 @@ mod tests {
         }
     }
 
-    /// An option of a key of `[render]` with values that it accepts, and values that it refuses.
+    /// Options accept and refuse the same values as their keys of `[render]`.
     #[test]
     fn options_accept_what_the_keys_accept() {
         let command = Args::command();

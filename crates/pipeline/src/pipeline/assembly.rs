@@ -20,7 +20,7 @@ pub(super) type Keyed = (Key, Arc<World>);
 #[derive(Clone, Debug)]
 pub(super) struct Eye {
     pub(super) camera: Camera,
-    /// The file that the camera is in, where it is in one.
+    /// The orbiter file, if the camera is in one.
     pub(super) orbiter: Option<OrbiterCamera>,
 }
 
@@ -38,7 +38,7 @@ impl Eye {
         world::Camera::viewpoint(&self.camera, self.orbiter.as_ref())
     }
 
-    /// Where the coordinates start in which it sees best.
+    /// Origin of the coordinates in which the camera sees most precisely.
     pub(super) fn origin(&self) -> DVec3 {
         world::origin(&self.camera, self.orbiter.as_ref())
     }

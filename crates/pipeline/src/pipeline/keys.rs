@@ -1,5 +1,5 @@
-//! What the later stages read of a scene. Places in the file and names are not among it, so that comments, order of
-//! keys and unused tables change nothing.
+//! Keys of the values that later stages read of a scene. They leave out places in the file and names, so that comments, the order
+//! of keys and unused tables change nothing.
 
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
@@ -7,17 +7,17 @@ use crate::math::DVec3;
 use crate::scene::description::{Accel, Camera, Render, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
-/// What the descriptions of a scene refer to by index.
+/// Textures, meshes and orbiter that descriptions refer to by index.
 pub(super) fn referents<'a>(scene: &'a Scene, meshes: &'a [Key], orbiter: Option<&'a str>) -> Referents<'a> {
     Referents { textures: &scene.textures, meshes, orbiter }
 }
 
-/// What a mesh's tree is built of.
+/// Key of a mesh's tree.
 pub(super) fn tree(mesh: &Key, accel: Accel) -> Key {
     Fingerprint::new("tree").key(mesh).choice(accel).finish()
 }
 
-/// What trees are built over, and which.
+/// Key of all geometry in trees.
 pub(super) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
     in_trees(&from(&shapes(scene, of), origin), scene.render.accel)
 }
@@ -27,7 +27,7 @@ fn from(of: &Key, origin: DVec3) -> Key {
     Fingerprint::new("from").key(of).dvec3(origin).finish()
 }
 
-/// What is made of these things with trees of a kind.
+/// Key of geometry in trees of a kind.
 pub(super) fn in_trees(of: &Key, accel: Accel) -> Key {
     Fingerprint::new("in trees").key(of).choice(accel).finish()
 }
@@ -40,8 +40,8 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// What gives light, where it is, and which objects it is. `sky` is the map of the environment, `patterns` are the images that
-/// lamps may have on them.
+/// Key of the lights, of their places and of the objects that emit. `sky` is the map of the environment, `patterns` are the
+/// images that lamps may have on them.
 pub(super) fn lights(
     scene: &Scene,
     of: &Referents<'_>,

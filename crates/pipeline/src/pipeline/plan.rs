@@ -34,7 +34,7 @@ pub(super) struct Plan {
     pub(super) effective: Effective,
 }
 
-/// Who named the files for the picture.
+/// Source of the picture's file names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NamedBy {
     /// `-o`.
@@ -86,13 +86,13 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
 /// Photons that a pass may send: what it stores must have room.
 pub(super) const MOST_PHOTONS: u64 = 4_000_000;
 
-/// How photons are sent and gathered.
+/// Settings by which photons are sent and gathered.
 fn photons(asked: &Photons) -> PhotonSettings {
     let Photons { enabled: _, count, radius, bounces } = *asked;
     PhotonSettings { count: count.clamp(1, MOST_PHOTONS) as u32, radius: radius as f32, bounces }
 }
 
-/// A scene may be large: it is copied only where it has to be another one.
+/// The scene with this acceleration structure. A scene may be large: it is copied only if the structure is another one.
 fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {

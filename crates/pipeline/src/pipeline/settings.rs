@@ -1,4 +1,4 @@
-//! What the command line and the keys change of a scene, and what then holds.
+//! Overrides of a scene by the command line and by keys, and the settings that result.
 
 use std::path::PathBuf;
 
@@ -63,7 +63,7 @@ pub struct Effective {
     pub height: u32,
     /// Samples per pixel, at most.
     pub samples: u32,
-    /// Noise that ends the sampling of a tile, relative to its brightness; 0: none does.
+    /// Noise threshold of a tile, relative to its brightness; 0: no threshold.
     pub error: f32,
     /// Method.
     #[serde(serialize_with = "choice::serialize")]
@@ -71,7 +71,7 @@ pub struct Effective {
     /// Shadows.
     #[serde(serialize_with = "choice::serialize")]
     pub shadows: Shadows,
-    /// Most radiance that a path brings by one vertex after its first reflection, which is a bias; 0: no such limit.
+    /// Most radiance that a path brings by one vertex after its first reflection, which makes a bias; 0: no such limit.
     pub clamp: f32,
     /// Whether photons are on.
     pub photons: bool,
@@ -80,7 +80,7 @@ pub struct Effective {
     /// Acceleration structure.
     #[serde(serialize_with = "choice::serialize")]
     pub accel: Accel,
-    /// What is shown.
+    /// The view: beauty or an AOV.
     #[serde(serialize_with = "choice::serialize")]
     pub view: View,
     /// In stops.

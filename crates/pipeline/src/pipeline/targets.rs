@@ -110,7 +110,7 @@ fn is_twin(target: Target<'_>, twin: &Path) -> Diagnostic {
     of_call(message, Some(format!("each needs a file of its own: {}", way_out(target.kind))))
 }
 
-/// What is there already and was not written by glimt.
+/// A file that exists already and that glimt did not write.
 fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
     let (name, way_out) = (target.path.display(), way_out(target.kind));
     let (replaced, help) = match target.kind {
@@ -135,7 +135,7 @@ fn way_out(kind: Kind) -> &'static str {
     }
 }
 
-/// What is about the call stands at no place of the scene.
+/// A diagnostic about the call, which has no place in the scene.
 fn of_call(message: String, help: Option<String>) -> Diagnostic {
     Diagnostic { severity: Severity::Error, message, path: PathBuf::new(), place: None, help }
 }

@@ -120,7 +120,7 @@ impl Desk {
         self.worker(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
     }
 
-    /// What is on the screen.
+    /// The screen as it is drawn now.
     pub(super) fn screen(&mut self) -> Buffer {
         self.state.dirty = false;
         let mut buffer =

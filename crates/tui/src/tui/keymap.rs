@@ -9,10 +9,10 @@ use super::event::KeyPress;
 pub(super) struct Binding<A = Action> {
     /// The keys that do it.
     pub keys: &'static [KeyPress],
-    /// How they are written in the help; empty: the line before says it.
+    /// Labels of the keys in the help; empty if the line before has them.
     pub label: &'static str,
     pub action: A,
-    /// What it does, for the help; empty: the line before says it.
+    /// Effect of the keys, for the help; empty if the line before tells it.
     pub help: &'static str,
     /// One word for the line of keys; empty: not there.
     pub hint: &'static str,
@@ -116,7 +116,7 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];
 
-/// What a key can mean while the help, the errors or the list of views are open, before what it means else.
+/// Actions of keys while the help, the errors or the list of views are open; they come before the usual actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Overlay {
     LineUp,
@@ -167,13 +167,13 @@ pub(super) const OVERLAY: &[Binding<Overlay>] = &[
     ),
 ];
 
-/// What a key means to what lies over the picture, if anything.
+/// The action of a key on an overlay, if it has one.
 pub(super) fn overlay(key: KeyPress) -> Option<Overlay> {
     OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// What a key means, if anything. Terminals differ in whether they report shift beside a capital or `?`, so
-/// shift does not count for characters.
+/// The action of a key, if it has one. Terminals differ in whether they report shift beside a capital or `?`, so shift does not
+/// count for characters.
 pub(super) fn action(key: KeyPress) -> Option<Action> {
     let modifiers = match key.code {
         KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,

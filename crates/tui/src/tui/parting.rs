@@ -8,7 +8,7 @@ use crate::pipeline::settings::View;
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
-/// What was written, its samples and its seconds, what came after it, and what is not kept of it.
+/// The files written, with their samples and seconds; events after them; and changes that are discarded.
 pub(super) fn words(state: &State) -> String {
     let files = match &state.saving.write_failed {
         Some(failed) => unwritten(state, failed),
@@ -19,7 +19,7 @@ pub(super) fn words(state: &State) -> String {
     files + not_kept
 }
 
-/// What came after the files that were written.
+/// Events after the files were written.
 fn since(state: &State) -> String {
     let is_after = state.saving.written.iter().any(|written| written.generation != state.request.generation);
     let next = if is_after { "the render after it" } else { "the render" };
@@ -38,14 +38,14 @@ fn since(state: &State) -> String {
     }
 }
 
-/// Whether the files that were written are of a scene that has changed since.
+/// Whether the scene has changed since the files were written.
 fn is_saved_since(state: &State) -> bool {
     let newest = state.saving.written.iter().map(|written| written.generation).max();
     !state.request.is_written()
         && newest.zip(state.saving.last_visible_edit).is_some_and(|(newest, saved)| newest < saved)
 }
 
-/// What was written, and what it is; files that hold the same together.
+/// The files written and their descriptions; files of the same picture stand together.
 fn files(written: &[Written]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made);
     let said: Vec<String> = alike
@@ -60,7 +60,7 @@ fn files(written: &[Written]) -> String {
     if said.is_empty() { "nothing is written".to_owned() } else { said.join("; ") }
 }
 
-/// What is not on disk, and why; what else was written, of the same picture and of earlier ones.
+/// The picture that is not on disk, and why; and the other files written, of the same picture and of earlier ones.
 fn unwritten(state: &State, failed: &Unwritten) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
@@ -72,7 +72,7 @@ fn unwritten(state: &State, failed: &Unwritten) -> String {
     words
 }
 
-/// What a picture is and what it took. One whose samples were there already took its time before.
+/// A picture and its cost, in words. A picture whose samples were there already had its cost before.
 pub(super) fn made(report: &Report) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
@@ -86,7 +86,7 @@ pub(super) fn made(report: &Report) -> String {
     format!("{view}{comma}{}×{}, {samples} samples, {time}", image.width, image.height)
 }
 
-/// What is shown, where it is not the picture itself.
+/// The view, unless it is beauty.
 pub(super) fn view(view: View) -> String {
     if view == View::Beauty { String::new() } else { format!("view {}", view.name()) }
 }

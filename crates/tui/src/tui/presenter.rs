@@ -1,6 +1,6 @@
 //! Pictures on their way to the screen: which are worth being drawn, when, and how near to them the cells have to come.
 //!
-//! What time it is comes with each call, so that a test can tell it.
+//! The time comes with each call, so that a test can choose it.
 
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};

@@ -32,11 +32,11 @@ const TURN: Duration = Duration::from_millis(3);
 /// [`Command::Quit`] at the end. To be called once in a process.
 ///
 /// # Errors
-/// [`TuiError`] where there is no terminal, where it cannot be written to, and when the worker is gone.
+/// [`TuiError`] if there is no terminal, if it cannot be written to, or if the worker is gone.
 pub fn run(options: Options) -> Result<Ended, TuiError> {
     terminal::require()?;
     let depth = color::depth(options.color, |name| std::env::var(name).ok());
-    // Otherwise crossterm drops colours that were asked for by name where NO_COLOR is set.
+    // Otherwise crossterm drops colours by name if NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
@@ -116,14 +116,14 @@ struct Ui {
     screen: Screen,
     presenter: Presenter,
     events: Receiver<Event>,
-    /// What came while answers were waited for.
+    /// Events that came while the loop waited for answers.
     postponed: VecDeque<Event>,
     state: State,
     commands: Box<dyn FnMut(Command)>,
     cell_aspect: Option<f32>,
 }
 
-/// How the loop ends.
+/// Ends of the loop.
 enum End {
     Quit(ExitStatus),
     Error(TuiError),

@@ -1,4 +1,4 @@
-//! What `glimt bench` takes.
+//! Arguments of `glimt bench`.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ multiplied: --integrator path,whitted --photons on,off. Without SCENE, the one t
 
 Exit codes: 0 measured; 1 the work failed; 2 the call or a scene is wrong; 130, 143, 129 ended by a signal.";
 
-/// What is measured and where it goes.
+/// Scenes, methods and outputs of a benchmark.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BenchArgs {
     /// The scene files
@@ -68,14 +68,14 @@ pub struct BenchArgs {
     /// Samples per pixel of each reference [default: by the time, or 100 times the most --samples]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
     pub reference_samples: Option<u32>,
-    /// Where references are kept
+    /// Folder for references
     #[arg(long, value_name = "FOLDER", help_heading = "Measurement")]
     pub cache: Option<PathBuf>,
     /// Make references anew and keep none
     #[arg(long, conflicts_with = "cache", help_heading = "Measurement")]
     pub no_cache: bool,
 
-    /// How light is followed
+    /// Rendering algorithms
     #[arg(long, value_delimiter = ',', value_parser = one_of::<Integrator>(), value_name = "LIST", help_heading = "Methods, each a list")]
     pub integrator: Vec<Integrator>,
     /// Indirect light and caustics from photon maps, in whitted
@@ -103,11 +103,11 @@ pub struct BenchArgs {
     /// Threads that render; 0: one per core
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "All pictures and references")]
     pub threads: Option<usize>,
-    /// How far rendering gives way to other programs, from 0, not at all, to 19
+    /// Give way to other programs, from 0, not at all, to 19
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, default_value = "0", help_heading = "All pictures and references")]
     pub nice: u8,
 
-    /// How progress is said on stderr
+    /// Progress on stderr
     #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: Progress,
     /// Colours of messages and of the plot in the terminal; auto looks at the terminal and at NO_COLOR

@@ -62,13 +62,13 @@ use crate::system::priority;
 use crate::system::threads::not_started;
 use crate::world::{Lookups, World};
 
-/// What an engine works with; tests work with other means.
+/// Means of an engine; tests replace some of them.
 #[derive(Clone, Copy)]
 pub(super) struct Means {
     pub(super) kernel: Kernel,
-    /// What one film may take, at most.
+    /// Most bytes of one film.
     pub(super) most_film_bytes: u64,
-    /// By how much the nice value of render threads is above that of the thread that starts them.
+    /// Difference between the nice values of the render threads and of the thread that starts them.
     pub(super) nice: u8,
 }
 
@@ -86,7 +86,7 @@ pub(super) struct Engine {
     meshes: Pool<PathBuf, KeptMesh>,
     textures: TextureCache,
     accel: AccelCache,
-    /// How many requests there were.
+    /// Number of requests so far.
     requests: u64,
     lights: Memo<Arc<Lights>>,
     sky: SkyMemo,
@@ -94,7 +94,7 @@ pub(super) struct Engine {
     photons: PhotonCache,
     films: FilmCache,
     written: Written,
-    /// What the current film is rendered by.
+    /// Plan of the current film.
     plan: Option<Plan>,
     at_hand: Option<AtHand>,
     /// The last scene that could be read, with what it names.
@@ -116,7 +116,7 @@ struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
     world: Keyed,
-    /// What light meets, and where its coordinates start.
+    /// Key of all surfaces and of the origin of their coordinates.
     surfaces: Key,
     origin: DVec3,
     texels_loaded: u64,
@@ -150,7 +150,7 @@ impl Engine {
         }
     }
 
-    /// Do what is asked for and say what came of it.
+    /// Carries out a request and reports its outcome.
     pub(super) fn request(&mut self, request: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
         let generation = request.generation;
         let outcome = self.outcome(request, sink, meanwhile);
@@ -168,7 +168,7 @@ impl Engine {
         }
     }
 
-    /// Do what is asked for.
+    /// Carries out a request.
     fn outcome(
         &mut self,
         request: &Request,
@@ -215,7 +215,7 @@ impl Engine {
         }
     }
 
-    /// Do what is asked of the picture at hand, outside of a request.
+    /// Answers a question about the current picture, outside of a request.
     pub(super) fn errand(&self, errand: &Errand, sink: &Sink) {
         match &self.at_hand {
             Some(at_hand) => at_hand.run(errand, self.films.current(), &self.inputs, sink),
@@ -526,7 +526,7 @@ impl Engine {
     }
 }
 
-/// What renders a scene, by no photons.
+/// Tracer of a scene, without photons.
 fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a CancelToken) -> Tracer<'a> {
     Tracer { kernel, pool, world: &ready.world.1, settings: &ready.plan.settings, token, photons: None }
 }

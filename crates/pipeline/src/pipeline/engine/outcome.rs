@@ -1,4 +1,4 @@
-//! What came of a request, for those who ask for one picture and wait for it.
+//! Outcome of a request, for callers who ask for one picture and wait for it.
 
 use std::path::Path;
 
@@ -15,9 +15,9 @@ use crate::scene::fingerprint::Key;
 pub struct Rendered {
     /// Linear light, unexposed.
     pub image: RadianceImage,
-    /// What it took.
+    /// Report of the request.
     pub report: Box<Report>,
-    /// What is probably not meant.
+    /// Likely mistakes in the scene.
     pub warnings: Vec<Diagnostic>,
     /// All that its sums depend on, apart from the number of samples.
     pub key: Key,
@@ -28,23 +28,23 @@ pub struct Rendered {
 pub enum Unrendered {
     /// The scene is wrong, or the work failed.
     Failed(Failure),
-    /// The work was told to stop.
+    /// A cancel token stopped the work.
     Cancelled,
 }
 
-/// Of a request that was done.
+/// Outcome of a finished request.
 pub(super) struct Outcome {
     pub(super) report: Report,
     /// Why nothing is written.
     pub(super) conflicts: Vec<Diagnostic>,
-    /// What is probably not meant.
+    /// Likely mistakes in the scene.
     pub(super) warnings: Vec<Diagnostic>,
     /// Whether neither the picture nor its view changed.
     pub(super) unchanged: bool,
 }
 
 impl Engine {
-    /// Do what is asked for; gives the picture as well, and what it is made of.
+    /// Carries out a request; returns its picture too, with the key of all inputs.
     ///
     /// # Errors
     /// Why there is no picture.

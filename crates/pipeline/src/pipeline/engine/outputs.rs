@@ -41,8 +41,8 @@ impl Engine {
         pool.install(|| write_by_hand(canvas, to, written));
     }
 
-    /// Whether a file that is to be written must not be. Where that need not end the request, it is said, and the
-    /// findings have it.
+    /// Looks for outputs that must not be written. If the request can go on without them, tells the front end and keeps the
+    /// conflicts in the findings.
     ///
     /// # Errors
     /// All conflicts, where the picture must be written.

@@ -50,7 +50,7 @@ impl Stage {
     }
 }
 
-/// How a stage stands.
+/// Status of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
@@ -67,11 +67,11 @@ pub enum Status {
 /// One line of the table of stages.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct StageReport {
-    /// Which.
+    /// The stage.
     pub name: Stage,
-    /// How it stands.
+    /// Its status.
     pub status: Status,
-    /// What it took.
+    /// Wall-clock time of the stage.
     pub seconds: f64,
     /// Why it was skipped or reused, or what it made, in a few words; may be empty.
     pub why: String,

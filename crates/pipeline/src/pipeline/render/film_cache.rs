@@ -35,8 +35,8 @@ impl FilmCache {
         self.kept.iter().chain(&self.current).any(|canvas| canvas.key == key)
     }
 
-    /// The film of this key becomes the current one if it is kept and of use; else there is none. The one before is
-    /// kept where there is room for it.
+    /// Makes the film of this key the current one, if it is kept and of use; else there is no current film. Keeps the film
+    /// before, if there is room.
     pub(in crate::pipeline) fn select(&mut self, key: Key, is_usable: impl FnOnce(&FilmState) -> bool) {
         if self.current.as_ref().is_none_or(|current| current.key != key) {
             let kept = self.kept.iter().position(|canvas| canvas.key == key);
@@ -67,7 +67,7 @@ impl FilmCache {
         Ok(self.current.insert(canvas))
     }
 
-    /// How many there are.
+    /// Number of films.
     pub(in crate::pipeline) fn count(&self) -> usize {
         self.kept.len() + usize::from(self.current.is_some())
     }
@@ -106,7 +106,7 @@ mod tests {
         Fingerprint::new(name).finish()
     }
 
-    /// Of 64×32 pixels, with samples.
+    /// A film of 64×32 pixels, with samples.
     fn canvas(name: &str) -> FilmState {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");

@@ -12,7 +12,7 @@ use crate::pipeline::render::noise_goals::Goals;
 use crate::pipeline::trace::{Cost, Job};
 use crate::scene::fingerprint::Key;
 
-/// A film that is being rendered, or that was.
+/// A film that is being rendered, or a finished one.
 #[derive(Debug)]
 pub(in crate::pipeline) struct FilmState {
     pub(in crate::pipeline) key: Key,
@@ -23,17 +23,17 @@ pub(in crate::pipeline) struct FilmState {
     pub(in crate::pipeline) rays: Vec<u64>,
     /// Seconds of a processor that all of them took.
     seconds: f64,
-    /// What the samples of each take of late.
+    /// Recent cost of the samples in each cell.
     costs: Vec<CellCost>,
-    /// What a pixel takes in a job, beside its samples.
+    /// Cost of a pixel in a job, beside its samples.
     pixel_share: PixelShare,
     /// Samples that they are to have at most.
     pub(in crate::pipeline) goals: Goals,
     /// Samples that halves without a goal are expected to get.
     expected: ExpectedSamples,
-    /// A first picture at the size of the preview, shown where there are no samples yet.
+    /// A first picture at the size of the preview, shown in pixels without samples.
     pub(in crate::pipeline) base: Option<RadianceImage>,
-    /// What the last preview was made by.
+    /// The previewer of the last preview.
     pub(in crate::pipeline) previewer: Option<Previewer>,
     /// Whether it was begun for a camera on its way.
     pub(in crate::pipeline) is_passing: bool,
@@ -84,7 +84,7 @@ impl FilmState {
         self.is_complete_in(None, samples)
     }
 
-    /// The same of the tiles of a part; none: of all.
+    /// Whether every pixel in the tiles of a part has this many samples, or all that it is to have. `None` means all tiles.
     pub(in crate::pipeline) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
         self.halves()
             .filter(|(cell, _)| self.is_in(part, *cell))
@@ -101,7 +101,7 @@ impl FilmState {
         self.samples_in(None, most)
     }
 
-    /// The same of the tiles of a part; none: of all.
+    /// Fewest samples of a pixel that is to have more, in the tiles of a part, at most `most`. `None` means all tiles.
     pub(in crate::pipeline) fn samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
@@ -146,8 +146,8 @@ impl FilmState {
             + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// What brings the halves of every cell of the tiles of a part (none: of all) to as many samples, or to those that they are to
-    /// have: whole tiles, where all of them lack the same, in the film's order.
+    /// Jobs that bring both halves of every cell to `target` or to their goals, in the tiles of a part (`None`: in all of them).
+    /// Tiles whose cells all lack the same samples are one job. The order is the film's.
     pub(in crate::pipeline) fn jobs(
         &self,
         part: Option<Rect>,
@@ -202,7 +202,7 @@ impl FilmState {
         job.pixel_count() * job.samples.len() as u64
     }
 
-    /// Decide which tiles have enough samples, of those that have this power of two of them.
+    /// Decides which tiles have enough samples, among those with `samples`, a power of two.
     pub(in crate::pipeline) fn judge(&mut self, samples: u32, error: f64) {
         if let Some(judgement) = self.goals.judge(&self.film, &self.done, samples, error) {
             self.expected.predict(&judgement, &self.goals, &self.done);
@@ -229,8 +229,9 @@ impl FilmState {
         self.seconds
     }
 
-    /// Those that it will take from here on, as far as that is known, to some samples at most; `jobs` tells in how many jobs a pixel
-    /// gets from some samples to others. What a sample takes in a cell is told by its last ones; where it has none, by the others.
+    /// Expected processor seconds of the samples to come, at most to `most`. `jobs` is the number of jobs in which a pixel gets
+    /// from some samples to others. The cost of a sample is that of the last ones in its cell; cells without samples take the
+    /// mean.
     pub(in crate::pipeline) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
         for cell in (0..self.done.len()).filter(|cell| self.film.cell_rect(*cell).is_some()) {
@@ -254,7 +255,7 @@ impl FilmState {
         seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
-    /// Samples of the pixels that have most, now and in the end as far as that is known: as many passes of photons are sent.
+    /// Samples of the pixel with most samples: now, and expected in the end. There are as many passes of photons.
     pub(in crate::pipeline) fn passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
@@ -280,7 +281,7 @@ impl FilmState {
     }
 }
 
-/// What all halves of all cells lack, if it is the same.
+/// Samples that all halves of all cells lack, if they all lack the same.
 fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
@@ -294,7 +295,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::scene::fingerprint::Fingerprint;
 
-    /// Of two tiles.
+    /// A film of two tiles.
     fn canvas() -> FilmState {
         let film = Film::new(64, 32, None).expect("a film");
         let cells = film.cell_count();

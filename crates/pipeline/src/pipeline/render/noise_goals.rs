@@ -1,9 +1,9 @@
-//! Which parts of a picture have enough samples.
+//! Goals by noise: which parts of a picture have enough samples.
 //!
-//! To stop by the same samples that the picture is the mean of would make it too dark: what is rare and bright ends no sampling
-//! where it was not met yet, and goes on where it was. So one half of a tile, which has every other pixel, stops by the noise of the
-//! other half, whose samples are others; the noise of both is much the same. A little of the bias is left, as a half
-//! that has stopped tells the other no more: a tenth of it, which is a thirtieth of the noise where that is worst.
+//! A picture whose samples decide by themselves when they stop is too dark: rare bright samples end no sampling before they are
+//! met, and prolong it once they are. So each half of a tile, every other pixel, stops by the noise of the other half, whose
+//! samples are independent and about as noisy. A tenth of the bias is left, as a half that has stopped tells the other no more;
+//! at worst that is a thirtieth of the noise.
 
 use crate::film::{CELLS, Convergence, Film, HalfNoise, samples_by};
 
@@ -13,10 +13,10 @@ pub(in crate::pipeline) const LEAST: u32 = 16;
 /// The part of the noise asked for that is aimed at: what is measured low by chance stops early.
 pub(in crate::pipeline) const AIM: f64 = 0.85;
 
-/// The part of the noise asked for from which it is told to be missed: beyond what chance does to what is measured.
+/// Ratio to the requested error from which a tile counts as missed: above the chance errors of the measurement.
 const TOO_MUCH: f64 = 1.5;
 
-/// As many samples as are ever expected; above it stands what nobody knows.
+/// Most samples ever expected; [`u32::MAX`] means unknown.
 pub(in crate::pipeline) const MOST: u32 = u32::MAX - 1;
 
 /// The least brightness that noise is held against, as a part of the picture's.
@@ -25,7 +25,7 @@ const LEAST_BRIGHTNESS: f64 = 0.01;
 /// Samples that the halves of each cell are to have.
 #[derive(Debug)]
 pub(in crate::pipeline) struct Goals {
-    /// What is decided; [`u32::MAX`] before.
+    /// Decided goals; [`u32::MAX`] while undecided.
     decided: Vec<[u32; 2]>,
     /// Mean luminance of the picture, when noise was first asked for.
     brightness: Option<f64>,
@@ -137,11 +137,11 @@ pub(in crate::pipeline) struct Judgement {
     pub(in crate::pipeline) aim: Aim,
 }
 
-/// What the samples of a tile tell of its noise.
+/// Noise of a tile, by its samples.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::pipeline) struct TileNoise {
     pub(in crate::pipeline) halves: [Option<HalfNoise>; 2],
-    /// How many times smaller its variance got of late.
+    /// Ratio of its variance before and after the last doubling of samples.
     pub(in crate::pipeline) fall: Option<f64>,
 }
 
@@ -156,10 +156,10 @@ impl TileNoise {
     }
 }
 
-/// What noise is held against.
+/// The error to reach, and the brightness that it is relative to.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::pipeline) struct Aim {
-    /// The error that is asked for.
+    /// The requested error.
     pub(in crate::pipeline) error: f64,
     /// Mean luminance of the picture.
     brightness: f64,

@@ -16,7 +16,7 @@ use crate::pipeline::sink::Sink;
 /// The longest that a film is taken up without a look at the orders.
 const PATIENCE: Duration = Duration::from_millis(4);
 
-/// What is shown, and where.
+/// The screen's preview: what it shows, and where it goes.
 #[derive(Clone, Copy)]
 pub(in crate::pipeline) struct Screen<'a> {
     /// None: nothing is shown.
@@ -70,7 +70,7 @@ impl Screen<'_> {
         }
     }
 
-    /// The picture's own pixels, if they are asked for.
+    /// Shows the image's own pixels, if the front end wants them.
     fn say_section(&self, canvas: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
         let quantity = self.plan.settings.view.quantity();
@@ -93,8 +93,9 @@ impl Screen<'_> {
         self.sink.preview(develop(image, tone), range, section);
     }
 
-    /// Numbers are stretched by the range of the picture that is written, as pixels of a preview are means of distances and nothing;
-    /// where that has pixels without samples, or is large and there is no time, by the range of the preview.
+    /// Tone mapping of a preview. Numbers are stretched by the range of the image that is written, since pixels of a preview
+    /// average over gaps. An image with pixels without samples, or a large one while there is no time, is stretched by the range
+    /// of the preview.
     fn tone(&self, canvas: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Pixels that are looked through in a few milliseconds.
         const QUICK: usize = 1 << 18;

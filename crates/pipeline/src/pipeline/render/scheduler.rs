@@ -1,4 +1,4 @@
-//! The schedule of a render: first picture, first pass, later passes, and rounds where there is a budget of time.
+//! The schedule of a render: first picture, first pass, later passes, and rounds if there is a budget of time.
 
 use std::cell::Cell;
 use std::ops::Range;
@@ -33,13 +33,13 @@ const PREVIEW_SHARE: u32 = 10;
 pub(in crate::pipeline) struct Rendering<'a> {
     pub(in crate::pipeline) tracer: Tracer<'a>,
     pub(in crate::pipeline) plan: &'a Plan,
-    /// Where photons are gathered: those of the scene.
+    /// The scene's photons, if it gathers any.
     pub(in crate::pipeline) photons: Option<&'a PhotonStore>,
     pub(in crate::pipeline) preview: Option<PreviewSize>,
     pub(in crate::pipeline) most_film_bytes: u64,
     /// Start from an empty film whatever is kept.
     pub(in crate::pipeline) force: bool,
-    /// What gets its samples before the rest.
+    /// The section that gets its samples first.
     pub(in crate::pipeline) first: Option<Section>,
     pub(in crate::pipeline) sink: &'a Sink,
     /// Called often with the film as it is, for orders that come during the render; and whether every pixel of it
@@ -93,7 +93,7 @@ impl<'a> Scheduler<'a> {
         }
     }
 
-    /// Brings the film to what is asked for.
+    /// Brings the film to the requested samples or error.
     ///
     /// # Errors
     /// Cancelled. The film keeps what it has.
@@ -186,8 +186,8 @@ impl<'a> Scheduler<'a> {
         Ok(maps)
     }
 
-    /// Samples that the halves of each cell are to have next, where there is a budget of time: some where they lower the error most.
-    /// Photons cost as much for the samples of one cell as for those of all, and an error asked for tells by itself where samples go.
+    /// Next samples of each half of each cell, under a budget of time: more where they lower the error most. `None` with photons,
+    /// which cost as much for one cell as for all, and with a noise threshold, which places samples by itself.
     fn next_round(&self) -> Option<Vec<[u32; 2]>> {
         let Rendering { plan, photons, .. } = *self.rendering;
         let Render { samples, error, .. } = plan.settings.render;
@@ -241,7 +241,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// What is due between two tiles.
+    /// Does all that is due between two tiles: progress, previews, orders, the budget of time.
     fn tick(&mut self) {
         let now = Instant::now();
         if now >= self.next_progress {
@@ -280,7 +280,7 @@ impl<'a> Scheduler<'a> {
         FirstPictures { tracer, plan, is_moved, rate }
     }
 
-    /// First pictures with one sample, where they are much less work than one pass.
+    /// Traces first pictures with one sample a pixel, if they are much less work than one pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let Some(shown) = self.screen.size() else { return Ok(()) };
         let coarse = self.first_pictures();

@@ -17,7 +17,7 @@ use crate::pipeline::sink::Sink;
 use crate::pipeline::targets::guarded;
 use crate::world::World;
 
-/// What a request came to.
+/// Results of a request.
 pub(in crate::pipeline) struct Finished<'a> {
     pub(in crate::pipeline) scene: &'a Path,
     pub(in crate::pipeline) plan: &'a Plan,
@@ -132,19 +132,19 @@ fn counters(finished: &Finished<'_>) -> Counters {
     }
 }
 
-/// Highest resident memory of the process so far; 0 where it cannot be told.
+/// Highest resident memory of the process so far; 0 if the system does not tell it.
 fn peak_memory_bytes() -> u64 {
     peak_of_program().unwrap_or_else(peak_of_process)
 }
 
-/// Of this program alone, where the system tells it (proc_pid_status(5)).
+/// Highest resident memory of this program alone, if the system tells it (proc_pid_status(5)).
 fn peak_of_program() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix("kB")?;
     Some(kibibytes.trim().parse::<u64>().ok()? * 1024)
 }
 
-/// With what the process took before it became this program: whoever calls glimt may have taken much.
+/// Highest resident memory with that of the process before it became this program: the caller of glimt may have used much.
 fn peak_of_process() -> u64 {
     use nix::sys::resource::{UsageWho, getrusage};
     // Bytes on macOS, kibibytes elsewhere (getrusage(2)).

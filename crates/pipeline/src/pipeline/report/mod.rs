@@ -24,7 +24,7 @@ pub struct Report {
     pub photons: Option<PhotonsReport>,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
-    /// What was done.
+    /// Counters of the work.
     pub counters: Counters,
     /// Wall-clock time of the request.
     pub seconds: f64,
@@ -50,10 +50,10 @@ pub struct ImageReport {
     pub error: Option<f64>,
     /// Seconds that it was rendered for: by this request, and by those before that it goes on from.
     pub render_seconds: f64,
-    /// Whether every pixel got the samples that were asked for.
+    /// Whether every pixel got the requested samples.
     pub complete: bool,
-    /// Of a view that is stretched to what is seen: the numbers at both ends. In `depth` the least, which is white, and the greatest
-    /// distance; in others 0 and the greatest number, which is white.
+    /// Numbers at both ends of a view that is stretched to its range. `depth`: the least distance, which is white, and the
+    /// greatest. Others: 0, and the greatest number, which is white.
     pub range: Option<[f32; 2]>,
 }
 
@@ -71,9 +71,9 @@ pub struct SampleCounts {
 /// The lights of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct LightsReport {
-    /// How many; a mesh counts for each of its emitting materials.
+    /// Number of lights; a mesh counts for each of its emitting materials.
     pub count: u64,
-    /// How many of them a surface samples where light falls on it.
+    /// Lights that each vertex samples.
     pub sampled: LightsSampled,
     /// Lights that a vertex picks: 32 × `shadow_samples` in whitted, 4 × in path; 0 without a tree.
     pub picks: u64,
@@ -90,7 +90,7 @@ pub struct PhotonsReport {
     pub passes: u64,
     /// Photons that were sent.
     pub emitted: u64,
-    /// Photons of them that were stored.
+    /// Photons that were stored.
     pub stored: u64,
     /// Texture look-ups on their ways.
     #[serde(skip)]
@@ -109,17 +109,17 @@ pub struct PhotonsReport {
     pub used_memory_bytes: u64,
 }
 
-/// How many lights a surface samples.
+/// Selection of lights at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LightsSampled {
     /// All of them.
     All,
-    /// Some that it picks, by what they are expected to bring.
+    /// Some lights that it picks by their expected contribution.
     Picked,
 }
 
-/// What a request did, counted.
+/// Counts of the work of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
     /// Triangles over all mesh instances and single triangles.
@@ -142,7 +142,7 @@ pub struct Counters {
     pub photons_stored: u64,
     /// Texels read from files.
     pub texels_loaded: u64,
-    /// Bytes held by images, with the levels of those that have them.
+    /// Bytes held by images and their mipmap levels.
     pub texture_memory_bytes: u64,
     /// Texture look-ups.
     pub texture_lookups: u64,

@@ -45,7 +45,7 @@ impl Stop {
     }
 }
 
-/// What a stage made, and how.
+/// Result of a stage, and how it came about.
 #[derive(Debug)]
 pub(super) struct Staged<T> {
     pub(super) value: T,
@@ -67,7 +67,7 @@ impl<T> Staged<T> {
     }
 }
 
-/// What stages that read files share.
+/// Inputs shared by stages that read files.
 pub(super) struct Reading<'a> {
     pub(super) sink: &'a Sink,
     pub(super) token: &'a CancelToken,
@@ -75,7 +75,7 @@ pub(super) struct Reading<'a> {
     pub(super) pool: &'a ThreadPool,
 }
 
-/// What a request found out about files on its way.
+/// Findings of a request about files, errors and warnings.
 #[derive(Debug)]
 pub(super) struct Findings {
     /// Before anything was read.
@@ -178,7 +178,7 @@ pub(super) fn loaded_and_kept<T>(value: T, counts: Counts) -> Staged<T> {
     Staged::done(value, parts.join(", "))
 }
 
-/// What became of the files of a stage.
+/// Counts of a stage's files.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
     pub(super) loaded: usize,

@@ -14,7 +14,7 @@ use crate::pipeline::render::scheduler::{Rendering, Scheduler};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 
-/// Bring the film of this key to what is asked for.
+/// Brings the film of this key to the requested samples or error.
 ///
 /// # Errors
 /// Cancelled; no memory for the film. The film keeps what it has.

@@ -29,7 +29,7 @@ pub use shape::{Lowered, Mesh, Object, Shape};
 pub struct Scene {
     /// The `[render]` table.
     pub render: Render,
-    /// Where the picture goes, if the scene says so, resolved against the scene's folder.
+    /// Output file, if the scene names one, resolved against the scene's folder.
     pub output: Option<PathBuf>,
     /// The `[camera]` table.
     pub camera: Camera,

@@ -99,8 +99,8 @@ macro_rules! __render_keys {
 /// `render_keys!(callback)` passes all of them on, `render_keys!(callback, changed)` those with `option` or `live`,
 /// `render_keys!(callback, option)` those with an option.
 ///
-/// To add a key: a line here, [`Render::add_to`](Fingerprinted::add_to), which says whether pictures depend on it, a line of the
-/// starter scene, and where it has an option its help in the command line's arguments. Tests compare these.
+/// To add a key: a line here; [`Render::add_to`](Fingerprinted::add_to), which says whether pictures depend on it; a line of the
+/// starter scene; and the help of its option, if it has one, in the command line's arguments. Tests compare these.
 #[doc(inline)]
 pub use __render_keys as render_keys;
 
@@ -208,7 +208,7 @@ choice! {
 }
 
 choice! {
-    /// How shadows are made.
+    /// Methods for shadows.
     pub enum Shadows {
         /// Nothing stops light.
         Off = "off",
@@ -242,7 +242,7 @@ impl Render {
     }
 }
 
-/// What the samples of a picture depend on.
+/// Key of the settings that samples depend on.
 impl Fingerprinted for Render {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self {

@@ -11,13 +11,13 @@ use crate::math::{DVec3, Vec3};
 
 /// The materials of a file.
 pub(super) struct Materials {
-    /// What they are called.
+    /// Names of the materials.
     pub(super) names: Names,
     /// In the order of the names; none if one of them is wrong.
     pub(super) list: Option<Vec<Material>>,
-    /// Which of them emit light.
+    /// Whether each material emits light.
     emissive: Vec<bool>,
-    /// Which of them are of glass.
+    /// Whether each material is glass.
     glass: Vec<bool>,
 }
 
@@ -46,7 +46,7 @@ pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
 }
 
 choice! {
-    /// What a material does.
+    /// Types of materials.
     enum Kind {
         /// Diffuse and glossy.
         Phong = "phong",

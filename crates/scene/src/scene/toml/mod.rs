@@ -17,8 +17,8 @@
 //! | most memory at once, beside the text | 192 MB | 2.67 GB |
 //! | errors in `tests/broken` | | the same messages and places, but no place where dotted keys are too deep |
 //!
-//! So the library stays what tests compare this tree with: both have the grammar of `toml_parser`, and therefore its errors. A
-//! scene of that size is a use that counts: its file would take more memory than the spheres that are rendered.
+//! So the library stays the reference of tests: both have the grammar of `toml_parser`, and therefore its errors. Scenes of that
+//! size are in use, and the library's tree would take more memory than the spheres that are rendered.
 
 mod assembly;
 mod brackets;
@@ -40,7 +40,7 @@ pub(super) use tree::{Document, Entries, Item, KeyValue, Value};
 /// Arrays and tables may lie in each other this deep, and dotted keys have at most this many parts.
 const DEEPEST: u32 = 80;
 
-/// A byte order mark, which may begin a text and is no part of it.
+/// A byte order mark, which may begin a text and does not belong to it.
 const MARK: &str = "\u{feff}";
 
 /// Whether a text is one value with a key that leads into a table, and nothing else.

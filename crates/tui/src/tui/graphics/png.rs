@@ -2,7 +2,7 @@
 
 use crate::film::Picture;
 
-/// The picture as PNG, quickly; empty where that is not possible.
+/// The picture as PNG, encoded quickly; empty if that fails.
 pub(super) fn png(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, picture.width, picture.height);

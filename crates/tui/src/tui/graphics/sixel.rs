@@ -54,7 +54,7 @@ pub(super) fn encode(
 /// Six rows: for each colour its sixels.
 struct Band {
     width: usize,
-    /// Of all registers, one after the other.
+    /// Sixels of all registers, one register after the other.
     sixels: Vec<u8>,
     is_used: [bool; REGISTERS],
 }

@@ -1,4 +1,4 @@
-//! What comes from the terminal: keys, pasted text, and the terminal's answers.
+//! Input from the terminal: keys, pasted text, and the terminal's answers.
 //!
 //! One thread polls the terminal and reads whatever is there, so that nothing waits for the next byte. [`Decoder`]
 //! turns bytes into [`Input`], and is the one place that knows how keys are encoded.
@@ -61,7 +61,7 @@ fn was_held() -> bool {
     was_held
 }
 
-/// What the next bytes mean, or that there are none for as long as the decoder waits; none: the terminal is gone.
+/// Input of the next bytes; empty if there are none while the decoder waits. `None` if the terminal is gone.
 fn next(decoder: &mut Decoder) -> Option<Vec<Input>> {
     let mut bytes = [0; 4096];
     let waited = wait(decoder.deadline());

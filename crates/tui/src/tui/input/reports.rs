@@ -1,4 +1,4 @@
-//! What a terminal reports in strings: its name, its colours, what it can do.
+//! Reports of a terminal in strings: its name, its colours, its abilities.
 
 use crate::tui::known::Answer;
 use crate::tui::known::Blocks;

@@ -1,6 +1,6 @@
 //! The precision that a picture is drawn with.
 
-/// How near to the picture the cells have to come.
+/// Precision with which cells show the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fidelity {
     /// The first picture of a request, to be refined soon: at most 12 bytes a cell.

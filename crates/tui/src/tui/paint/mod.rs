@@ -55,12 +55,12 @@ pub struct Painter {
     memory: Memory,
     wanted: Wanted,
     budget: Budget,
-    /// What is still to be looked at, in order.
+    /// Parts still to be looked at, in order.
     parts: vec::IntoIter<Part>,
-    /// What is being drawn.
+    /// The part that is being drawn.
     part: Option<Part>,
     strokes: vec::IntoIter<Stroke>,
-    /// How far the picture is in each row.
+    /// Progress of the picture in each row.
     rows: Vec<Progress>,
     aim: u64,
 }
@@ -74,7 +74,7 @@ enum Part {
     Picture(u16),
 }
 
-/// How far the picture is in a row.
+/// Progress of the picture in a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct Progress {
     /// The number of the last aim that it was drawn for.
@@ -150,8 +150,8 @@ impl Painter {
         self.slice_until(most_bytes, || false)
     }
 
-    /// The same, and what there is once `is_late` says so, which is asked before each row: a picture takes longer to
-    /// be planned than a key may wait.
+    /// The next slice; if `is_late` says so, only the bytes so far. It is asked before each row: to plan a picture takes longer
+    /// than a key may wait.
     pub fn slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = Slice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {

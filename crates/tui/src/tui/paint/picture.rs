@@ -13,12 +13,12 @@ use super::wanted::Wanted;
 const FIRST_BYTES: u32 = 12;
 /// Bytes at the begin of a row that the search does not count: modifiers of words that are turned off.
 const ROW_BYTES: u32 = 4;
-/// How much dearer bytes become from one try to the next.
+/// Ratio of the price of a byte from one try to the next.
 const STEP: f32 = 1.6;
 /// A byte dearer than this buys nothing.
 const DEAREST: f32 = 4000.0;
 
-/// What is left for the rows of a first picture.
+/// Bytes left for the rows of a first picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Budget {
     bytes: u32,
@@ -51,7 +51,7 @@ impl Budget {
     }
 }
 
-/// What is to be drawn of the picture in a row.
+/// Plans the strokes of the picture in a row.
 pub(super) fn plan(
     screen: &Screen,
     wanted: &Wanted,

@@ -1,9 +1,8 @@
-//! What a byte is worth in error.
+//! The price of a byte in error.
 
 use super::shade::Shade;
 
-/// How bytes are weighed against error. The error of a half of a cell is the sum of the squared differences of its
-/// channels.
+/// Weights of bytes against error. The error of a half of a cell is the sum of the squared differences of its channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Taste {
     /// Error that a byte may save.

@@ -24,7 +24,7 @@ pub(super) struct Target {
     pub(super) shown: Option<Mosaic>,
 }
 
-/// Where a row begins.
+/// Pen and cursor at the beginning of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     pub(super) fg: Shade,
@@ -53,7 +53,7 @@ struct Way {
     bytes: u32,
     /// Bytes and errors.
     cost: f32,
-    /// Of the ways to the cell before.
+    /// Index among the ways to the cell before.
     parent: usize,
     /// None: the cell was left.
     glyph: Option<Glyph>,
@@ -90,14 +90,14 @@ impl Gap {
     }
 }
 
-/// What is drawn in a row.
+/// Strokes of a row.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub(super) dabs: Vec<Dab>,
     pub(super) bytes: u32,
 }
 
-/// What leads through the row at the least cost.
+/// The way through the row at the least cost.
 pub(super) fn row(targets: &[Target], start: Start, taste: Taste) -> Row {
     let gap = if start.is_there { Gap::Cells(0) } else { Gap::Far };
     let Start { fg, bg, .. } = start;
@@ -179,18 +179,18 @@ impl Beam {
 #[derive(Clone, Copy)]
 struct Change {
     shade: Shade,
-    /// Of the parameters of SGR.
+    /// Bytes of the SGR parameters.
     bytes: u32,
     /// In the first and the second part.
     errors: [f32; 2],
 }
 
-/// What may be drawn at a cell.
+/// Changes that may be drawn at a cell.
 struct Changes {
     mosaic: Mosaic,
     taste: Taste,
     all: Vec<Change>,
-    /// So many of them are for the first part, and up to here for the second one.
+    /// Number of changes of the first part; those of the second part follow.
     first: usize,
     second: usize,
 }
@@ -264,13 +264,13 @@ struct End<'a> {
     parent: usize,
     /// With those that lead to the cell.
     bytes: u32,
-    /// Of the cells before.
+    /// Error of the cells before.
     error: f32,
     /// The price of a byte.
     byte: f32,
     tile: Tile,
     beam: &'a mut Beam,
-    /// Of the beam.
+    /// Bound of the beam.
     bound: f32,
 }
 

@@ -16,7 +16,7 @@ pub(in crate::tui) struct DisplayState {
     pub shades: Shades,
     /// The terminal's 16 colours.
     pub ansi: Ansi,
-    /// Questions that the terminal was asked.
+    /// Questions to the terminal.
     pub ask: Ask,
     /// Whether the terminal's background is light.
     pub is_light: bool,

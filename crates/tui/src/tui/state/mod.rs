@@ -35,7 +35,7 @@ pub(super) struct Setup {
     pub is_light: bool,
     /// Likely values of the 16 colours.
     pub ansi: Ansi,
-    /// Questions that the terminal is asked.
+    /// Questions to the terminal.
     pub ask: Ask,
 }
 

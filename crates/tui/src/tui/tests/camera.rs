@@ -1,4 +1,4 @@
-//! Keys on the camera: what is asked for, how often, and what is said.
+//! Tests of keys on the camera: which pictures they request, how often, and the messages.
 
 use super::{BLUE, RED};
 use crate::pipeline::protocol::{self, Writing};

@@ -1,4 +1,4 @@
-//! What a person sees while a picture is rendered, on a quick terminal and at the end of a thin line, in told time.
+//! Tests of the screen during a render, on a quick terminal and on a slow line, with simulated time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -21,7 +21,7 @@ use crate::tui::preview_kind::PreviewKind;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
-/// Of the render, and of pixels in the end.
+/// Seconds of the render.
 const SECONDS: f64 = 10.0;
 const SAMPLES: f64 = 256.0;
 /// Between two pictures of the worker, and between two of its words.
@@ -48,7 +48,7 @@ struct Terminal {
     answers: VecDeque<(Instant, Answer)>,
     cells: vt100::Parser,
     pixels: PixelScreen,
-    /// What came, and how many bytes were sent.
+    /// Bytes that came, and their number.
     bytes: Vec<u8>,
     sent: usize,
     /// Bytes in the line or unanswered, and the most of them.
@@ -185,7 +185,7 @@ impl Watch {
         self.go_on(end, true);
     }
 
-    /// A key on the camera is held for so long: the worker has a first picture of each step soon after it was asked for.
+    /// Holds a key on the camera for so long: the worker has a first picture of each step soon after its request.
     fn orbit(&mut self, time: Duration) {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
@@ -205,7 +205,7 @@ impl Watch {
                 key += REPEAT;
                 self.desk.press('l');
             }
-            // A step that waited is asked for when the one before has its picture.
+            // A step that waited is requested when the step before has its picture.
             if self.desk.state.request.generation > last {
                 (asked, last) = (Some(self.desk.now), self.desk.state.request.generation);
             }
@@ -244,7 +244,7 @@ impl Watch {
         }
     }
 
-    /// What has happened by now.
+    /// Events by now.
     fn events(&mut self, is_at_work: bool) {
         let now = self.desk.now;
         self.terminal.pass(now);

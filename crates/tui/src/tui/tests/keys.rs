@@ -1,4 +1,4 @@
-//! What each key does, and that the help says so.
+//! Tests of the effect of each key, and that the help tells it.
 
 use super::{BLUE, RED, cells_of};
 use crate::choice::Choice;
@@ -27,7 +27,7 @@ fn every_key_has_its_effect() {
     }
 }
 
-/// Where a key puts the camera.
+/// The pose that a key gives to the camera.
 fn moved(effects: &[Effect]) -> Pose {
     request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
@@ -274,7 +274,7 @@ fn a_message_stands_under_the_picture_until_the_next_key_and_the_keys_stay() {
     desk.press('?');
     desk.press('?');
     assert!(!desk.text().contains("the keys have changed nothing"));
-    // Where there is no line for it, it takes the place of the keys, and of the name where there are none either.
+    // Without a line of its own it takes the place of the keys, and without those the place of the name.
     for rows in [12, 5] {
         desk.event(Event::Resize(window(60, rows)));
         desk.press('0');

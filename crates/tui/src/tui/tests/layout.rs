@@ -1,4 +1,4 @@
-//! What of the screen is the picture, and that nothing jumps.
+//! Tests of the layout: the picture's part of the screen, and that nothing jumps.
 
 use super::{RED, cells_of};
 use crate::pipeline::protocol::{self, Command, PreviewSize, Stage, Status};
@@ -22,7 +22,7 @@ fn previewed(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
     (side(size.0, most.width), side(size.1, most.height))
 }
 
-/// The settings of a scene of this size, and its picture as it was asked for.
+/// The settings of a scene of this size, and its picture at the requested size.
 fn rendered(desk: &mut Desk, (width, height): (u32, u32)) {
     let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
@@ -228,7 +228,7 @@ fn the_folded_line_names_no_file_of_another_picture() {
     );
     desk.press('l');
     finish(&mut desk);
-    // A key that does nothing more takes away what was said of the move.
+    // A key without another effect clears the message about the move.
     desk.press('?');
     desk.press('?');
     let text = desk.text();

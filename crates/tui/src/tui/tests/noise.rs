@@ -1,4 +1,4 @@
-//! What is said of the noise.
+//! Tests of the words about noise.
 
 use super::RED;
 use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};

@@ -1,4 +1,4 @@
-//! What lies over the picture: the help, the list of views, the errors.
+//! Tests of overlays: the help, the list of views, the errors.
 
 use crossterm::event::KeyCode;
 
@@ -10,7 +10,7 @@ use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 
-/// How many views there are.
+/// Number of views.
 const VIEWS: u16 = <View as crate::choice::Choice>::ALL.len() as u16;
 
 const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);

@@ -1,4 +1,4 @@
-//! The mouse, what it asks for, what is said of the answers; and the editor's places.
+//! Tests of the mouse: its requests, and the words for the answers; and the editor's places.
 
 use crossterm::event::KeyCode;
 

@@ -1,4 +1,4 @@
-//! What is on the screen.
+//! Tests of the screen.
 
 use std::time::Duration;
 

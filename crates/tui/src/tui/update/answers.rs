@@ -1,4 +1,4 @@
-//! What the terminal says of itself.
+//! Answers of the terminal about itself.
 
 use super::request::resized_preview;
 use crate::tui::color::{ColorDepth, Shades};
@@ -9,7 +9,7 @@ use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::State;
 use crate::tui::view::ramp;
 
-/// Shows things as the terminal can from now on, where it was asked.
+/// Shows everything as well as the terminal can from now on, if the answer belongs to a question.
 pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
     match answer {
         Answer::Blocks(blocks) if state.display.ask.blocks => return draw_in(state, blocks),

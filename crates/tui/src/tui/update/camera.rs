@@ -1,5 +1,5 @@
-//! Keys and the mouse on the camera. Steps come faster than pictures: a step waits until the one before has its first picture, and
-//! only the newest of those that wait is rendered.
+//! Keys and the mouse on the camera. Steps come faster than pictures: a step waits until the one before has its first picture,
+//! and glimt renders only the newest step that waits.
 
 use super::request::render;
 use super::say::{say, told};
@@ -13,28 +13,28 @@ use crate::tui::state::State;
 
 /// Degrees of a step around.
 const TURN: f64 = 3.0;
-/// What a step brings the eye nearer by.
+/// Factor of the eye's distance for a step nearer.
 const NEARER: f64 = 0.95;
-/// What a step widens the field of view by.
+/// Factor of the field of view for a step wider.
 const WIDER: f64 = 1.05;
-/// How far from where it began a field of view may be for all that it is back, as each step is rounded; no step is as small.
+/// Greatest difference from the first field of view that counts as none, since each step is rounded; every step is larger.
 const ROUNDING: f64 = 0.015;
 /// Stops of a step of exposure.
 const STOPS: f32 = 0.25;
 /// The most that keys expose, and darken.
 const MOST_STOPS: f32 = 20.0;
 
-/// So many steps to the right and up.
+/// Turns by so many steps to the right and up.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     turn(state, right * TURN, up * TURN)
 }
 
-/// So many degrees to the right and up.
+/// Turns by so many degrees to the right and up.
 pub(super) fn turn(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     moved(state, |pose| orbited(pose, right, up))
 }
 
-/// So many steps nearer.
+/// Moves so many steps nearer.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera) else {
         return unknown(state);
@@ -47,7 +47,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     moved(state, |_| pose)
 }
 
-/// So many steps wider.
+/// Widens the field of view by so many steps.
 pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return unknown(state) };
     let fov = zoomed(&view, libm::pow(WIDER, steps));
@@ -58,7 +58,7 @@ pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     step_of_camera(state)
 }
 
-/// So many steps brighter.
+/// Brightens by so many steps.
 pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
     let Some(scene) = state.request.exposure else { return unknown(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
@@ -97,7 +97,7 @@ pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
     effects
 }
 
-/// What is as the scene has it is no change.
+/// Drops changes back to the scene's own values.
 fn forget_own(state: &mut State) {
     let Some(own) = state.request.camera else { return };
     let camera = &mut state.request.toggles.camera;
@@ -117,7 +117,7 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     vec![Effect::Send(Command::KeepCamera(view))]
 }
 
-/// What came of that. A camera that the file gives now is no longer one of the keys.
+/// Tells the outcome of keeping the camera. A camera that the file has now does not count as moved by keys.
 pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
     let Kept { path, is_new, is_own } = match outcome {
         Ok(kept) => kept,

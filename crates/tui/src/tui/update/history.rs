@@ -19,7 +19,7 @@ pub(super) fn record(state: &mut State) {
     }
 }
 
-/// So many pictures back; negative: forth.
+/// Goes so many pictures back; negative: forward.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record(state);
     let Some(newest) = newest(state) else { return told(state, "there is no picture yet") };

@@ -1,4 +1,4 @@
-//! What a key does to the state.
+//! Effects of keys on the state.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 

@@ -27,7 +27,7 @@ use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::Command;
 
-/// The window must keep its size for this long before another preview is asked for.
+/// Time that the window must keep its size before glimt requests another preview.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
 /// The first request.
@@ -67,7 +67,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             show(state, Shown { generation, picture, range, section, lacks_photons })
         }
         Event::Changed(Changed { noticed }) => {
-            // It may be glimt's own save, or the one that kept it from its own: what was said of that stays.
+            // It may be glimt's own save, or one that kept glimt from its own: the message about that stays.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));

@@ -1,4 +1,4 @@
-//! What a key does to what lies over the picture: the help, the list of views, the errors.
+//! Effects of keys on overlays: the help, the list of views, the errors.
 
 use crossterm::event::KeyCode;
 
@@ -47,7 +47,8 @@ fn chosen(state: &State, key: KeyPress) -> Option<View> {
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
-/// What was opened last: over all else, then what waits for a click or a drag, then what was said of a place, then an older picture.
+/// Closes the topmost overlay: first those over all else, then waiting for a click or a drag, then facts about a place, then an
+/// older picture.
 fn close(state: &mut State) -> bool {
     let is_open = if state.overlays.help.open {
         state.overlays.help.open = false;

@@ -1,4 +1,4 @@
-//! Where the editor is led to.
+//! The place that the editor opens.
 
 use crate::scene::diagnostic::{Diagnostic, Place};
 use crate::tui::event::FilePlace;
@@ -12,7 +12,7 @@ pub(super) fn to_edit(state: &State) -> FilePlace {
     errors.or_else(|| state.selection.picked.clone()).or_else(warnings).unwrap_or_else(scene)
 }
 
-/// The place of a diagnostic, where that is in a file.
+/// The place of a diagnostic, if it is in a file.
 fn in_file(diagnostic: &Diagnostic) -> Option<FilePlace> {
     let Place { source, span, .. } = diagnostic.place.as_ref()?;
     let before = source.get(..span.start)?;

@@ -1,4 +1,4 @@
-//! The mouse on the picture, and what is asked of a place there.
+//! The mouse on the picture, and questions about a place there.
 
 use super::say::{say, told};
 use super::{camera, overlay, rectangle};
@@ -17,7 +17,7 @@ const TURN_ACROSS: f64 = 180.0;
 
 const IN_FOCUS: &str = "everything is in focus: the scene's camera has no `aperture`";
 
-/// What the mouse did.
+/// Reacts to the mouse.
 pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     match mouse.kind {
         MouseKind::Press => {
@@ -81,7 +81,7 @@ fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     ask(state, purpose)
 }
 
-/// What is at the crosshair?
+/// Asks for the object at the crosshair.
 pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
     ask(state, PickPurpose::Inspect)
 }

@@ -40,7 +40,7 @@ pub(super) fn drag(state: &mut State, from: Spot, to: Spot) {
     state.dirty = true;
 }
 
-/// The hand let go: what it marked, else what is around the place.
+/// Ends a drag: takes the marked rectangle, else one around the place.
 pub(super) fn release(state: &mut State, spot: Option<Spot>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
         (Some(marked), _) => take(state, marked),

@@ -49,7 +49,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     effects
 }
 
-/// The same picture at another size where the window has another one than was asked for; what is rendered goes on.
+/// Requests the same picture at another size, if the window changed; the render goes on.
 pub(super) fn resized_preview(state: &mut State) -> Vec<Effect> {
     let size = Layout::preview_size(state);
     if size == state.request.preview_size || size.is_none() {

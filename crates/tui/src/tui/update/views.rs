@@ -11,7 +11,7 @@ use crate::tui::keymap::Overlay;
 use crate::tui::state::State;
 use crate::tui::view::views::rows;
 
-/// What a key of the tables does to the list; `None` if it is closed, or covered by the help.
+/// Effect of a bound key on the list. `None` if the list is closed, or covered by the help.
 pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> {
     if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
@@ -40,7 +40,7 @@ pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> 
     Some(choose(state, View::ALL[chosen]))
 }
 
-/// What a key types while a name is looked for; `None` if none is.
+/// Effect of a key while a name is typed. `None` if none is.
 pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT);

@@ -1,4 +1,4 @@
-//! What the worker's events do to the state. Those of older generations do nothing, but for what they say of files.
+//! Effects of the worker's events on the state. Events of older generations do nothing, except for those about files.
 
 use std::path::PathBuf;
 
@@ -156,7 +156,7 @@ fn note(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     state.saving.written.push(Written { path, bytes, generation, made });
 }
 
-/// What the files of a request hold that has ended, if it wrote its picture at the end.
+/// Describes the files of a finished request, if it wrote its picture at the end.
 fn describe(state: &mut State, generation: u64, report: &Report) {
     if report.image.path.is_some() {
         for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
@@ -165,7 +165,7 @@ fn describe(state: &mut State, generation: u64, report: &Report) {
     }
 }
 
-/// What is new is shown at once; what a person has seen and closed stays closed.
+/// Shows new conflicts at once; a pane that a person has closed stays closed.
 fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.saving.is_write_requested = false;
     state.saving.unwritten = Some("not written: e says why".to_owned());
@@ -224,7 +224,7 @@ fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
     state.overlays.are_warnings_known = true;
 }
 
-/// What is wrong with a file that may be half written is not said until that stays so.
+/// Holds back errors in a file that may be half written until they persist.
 fn failed(state: &mut State, failure: Failure) {
     state.set_paused(false);
     state.work.assets.clear();
@@ -239,7 +239,7 @@ fn failed(state: &mut State, failure: Failure) {
     }
 }
 
-/// What a person has seen and closed stays closed.
+/// Shows new problems; a pane that a person has closed stays closed.
 fn broken(state: &mut State, problems: Problems) {
     state.work.activity = Activity::Broken;
     if state.overlays.problems.as_ref() != Some(&problems) {

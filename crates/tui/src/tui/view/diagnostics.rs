@@ -83,7 +83,7 @@ fn text(state: &State, area: Rect) -> Vec<Line> {
     text
 }
 
-/// Errors first; a fault that is in several places is told once, with all of them.
+/// Lines of the diagnostics, errors first; a fault in several places appears once, with all of them.
 fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
     let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();

@@ -96,7 +96,7 @@ fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     put(buffer, area, &pieces, state.display.depth);
 }
 
-/// What is seen, where it is not the picture itself, and what it is stretched to.
+/// The view, unless it is beauty, and its range.
 fn view(state: &State) -> String {
     if state.request.view() == View::Beauty {
         return String::new();
@@ -123,7 +123,7 @@ fn close_up(state: &State) -> String {
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
-/// How far it is, or what came of it; in full and in short.
+/// Progress or result, in full and in short.
 fn figures(state: &State) -> Vec<String> {
     if let Some((number, count, time)) = state.picture.history.place() {
         let place = format!("{number} of {count}");
@@ -162,7 +162,7 @@ pub(super) fn at_work(state: &State) -> Option<&'static str> {
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }
 
-/// How many errors there are, and warnings where there are some.
+/// Number of errors, and of warnings if there are any.
 pub(super) fn errors(state: &State) -> String {
     let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();

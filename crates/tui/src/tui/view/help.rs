@@ -9,7 +9,7 @@ use super::text::{Tone, columns, put, row, wrapped};
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 use crate::tui::state::State;
 
-/// What else is on the screen.
+/// Notes about the rest of the screen.
 const NOTES: &[(&str, &str)] = &[
     ("saved → seen", "from a save to the first changed cell"),
     ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
@@ -50,10 +50,10 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     }
 }
 
-/// Columns beside the labels and what is said of them.
+/// Columns beside the labels and their texts.
 const BESIDE: u16 = 3;
 
-/// Columns of the labels where there are so many in all.
+/// Columns of the labels, if the help has `width`.
 fn labels(width: u16) -> u16 {
     const LEAST: u16 = 9;
     widest(|(label, _)| label).min(LEAST.max(width / 3))

@@ -14,7 +14,7 @@ use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
 use crate::tui::state::{Activity, State, Toggles, ViewList};
 
-/// A key, and what is said of it in full and in short.
+/// A key with its description, in full and in short.
 struct Hint {
     key: &'static str,
     words: String,
@@ -43,7 +43,7 @@ impl Hint {
 
 /// Between two of them.
 const GAP: u16 = 2;
-/// Columns that are kept for what is of use now, before the toggles are said in full.
+/// Columns kept for the hints of use now, before the toggles appear in full.
 const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -127,7 +127,7 @@ fn toggles(state: &State) -> Vec<Hint> {
     all.into_iter().filter_map(hint).collect()
 }
 
-/// What is of use now: what is urgent, and what else is.
+/// Hints of use now: the urgent ones, and the others.
 fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     let overlay = |wanted: &[Overlay]| -> Vec<Hint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
@@ -181,7 +181,7 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
-    // It is told above with what it takes back.
+    // Another hint has it above, with what it takes back.
     let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
     let others =
@@ -189,7 +189,7 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     (urgent, first.into_iter().chain(others).collect())
 }
 
-/// How a view is chosen from the list, or what was typed of its name.
+/// Keys of the list of views, or the letters typed of a name.
 fn of_views(views: &ViewList) -> Vec<Hint> {
     match &views.name {
         Some(name) => vec![Hint { tone: Tone::Strong, ..Hint::new("/", format!("{name}▏")) }],

@@ -1,4 +1,4 @@
-//! Where things are on the screen: the picture first.
+//! The layout of the screen: the picture first.
 //!
 //! The places follow from the window, the shape of the picture and `tab` alone, never from what is going on: nothing
 //! jumps while a render runs.
@@ -21,7 +21,7 @@ pub(in crate::tui) struct Layout {
     pub under: Rect,
     /// The line of keys.
     pub keys: Rect,
-    /// Where errors lie: beside the picture, else over its lower part.
+    /// Area of the errors: beside the picture, else over its lower part.
     pub pane: Rect,
 }
 
@@ -37,7 +37,7 @@ const SIDE_WIDTH: u16 = 23;
 pub(super) const ENTRY_WIDTH: u16 = 26;
 /// A panel at the side has room for half of the stages at least.
 const SIDE_HEIGHT: u16 = 4;
-/// The part of its cells that the picture keeps beside a panel; where it is less there is none.
+/// Least share of its cells that the picture keeps beside a panel; with less there is no panel.
 const KEPT: f32 = 0.9;
 /// A panel from one of these sizes on holds errors as well: what is narrow has to be high.
 const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
@@ -65,7 +65,7 @@ impl Layout {
         })
     }
 
-    /// `shape`: columns of the picture over its rows; none: no picture is shown.
+    /// `shape`: columns of the picture over its rows. `None` if no picture is shown.
     fn new(columns: u16, rows: u16, shape: Option<f32>, is_alone: bool) -> Self {
         let mut layout = Self::default();
         let mut rest = Rect::new(0, 0, columns, rows);

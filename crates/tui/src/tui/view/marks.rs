@@ -1,4 +1,4 @@
-//! Marks over the picture: the crosshair while a place is asked for, and the corners of what is rendered first.
+//! Marks over the picture: the crosshair while a place is to be chosen, and the corners of the section that is rendered first.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

@@ -1,5 +1,5 @@
-//! What was said last, until the next key: in the line under the picture, or where there is none in the last line, or in the first;
-//! what is longer goes on over the picture.
+//! The last message, until the next key: in the line under the picture, without one in the last line, or in the first. Longer
+//! messages go on over the picture.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

@@ -68,7 +68,7 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
     lines
 }
 
-/// What was found at a place.
+/// Facts about a place.
 fn inspected(state: &State, width: u16) -> Vec<Line> {
     let facts = state.selection.facts.iter().filter(|_| message::is_in_panel(&Layout::of(state))).flatten();
     let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
@@ -99,7 +99,7 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
     vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// What came out: a label and a value in each line.
+/// Results: a label and a value in each line.
 fn results(state: &State) -> Vec<Line> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];

@@ -55,7 +55,7 @@ pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Sp
     cells.contains((column, row).into()).then(spot)
 }
 
-/// What is drawn where the picture has to be in cells.
+/// Kind of preview when the picture has to be in cells.
 fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
         PreviewKind::Pixels(_) => PreviewKind::of(PreviewChoice::Auto, depth),
@@ -72,7 +72,7 @@ fn is_in_pixels(state: &State) -> bool {
         && !message::is_over_picture(state)
 }
 
-/// Where the picture is drawn in pixels; none: it is drawn in cells.
+/// Placement of the picture in pixels. `None` if it is drawn in cells.
 pub(in crate::tui) fn placement(state: &State, area: Rect) -> Option<Placement> {
     let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
     let placed = Placed::of(state, shown, area, state.display.kind);
@@ -80,7 +80,7 @@ pub(in crate::tui) fn placement(state: &State, area: Rect) -> Option<Placement> 
     (!cells.is_empty()).then_some(Placement { picture, cells, cell: state.display.window.cell_pixels })
 }
 
-/// What colours are shown by.
+/// Colours that show a picture.
 #[derive(Clone, Copy)]
 pub(in crate::tui) struct Inks<'a> {
     pub(in crate::tui) depth: ColorDepth,
@@ -115,7 +115,7 @@ pub(in crate::tui) fn shown_by(
     buffer
 }
 
-/// The columns and rows that a picture takes in half blocks or in characters, of those that there are.
+/// Columns and rows of a picture in half blocks or in characters, within those available.
 pub(in crate::tui) fn size_in_cells(
     picture: &Picture,
     depth: ColorDepth,
@@ -128,7 +128,7 @@ pub(in crate::tui) fn size_in_cells(
     (cells.width, cells.height)
 }
 
-/// Where a picture lies: its cells, and how many pixels it has there.
+/// Placement of a picture: its cells, and its pixels there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Placed {
     cells: Rect,
@@ -137,7 +137,7 @@ struct Placed {
 }
 
 impl Placed {
-    /// Where the state's picture is drawn: as large as there is room for, or pixel by pixel.
+    /// Placement of the state's picture: as large as there is room for, or pixel by pixel.
     fn of(state: &State, shown: &Shown, area: Rect, kind: PreviewKind) -> Self {
         let across = kind.grid().map_or(1, Grid::columns);
         let one_to_one = across as f32 / state.display.pixels_across() as f32;

@@ -13,7 +13,7 @@ const SMALL: f64 = 0.02;
 /// Fewer columns of a reason say nothing.
 const LEAST_WHY: u16 = 12;
 
-/// Sign, name, time, how much that changed, and why: where there is no room beside them, in lines of its own.
+/// Sign, name, time, its change, and the reason; in lines of its own if there is no room beside them.
 pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<Line> {
     let mut line = figures(state, stage, room);
     let why = why(state, stage);
@@ -53,7 +53,7 @@ fn why(state: &State, stage: Stage) -> String {
     visible(report.map_or("", |report| report.why.as_str())).into_owned()
 }
 
-/// Sign, name, time, and how much that changed where there is room.
+/// Sign, name, time, and its change if there is room.
 fn figures(state: &State, stage: Stage, room: u16) -> Line {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.work.is_running();
@@ -118,7 +118,7 @@ pub(super) fn in_one_line(state: &State) -> Line {
     line
 }
 
-/// How much of an asset is loaded.
+/// Loaded fraction of an asset.
 pub(super) fn fraction(asset: &AssetBar) -> f64 {
     let progress = &asset.progress;
     if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }

@@ -47,13 +47,13 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// How far the last good scene is, which is rendered on while the file is broken.
+/// Progress of the last good scene, whose render goes on while the file is broken.
 pub(in crate::tui) fn goes_on(state: &State) -> Option<&RenderProgress> {
     let is_broken = matches!(state.work.activity, Activity::Broken | Activity::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
-/// Of the loading asset or of the render.
+/// Draws the bar of the loading asset or of the render.
 fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
     let time = state.work.running_for(state.now).map_or(String::new(), running);
@@ -94,7 +94,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
     [next.unwrap_or_else(|| now.clone()), now]
 }
 
-/// The stages in one line, and what else is to be told where it is not in the panel.
+/// Draws the stages in one line, and the other facts that the panel does not show.
 fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
     let mut pieces = stages::in_one_line(state);
@@ -138,7 +138,7 @@ pub(super) fn files(state: &State) -> impl Iterator<Item = &Written> {
         .filter(|written| state.request.is_written() || written.generation == state.request.generation)
 }
 
-/// Whether the picture at hand is one that is written when it is asked for, and was not.
+/// Whether the current picture is one that only a key writes, and that no key has written.
 pub(super) fn is_in_no_file(state: &State) -> bool {
     !state.request.is_written() && files(state).next().is_none()
 }
@@ -148,7 +148,7 @@ pub(super) fn seen(state: &State) -> Option<String> {
     state.saving.first_change.map(|time| format!("saved → seen {}", duration(time)))
 }
 
-/// What somebody who has not saved yet may not know.
+/// A hint for a person who has not saved yet.
 pub(super) fn hint(state: &State) -> String {
     if state.saving.edits > 0 {
         return String::new();
@@ -158,7 +158,7 @@ pub(super) fn hint(state: &State) -> String {
     format!("save {} and it is rendered again", visible(&name))
 }
 
-/// What the last picture took on its way: its size, and how long the terminal takes to answer; in full and in short.
+/// Cost of the last picture on its way: its size, and the terminal's time to answer; in full and in short.
 fn frame(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let size = format!("{} kB", frame.bytes.div_ceil(1000));

@@ -1,4 +1,4 @@
-//! The list of views, for a moment after one was chosen: in the panel where that has room, else over the picture.
+//! The list of views, for a moment after one was chosen: in the panel if that has room, else over the picture.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

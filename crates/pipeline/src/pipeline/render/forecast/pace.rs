@@ -13,28 +13,28 @@ pub(in crate::pipeline) struct Pace {
     measured: (f64, f64),
 }
 
-/// How far work is.
+/// Work done and to come.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::pipeline) struct Work {
     pub(in crate::pipeline) done: f64,
     /// In all; none where nobody knows.
     pub(in crate::pipeline) total: Option<f64>,
-    /// Seconds at something else that is no part of it, so far and to come.
+    /// Seconds spent beside the work, so far and to come.
     pub(in crate::pipeline) aside: [f64; 2],
 }
 
 impl Pace {
-    /// So much was done before the clock started.
+    /// Pace of work of which a part was done before the clock started.
     pub(in crate::pipeline) fn new(done: f64) -> Self {
         Self { fraction: 0.0, rate: None, measured: (0.0, done) }
     }
 
-    /// Work a second, once that can be told.
+    /// Work a second, once it is known.
     pub(in crate::pipeline) fn rate(&self) -> Option<f64> {
         self.rate
     }
 
-    /// The fraction done, never falling, and the seconds to go once they can be told.
+    /// The fraction done, which never falls, and the seconds to go, once they are known.
     pub(in crate::pipeline) fn at(&mut self, seconds: f64, work: Work) -> (f64, Option<f64>) {
         let Work { done, total, aside: [aside, aside_to_come] } = work;
         let seconds = seconds - aside;
@@ -62,7 +62,7 @@ impl Pace {
 mod tests {
     use super::*;
 
-    /// So much of so much work, and nothing aside.
+    /// Work of which a part is done, with no time spent beside it.
     fn of(done: f64, total: f64) -> Work {
         Work { done, total: Some(total), aside: [0.0; 2] }
     }

@@ -3,8 +3,8 @@
 use crate::film::{CELLS, Convergence, samples_by};
 use crate::pipeline::render::noise_goals::{AIM, Goals, Judgement, LEAST, MOST, TileNoise};
 
-/// How many times smaller the variance gets from two to four samples and from four to eight, where nothing tells it: of half of the tiles
-/// of the bundled scenes more, of the others less.
+/// Fall of the variance from two to four samples and from four to eight, if nothing is known. In the bundled scenes half of the
+/// tiles fall faster, half slower.
 const EARLY_FALL: f64 = 4.0;
 /// Between which it is believed.
 const FALLS: [f64; 2] = [2.0, 8.0];
@@ -29,8 +29,8 @@ impl ExpectedSamples {
         size_of_val(self.0.as_slice())
     }
 
-    /// Predicts from a judgement, whose samples are a power of two: by the noise of both halves of a tile, and by how the noise fell.
-    /// `done` are the samples that all halves have. Halves that have their goals keep what was expected.
+    /// Predicts from a judgement, whose samples are a power of two: by the noise of both halves of a tile, and by its fall.
+    /// `done` are the samples of all halves. Halves with a goal keep their prediction.
     pub(in crate::pipeline) fn predict(&mut self, judgement: &Judgement, goals: &Goals, done: &[[u32; 2]]) {
         let Judgement { noise, samples, aim } = judgement;
         // Take the tiles without goals, and how fast the noise of all of them falls.
@@ -62,22 +62,22 @@ impl ExpectedSamples {
     }
 }
 
-/// How noise is expected to fall from some samples on. What is smooth falls fast, and is below any bound soon: what is left of it then
-/// is noise that falls as that of edges and penumbras, or slower.
+/// Expected fall of noise from some samples on. Smooth parts fall fast and are below any bound soon. The rest falls as noise at
+/// edges and in penumbras does, or slower.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct NoiseFall {
     samples: u32,
     /// Doublings of these by each of which the variance falls by `fall`; after them it falls with `power`.
     doublings: u32,
-    /// How many times smaller the variance of the tiles got by the last doubling; none below [`LEAST`] samples, where the own fall of
-    /// each tile is taken.
+    /// Ratio of the tiles' variances before and after the last doubling. `None` below [`LEAST`] samples, where each tile's own
+    /// fall counts.
     fall: Option<f64>,
     /// The power of the samples with which variance falls later.
     power: f64,
 }
 
 impl NoiseFall {
-    /// By how many times smaller the variances of tiles got by their last doubling.
+    /// The law that fits the tiles' ratios of variance before and after their last doubling.
     fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
         if convergence == Convergence::Photons {
