@@ -42,7 +42,7 @@ pub(super) struct Amount {
 }
 
 impl Amount {
-    /// As good as the time allows, but not better than the most samples need.
+    /// The best quality that the time allows, but no better than the most samples need.
     pub(super) fn in_time(seconds: f64, most: Option<u32>) -> Self {
         let samples = most.map_or(NO_END, |most| most.saturating_mul(MORE).min(NO_END));
         Self { samples, seconds: Some(seconds) }

@@ -149,7 +149,7 @@ pub struct RenderArgs {
     #[arg(long = "set", value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
-    /// Where the picture goes; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
+    /// Write the picture to this file; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
     /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
     #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
@@ -278,7 +278,7 @@ choice! {
     pub enum Pictures {
         /// On a terminal of 30 columns or more.
         Auto = "auto",
-        /// For 80 columns where there is no terminal.
+        /// Always; for 80 columns if there is no terminal.
         On = "on",
         /// Never.
         Off = "off",

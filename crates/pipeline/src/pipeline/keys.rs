@@ -8,17 +8,17 @@ use crate::scene::description::{Accel, Camera, Render, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
 /// Textures, meshes and orbiter that descriptions refer to by index.
-pub(super) fn referents<'a>(scene: &'a Scene, meshes: &'a [Key], orbiter: Option<&'a str>) -> Referents<'a> {
+pub(in crate::pipeline) fn referents<'a>(scene: &'a Scene, meshes: &'a [Key], orbiter: Option<&'a str>) -> Referents<'a> {
     Referents { textures: &scene.textures, meshes, orbiter }
 }
 
 /// Key of a mesh's tree.
-pub(super) fn tree(mesh: &Key, accel: Accel) -> Key {
+pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
     Fingerprint::new("tree").key(mesh).choice(accel).finish()
 }
 
 /// Key of all geometry in trees.
-pub(super) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
+pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
     in_trees(&from(&shapes(scene, of), origin), scene.render.accel)
 }
 
@@ -28,7 +28,7 @@ fn from(of: &Key, origin: DVec3) -> Key {
 }
 
 /// Key of geometry in trees of a kind.
-pub(super) fn in_trees(of: &Key, accel: Accel) -> Key {
+pub(in crate::pipeline) fn in_trees(of: &Key, accel: Accel) -> Key {
     Fingerprint::new("in trees").key(of).choice(accel).finish()
 }
 
@@ -40,9 +40,9 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Key of the lights, of their places and of the objects that emit. `sky` is the map of the environment, `patterns` are the
-/// images that lamps may have on them.
-pub(super) fn lights(
+/// What gives light, where it is, and which objects it is. `sky` is the map of the environment, `patterns` are the images that
+/// lamps may have on them.
+pub(in crate::pipeline) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
     origin: DVec3,
@@ -81,12 +81,12 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
 }
 
 /// Everything that a world is made of but the kind of its trees, which all have the same hits: views that show the trees add it.
-pub(super) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
+pub(in crate::pipeline) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
     Fingerprint::new("world").key(surfaces).add(camera, of).finish()
 }
 
 /// Everything that photons depend on: what they meet, in coordinates that start somewhere, how they are sent and how far they go.
-pub(super) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
+pub(in crate::pipeline) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
     let PhotonSettings { count, radius, bounces } = photons;
     let mut key = Fingerprint::new("photons");
     key.key(&from(surfaces, origin)).u64(count.into()).f32(radius).u64(bounces.into());
@@ -94,7 +94,7 @@ pub(super) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: P
 }
 
 /// Everything that light meets.
-pub(super) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
+pub(in crate::pipeline) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
     let mut key = Fingerprint::new("surfaces");
     key.key(&shapes(scene, of)).key(&described_lights(scene, of));
     for object in &scene.objects {
@@ -110,7 +110,7 @@ pub(super) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> K
 }
 
 /// Everything that a film's sums depend on, apart from the number of samples.
-pub(super) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
+pub(in crate::pipeline) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
     let mut key = Fingerprint::new("render");
     key.key(&world).add(settings, &Referents::default());
     if let Some(rect) = crop {

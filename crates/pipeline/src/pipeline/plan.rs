@@ -86,7 +86,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
 /// Photons that a pass may send: what it stores must have room.
 pub(super) const MOST_PHOTONS: u64 = 4_000_000;
 
-/// Settings by which photons are sent and gathered.
+/// How photons are sent and gathered.
 fn photons(asked: &Photons) -> PhotonSettings {
     let Photons { enabled: _, count, radius, bounces } = *asked;
     PhotonSettings { count: count.clamp(1, MOST_PHOTONS) as u32, radius: radius as f32, bounces }

@@ -12,7 +12,7 @@ pub use crate::pipeline::watch::{Changed, News};
 choice! {
     /// Choice of how the preview is drawn.
     pub enum PreviewChoice {
-        /// The finest blocks that the terminal is known to have where there is colour, characters elsewhere.
+        /// The finest blocks that the terminal is known to have if it has colours, else characters.
         Auto = "auto",
         /// Two pixels a cell.
         HalfBlock = "halfblock",

@@ -12,10 +12,10 @@ use super::editor;
 use super::environment::{ask, way};
 use super::event::FilePlace;
 use super::event::{Effect, Event, Source};
+use super::exit_summary;
 use super::graphics::Images;
 use super::input;
 use super::options::{Ended, ExitStatus, Options, TuiError};
-use super::parting;
 use super::presenter::Presenter;
 use super::preview_kind::PreviewKind;
 use super::signals::{self, Listener};
@@ -152,7 +152,8 @@ impl Ui {
             }
             None => ExitStatus::QUIT,
         };
-        let (summary, is_unwritten) = (parting::words(&self.state), self.state.saving.write_failed.is_some());
+        let (summary, is_unwritten) =
+            (exit_summary::words(&self.state), self.state.saving.write_failed.is_some());
         Ok(Ended { status, is_write_unanswered: self.state.saving.is_write_requested, summary, is_unwritten })
     }
 

@@ -185,7 +185,7 @@ impl<'a> Key<'a> {
         self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
     }
 
-    /// As many numbers as the array has room for; reports every wrong one.
+    /// Numbers of an array of that length; reports every wrong one.
     fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.array().filter(|array| array.len() == N) else {

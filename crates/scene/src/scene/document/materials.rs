@@ -17,7 +17,7 @@ pub(super) struct Materials {
     pub(super) list: Option<Vec<Material>>,
     /// Whether each material emits light.
     emissive: Vec<bool>,
-    /// Whether each material is glass.
+    /// Which of them are of glass.
     glass: Vec<bool>,
 }
 

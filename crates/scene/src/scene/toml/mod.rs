@@ -17,7 +17,7 @@
 //! | most memory at once, beside the text | 192 MB | 2.67 GB |
 //! | errors in `tests/broken` | | the same messages and places, but no place where dotted keys are too deep |
 //!
-//! So the library stays the reference of tests: both have the grammar of `toml_parser`, and therefore its errors. Scenes of that
+//! The library stays the reference of tests: both have the grammar of `toml_parser`, and therefore its errors. Scenes of that
 //! size are in use, and the library's tree would take more memory than the spheres that are rendered.
 
 mod assembly;

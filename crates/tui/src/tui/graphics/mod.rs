@@ -69,7 +69,7 @@ pub(super) struct Images {
     /// Whether what is shown was made coarser than the picture, to be shorter.
     is_coarse: bool,
     pieces: VecDeque<Vec<u8>>,
-    /// Which of kitty's two images is shown: they take turns, so that one goes when the next is there.
+    /// Whether kitty's second image is shown: the two take turns, so that one goes when the next is there.
     turn: bool,
     /// Palette of the last sixels.
     palette: Option<Palette>,

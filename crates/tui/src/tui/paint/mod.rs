@@ -11,21 +11,21 @@
 //! [`advise`] tells which pictures are worth being aimed at on a line of some speed.
 
 mod abilities;
-mod advice;
 mod candidates;
+mod cost_model;
 mod fidelity;
+mod frame_pacing;
 mod lines;
 mod look;
 mod memory;
 mod moves;
 mod pen;
 mod picture;
+mod row_optimizer;
 mod screen;
 mod shade;
-mod taste;
 #[cfg(test)]
 mod tests;
-mod trellis;
 mod wanted;
 mod words;
 
@@ -35,8 +35,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 pub use self::abilities::can_repeat;
-pub use self::advice::{Advice, Moment, advise};
 pub use self::fidelity::Fidelity;
+pub use self::frame_pacing::{Advice, Moment, advise};
 pub use self::lines::in_lines;
 use self::memory::Memory;
 use self::picture::Budget;

@@ -1,12 +1,12 @@
 //! The terminal: its window, its colours, and the means by which pictures are shown.
 
-use super::super::color::{Ansi, ColorDepth, Shades};
-use super::super::event::{FrameReport, Window};
-use super::super::graphics::Protocol;
-use super::super::known::Ask;
-use super::super::mosaic::Grid;
-use super::super::preview_kind::PreviewKind;
 use super::Setup;
+use crate::tui::color::{Ansi, ColorDepth, Shades};
+use crate::tui::event::{FrameReport, Window};
+use crate::tui::graphics::Protocol;
+use crate::tui::known::Ask;
+use crate::tui::mosaic::Grid;
+use crate::tui::preview_kind::PreviewKind;
 
 /// The terminal as far as it is known.
 pub(in crate::tui) struct DisplayState {

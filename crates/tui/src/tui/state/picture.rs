@@ -1,7 +1,7 @@
 //! The picture on the screen, and the pictures before it.
 
-use super::super::history::{History, Shown};
 use crate::pipeline::protocol::Spot;
+use crate::tui::history::{History, Shown};
 
 /// The picture on the screen, and how it is looked at.
 #[derive(Default)]

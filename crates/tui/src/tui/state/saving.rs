@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::event::{Unwritten, Written};
+use crate::tui::event::{Unwritten, Written};
 
 /// A save on its way to the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! The mouse, and the place of the picture that is picked.
 
-use super::super::event::FilePlace;
 use crate::pipeline::protocol::Spot;
+use crate::tui::event::FilePlace;
 
 /// A press of the left button on the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]

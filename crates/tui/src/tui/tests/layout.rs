@@ -249,7 +249,7 @@ fn hints_wrap_at_the_width_of_the_panel() {
         let settings = Box::new(Effective { width, height: 480, ..settings() });
         desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
         let panel = Layout::of(&desk.state).panel;
-        let hint = "save cornell.toml and it is rendered again";
+        let hint = "save cornell.toml to render again";
         assert_eq!(
             desk.text().contains(hint),
             usize::from(panel.width) >= hint.len(),

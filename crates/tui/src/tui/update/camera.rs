@@ -2,7 +2,7 @@
 //! and glimt renders only the newest step that waits.
 
 use super::request::render;
-use super::say::{say, told};
+use super::say::{notify, say};
 use crate::pipeline::protocol::{Command, Kept};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
@@ -42,7 +42,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
     if pose == view.pose {
         let (end, part) = if steps > 0.0 { ("near", "a thousandth of") } else { ("far", "1000 times") };
-        return told(state, &format!("this is as {end} as keys go: {part} the scene's own distance"));
+        return notify(state, &format!("this is as {end} as keys go: {part} the scene's own distance"));
     }
     moved(state, |_| pose)
 }
@@ -52,7 +52,7 @@ pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return unknown(state) };
     let fov = zoomed(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
-        return told(state, &format!("field of view {fov}°: keys go from 1° to 160°"));
+        return notify(state, &format!("field of view {fov}°: keys go from 1° to 160°"));
     }
     state.request.toggles.camera.fov = Some(fov);
     step_of_camera(state)
@@ -65,7 +65,7 @@ pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
     if stops == before {
-        return told(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
+        return notify(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = step(state);
@@ -80,7 +80,7 @@ fn moved(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
 }
 
 fn unknown(state: &mut State) -> Vec<Effect> {
-    told(state, "the scene has not been read yet")
+    notify(state, "the scene has not been read yet")
 }
 
 pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
@@ -112,7 +112,7 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return unknown(state) };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     if !state.request.toggles.camera.is_any() && !is_set {
-        return told(state, "the camera is where the scene has it: there is nothing to write");
+        return notify(state, "the camera is where the scene has it: there is nothing to write");
     }
     vec![Effect::Send(Command::KeepCamera(view))]
 }
@@ -123,7 +123,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            return told(state, &format!("error: {}", visible(&why)));
+            return notify(state, &format!("error: {}", visible(&why)));
         }
     };
     let name = visible(&path.to_string_lossy()).into_owned();

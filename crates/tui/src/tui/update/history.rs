@@ -1,6 +1,6 @@
 //! Pictures of before: the last ones, older and newer, and the one from before the last edit.
 
-use super::say::{say, told};
+use super::say::{notify, say};
 use crate::tui::event::Effect;
 use crate::tui::history::ago;
 use crate::tui::state::State;
@@ -22,13 +22,13 @@ pub(super) fn record(state: &mut State) {
 /// Goes so many pictures back; negative: forward.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record(state);
-    let Some(newest) = newest(state) else { return told(state, "there is no picture yet") };
+    let Some(newest) = newest(state) else { return notify(state, "there is no picture yet") };
     if state.picture.history.leads_to_newest(steps) {
         return close(state, NEWEST);
     }
     match state.picture.history.step(steps, newest) {
         Some(shown) => look_at(state, shown),
-        None => told(state, if steps > 0 { "this is the oldest picture that is kept" } else { NEWEST }),
+        None => notify(state, if steps > 0 { "this is the oldest picture that is kept" } else { NEWEST }),
     }
 }
 
@@ -38,7 +38,7 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
         return close(state, "after the last edit: the newest picture");
     }
     record(state);
-    let Some(newest) = newest(state) else { return told(state, "there is no picture yet") };
+    let Some(newest) = newest(state) else { return notify(state, "there is no picture yet") };
     match state.picture.history.before_edit(newest) {
         Some(shown) => {
             let effects = look_at(state, shown);
@@ -46,7 +46,7 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
             say(state, format!("before the last edit{edit}; b is after it"));
             effects
         }
-        None => told(state, "there is no picture from before an edit"),
+        None => notify(state, "there is no picture from before an edit"),
     }
 }
 

@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::request::{render, resized_preview};
-use super::say::{say, told};
+use super::say::{notify, say};
 use super::views::choose_view;
 use super::{camera, history, overlay, places, pointer, rectangle};
 use crate::choice::Choice;
@@ -25,7 +25,7 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
         return if is_digit {
-            told(state, "v lists the views; a digit chooses one of the list")
+            notify(state, "v lists the views; a digit chooses one of the list")
         } else {
             Vec::new()
         };
@@ -99,7 +99,7 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     match state.request.integrator() {
         Integrator::Path => {
-            return told(state, "path ignores `shadows`: its light is what it is; i is whitted");
+            return notify(state, "path ignores `shadows`; press i for whitted");
         }
         Integrator::Whitted => {}
     }
@@ -116,9 +116,9 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.overrides().dof == Some(false);
     match &state.request.effective {
-        None => return told(state, "the scene has not been read yet"),
+        None => return notify(state, "the scene has not been read yet"),
         Some(effective) if !effective.dof && !switched_off => {
-            return told(state, "no depth of field: the scene's camera has no `aperture`");
+            return notify(state, "no depth of field: the scene's camera has no `aperture`");
         }
         Some(_) => {}
     }
@@ -129,7 +129,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
     match state.request.integrator() {
         Integrator::Path => {
-            return told(state, "path gathers no photons; press i for whitted");
+            return notify(state, "path gathers no photons; press i for whitted");
         }
         Integrator::Whitted => {}
     }
@@ -144,7 +144,7 @@ fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
 
 fn picture_alone(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
-        PreviewKind::None => return told(state, "no picture is shown: see --preview"),
+        PreviewKind::None => return notify(state, "no picture is shown: see --preview"),
         PreviewKind::HalfBlock
         | PreviewKind::Quadrant
         | PreviewKind::Sextant
@@ -160,13 +160,13 @@ fn picture_alone(state: &mut State) -> Vec<Effect> {
 /// The picture's own pixels around the crosshair, or all of it again.
 fn close_up(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
-        return told(state, "no picture is shown: see --preview");
+        return notify(state, "no picture is shown: see --preview");
     }
     history::close(state, "");
     state.picture.close_up =
         if state.picture.close_up.is_some() { None } else { Some(state.selection.crosshair) };
     match state.picture.close_up {
-        Some(_) => say(state, "1:1: the picture's own pixels around the crosshair; x is back"),
+        Some(_) => say(state, "1:1: the picture's own pixels around the crosshair; x goes back"),
         None => state.overlays.message = None,
     }
     state.dirty = true;
@@ -175,7 +175,7 @@ fn close_up(state: &mut State) -> Vec<Effect> {
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
     if !state.work.is_running() && !state.work.paused {
-        return told(state, "nothing is rendering");
+        return notify(state, "nothing is rendering");
     }
     state.set_paused(!state.work.paused);
     state.dirty = true;
@@ -190,7 +190,7 @@ fn write_now(state: &mut State) -> Vec<Effect> {
 
 fn scene_settings(state: &mut State) -> Vec<Effect> {
     if state.request.toggles == Toggles::default() {
-        return told(state, "the keys have changed nothing");
+        return notify(state, "the keys have changed nothing");
     }
     state.request.toggles = Toggles::default();
     let effects = render(state, false);
@@ -201,7 +201,7 @@ fn scene_settings(state: &mut State) -> Vec<Effect> {
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
     if state.overlays.problems.is_none() && state.overlays.warnings.is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_running();
-        return told(
+        return notify(
             state,
             if is_read { "no errors and no warnings" } else { "the files are still being read" },
         );

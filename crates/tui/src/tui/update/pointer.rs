@@ -1,6 +1,6 @@
 //! The mouse on the picture, and questions about a place there.
 
-use super::say::{say, told};
+use super::say::{notify, say};
 use super::{camera, overlay, rectangle};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
@@ -90,11 +90,11 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 pub(super) fn focus(state: &mut State) -> Vec<Effect> {
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
-        return told(state, IN_FOCUS);
+        return notify(state, IN_FOCUS);
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
-        return told(
+        return notify(
             state,
             "click where to focus; f again focuses at the crosshair: the last click, else the middle",
         );
@@ -105,7 +105,7 @@ pub(super) fn focus(state: &mut State) -> Vec<Effect> {
 
 fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
     if state.request.camera.is_none() {
-        return told(state, "the scene has not been read yet");
+        return notify(state, "the scene has not been read yet");
     }
     state.selection.purpose = purpose;
     vec![Effect::Send(Command::Pick(state.selection.crosshair))]
@@ -137,7 +137,7 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
             state.dirty = true;
             Vec::new()
         }
-        (PickPurpose::Focus, None) => told(state, "there is nothing to focus on"),
+        (PickPurpose::Focus, None) => notify(state, "there is nothing to focus on"),
         (PickPurpose::Focus, Some(thing)) => focus_at(state, thing.depth),
     }
 }
@@ -145,11 +145,11 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
 fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     let distance = rounded(depth, step_at(depth));
     if !(distance > 0.0) {
-        return told(state, "there is nothing to focus on");
+        return notify(state, "there is nothing to focus on");
     }
     // The scene may have been edited since.
     if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return told(state, IN_FOCUS);
+        return notify(state, IN_FOCUS);
     }
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::step_of_camera(state);

@@ -1,7 +1,7 @@
 //! A rectangle of the picture that is rendered before the rest.
 
 use super::request::render;
-use super::say::{say, told};
+use super::say::{notify, say};
 use crate::pipeline::protocol::{Section, Spot};
 use crate::tui::event::Effect;
 use crate::tui::state::State;
@@ -14,12 +14,12 @@ pub(super) fn press(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
         let effects = again(state);
-        say(state, "no part of the picture comes first any more");
+        say(state, "no rectangle is rendered first any more");
         return effects;
     }
     if state.selection.is_mouse_on && !state.selection.is_marking {
         state.selection.is_marking = true;
-        return told(
+        return notify(
             state,
             "drag a rectangle: it is rendered first; z again takes what is around the crosshair",
         );

@@ -10,7 +10,7 @@ pub(super) fn say(state: &mut State, message: impl Into<String>) {
 }
 
 /// Shows a message; no effect follows.
-pub(super) fn told(state: &mut State, message: &str) -> Vec<Effect> {
+pub(super) fn notify(state: &mut State, message: &str) -> Vec<Effect> {
     say(state, message);
     Vec::new()
 }

@@ -9,7 +9,7 @@ use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, Stage, St
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Unwritten, Written};
-use crate::tui::parting;
+use crate::tui::exit_summary;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
@@ -148,8 +148,8 @@ fn wrote(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
 /// A picture is in a file. Its render may go on; a report that is there already is of this picture.
 fn note(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     let made = match &state.work.report {
-        Some(report) => parting::made(report),
-        None if generation == state.request.generation => parting::view(state.request.view()),
+        Some(report) => exit_summary::made(report),
+        None if generation == state.request.generation => exit_summary::view(state.request.view()),
         None => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);
@@ -160,7 +160,7 @@ fn note(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
 fn describe(state: &mut State, generation: u64, report: &Report) {
     if report.image.path.is_some() {
         for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
-            written.made = parting::made(report);
+            written.made = exit_summary::made(report);
         }
     }
 }

@@ -32,7 +32,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         Activity::Done => summary(state, layout, buffer),
         Activity::Waiting | Activity::Cancelled => {}
         Activity::Broken if let Some(progress) = goes_on(state) => {
-            let words = format!("the last good scene is rendered on: {} %", percent(progress.fraction));
+            let words = format!("the last good scene goes on: {} %", percent(progress.fraction));
             put(buffer, area, &[(&words, Tone::Faint)], state.display.depth);
         }
         Activity::Broken if state.picture.shown.is_some() => {
@@ -155,7 +155,7 @@ pub(super) fn hint(state: &State) -> String {
     }
     let name =
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    format!("save {} and it is rendered again", visible(&name))
+    format!("save {} to render again", visible(&name))
 }
 
 /// Cost of the last picture on its way: its size, and the terminal's time to answer; in full and in short.

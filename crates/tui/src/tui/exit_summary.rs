@@ -14,8 +14,7 @@ pub(super) fn words(state: &State) -> String {
         Some(failed) => unwritten(state, failed),
         None => files(&state.saving.written) + &since(state),
     };
-    let not_kept =
-        if state.request.toggles.camera.is_any() { "; the camera was moved and is not kept" } else { "" };
+    let not_kept = if state.request.toggles.camera.is_any() { "; camera changes discarded" } else { "" };
     files + not_kept
 }
 
@@ -125,7 +124,7 @@ mod tests {
         desk.worker(done(begun, Vec::new(), false));
         desk.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&desk.state), format!("{made}; the camera was moved and is not kept"));
+        assert_eq!(words(&desk.state), format!("{made}; camera changes discarded"));
         assert!(desk.text().contains("unwritten: w writes it"), "of the one at hand: {}", desk.text());
     }
 
@@ -182,7 +181,7 @@ mod tests {
             desk.finish([30, 30, 200]);
             let after = words(&desk.state);
             assert!(after.starts_with(&format!("{made}; that was before the last save")), "{key}: {after}");
-            assert_eq!(after.contains("the camera was moved and is not kept"), key == 'l', "{after}");
+            assert_eq!(after.contains("camera changes discarded"), key == 'l', "{after}");
             // A save that changes nothing does not make it newer.
             desk.event(crate::tui::event::Event::Changed(Changed { noticed: desk.now }));
             let generation = desk.state.request.generation;
