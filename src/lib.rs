@@ -49,8 +49,8 @@
 //!
 //! ## The arrows
 //!
-//! Each room uses the rooms on its right and no others; `tests/suite/house.rs` reads the sources and holds them to
-//! this table, and the table to them.
+//! Each room uses the rooms on its right and no others; `tests/suite/house` reads the sources and holds them to
+//! this table, and the table to them. Within a room files import in one direction too, but for the pairs listed there.
 //!
 //! ```text
 //! system      ->

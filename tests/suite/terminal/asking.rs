@@ -138,7 +138,7 @@ fn the_rectangle_is_around_the_crosshair_without_the_mouse() {
         terminal.wait_for("the rectangle is rendered first; z ends that");
         terminal.wait("its corners", has_corners);
         terminal.press("z");
-        terminal.wait_for("no part of the picture comes first any more");
+        terminal.wait_for("no rectangle is rendered first any more");
         terminal.wait("no corners", |screen| !has_corners(screen));
     }
 }

@@ -134,7 +134,7 @@ fn each_stage_says_what_became_of_it_while_the_picture_is_rendered() {
 
     // Broken during the render, and mended by going back to the first of them.
     folder.write("scene.toml", "[render");
-    terminal.wait_for("the last good scene is rendered on");
+    terminal.wait_for("the last good scene goes on");
     folder.write("scene.toml", &own);
     let back = [kept, ("=", "textures", "reused"), ("=", "accel", "reused"), ("✓", "lights", " "), rendering];
     wait_for_stages(&terminal, &back);

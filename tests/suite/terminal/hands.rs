@@ -302,5 +302,5 @@ fn a_rectangle_is_rendered_first_and_the_picture_is_the_same() {
     terminal.wait_for_render(2);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
     terminal.press("z");
-    terminal.wait_for("no part of the picture comes first any more");
+    terminal.wait_for("no rectangle is rendered first any more");
 }

@@ -1,4 +1,4 @@
-//! What became slower or worse since an older run, and whether that is more than chance.
+//! Regressions since an older run, and whether they are more than chance.
 
 use super::results::{MethodResult, Results, Step};
 use super::statistics::{above, quantile, welch};
@@ -6,18 +6,18 @@ use super::statistics::{above, quantile, welch};
 /// The part of all comparisons without a change in which one is called a change, over the whole table.
 const FALSE_ALARMS: f64 = 0.01;
 
-/// How one quantity of a method on a scene changed.
+/// Change of one quantity of a method on a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     /// The scene.
     pub scene: String,
     /// The method.
     pub method: String,
-    /// What changed.
+    /// The quantity.
     pub quantity: Quantity,
     /// Now over then: the geometric mean over the steps.
     pub factor: f64,
-    /// Where the factor lies with 95 % confidence.
+    /// Confidence interval of the factor, 95 %.
     pub interval: [f64; 2],
     /// The probability of as large a change, either way, by chance.
     pub by_chance: f64,
@@ -25,7 +25,7 @@ pub struct Change {
     pub is_real: bool,
 }
 
-/// What is compared.
+/// Quantities that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Seconds of rendering.
@@ -90,7 +90,7 @@ fn twin<'a>(step: &Step, then: &'a [Step]) -> Option<&'a Step> {
     })
 }
 
-/// Of the logarithms, with its standard error and degrees of freedom. None, where too few have a logarithm.
+/// Difference of the mean logarithms, with its standard error and degrees of freedom. `None` if too few values have a logarithm.
 fn difference(then: &Step, now: &Step, quantity: Quantity) -> Option<(f64, f64, f64)> {
     let of = |step: &Step| -> Vec<f64> {
         let values = step.pictures.iter().map(|picture| match quantity {

@@ -1,4 +1,4 @@
-//! What many pictures by one method have in common that the references have not: its bias.
+//! Bias of a method: the error that many pictures by it share, and that the references do not have.
 //!
 //! The mean over all pairs of different seeds of (xᵢ − r₁)(xⱼ − r₂) is the square of the bias, as the noise of all four is
 //! independent. How far it is from 0 by chance is estimated from how the pairs differ, from what leaving each seed out changes,
@@ -18,7 +18,7 @@ pub const LEAST_SEEDS: usize = 3;
 /// An estimate of a bias.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bias {
-    /// Its square, as a part of relMSE; by chance below 0 where there is none.
+    /// Square of the bias, as a part of relMSE; by chance below 0 if there is none.
     pub size: f64,
     /// Its standard error.
     pub error: f64,
@@ -49,7 +49,7 @@ pub fn bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<Bi
     Some(Bias { size, error, by_chance, bound: size.max(0.0) + quantile(FALSE_ALARMS, freedom) * error })
 }
 
-/// What each two pictures have in common.
+/// Products of the errors of each two pictures.
 struct Pairs {
     count: usize,
     /// With the numbers of the two.
@@ -75,7 +75,7 @@ impl Pairs {
         sum / count
     }
 
-    /// Of the mean: without a bias the products of different pairs are uncorrelated.
+    /// Variance of the mean: without a bias the products of different pairs are uncorrelated.
     fn variance_without_bias(&self) -> f64 {
         let (mean, count) = (self.mean(), self.products.len() as f64);
         let squares: f64 =
@@ -83,7 +83,7 @@ impl Pairs {
         squares / (count - 1.0) / count
     }
 
-    /// Of the mean, by the jackknife.
+    /// Variance of the mean, by the jackknife.
     fn variance_by_leaving_out(&self) -> f64 {
         let (mean, count) = (self.mean(), self.count as f64);
         let squares = (0..self.count).map(|seed| self.mean_without(seed) - mean);

@@ -10,10 +10,10 @@ use crate::film::RadianceImage;
 use crate::math::DVec3;
 use crate::math::color::LUMINANCE_WEIGHTS;
 
-/// How much brighter pictures are than the references.
+/// Relative difference in brightness between pictures and references.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Brightness {
-    /// As a part of the mean luminance of the references.
+    /// The difference, as a part of the mean luminance of the references.
     pub value: f64,
     /// Its standard error.
     pub error: f64,
@@ -109,7 +109,7 @@ mod tests {
             let by_relmse = bias(&references, &pictures).expect("enough seeds");
             assert!(!by_relmse.is_found(), "{seed}: or this test tells nothing");
         }
-        // One percent is 4.7 standard errors here and 3.3 are asked for: 8 % are missed, 3.3 of 40, by chance up to 8.
+        // One percent is 4.7 standard errors here and the threshold is 3.3: 8 % are missed, 3.3 of 40, by chance up to 8.
         assert!(missed <= 8, "{missed}");
         // In standard errors: as often above as below, and as large as they say.
         let count = f64::from(SEEDS);

@@ -13,7 +13,7 @@ use crate::math::Vec3;
 use crate::output::{OutputError, write};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// The folder for references: below `XDG_CACHE_HOME`, else `~/.cache`. None where there is neither.
+/// The folder for references: below `XDG_CACHE_HOME`, else `~/.cache`. `None` if neither is set.
 pub fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
@@ -42,12 +42,12 @@ pub(super) struct Stored {
     pub(super) cost: Cost,
 }
 
-/// What two references cost.
+/// Cost of two references.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Cost {
     /// Samples per pixel of each, on average.
     pub(super) samples: f64,
-    /// Of both, of rendering.
+    /// Seconds of rendering, of both.
     pub(super) seconds: f64,
 }
 
@@ -60,7 +60,7 @@ struct Head {
 
 const KEY_BYTES: usize = 64;
 
-/// What is stored under a key. A file that is not whole is as good as none.
+/// References stored under a key. `None` for a missing file or one that is not whole.
 pub(super) fn load(folder: &Path, key: &Key) -> Option<Stored> {
     let bytes = fs::read(file(folder, key)).ok()?;
     let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;

@@ -31,10 +31,10 @@ struct Aim {
 /// A method on a scene.
 pub(super) struct Measure<'a> {
     pub(super) run: &'a Run<'a>,
-    /// What all pictures share with the references.
+    /// Overrides that all pictures share with the references.
     pub(super) common: &'a Overrides,
     pub(super) method: &'a Method,
-    /// What the references depend on.
+    /// Keys of the references.
     pub(super) keys: &'a Keys,
     pub(super) two: &'a TwoReferences,
     /// To which a ladder without given steps climbs.
@@ -63,7 +63,7 @@ impl Measure<'_> {
         Ok(MethodResult::new(self.method.name.clone(), setup(&first.report), steps))
     }
 
-    /// What comes after these steps, which took so many seconds each.
+    /// The next step after these, which took so many seconds each.
     fn next(&self, steps: &[Step], took: &[f64], pace: &Pace) -> Option<Aim> {
         let index = steps.len() as u32;
         match &self.run.order.steps {
@@ -139,7 +139,7 @@ impl Measure<'_> {
         self.run.begins(&what, left);
     }
 
-    /// How much longer a step takes than the one before.
+    /// Factor of a step's time over the step before.
     fn growth(&self, aim: Aim) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {

@@ -1,4 +1,4 @@
-//! Which methods a scene is rendered by.
+//! Methods that a scene is rendered by.
 
 use crate::choice::Choice;
 use crate::pipeline::settings::Overrides;
@@ -7,7 +7,7 @@ use crate::scene::description::{Accel, Integrator, Scene, Shadows};
 /// The values of each toggle that are to be measured, all with all; empty: the scene's own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Toggles {
-    /// How light is followed.
+    /// Rendering algorithms.
     pub integrators: Vec<Integrator>,
     /// Photon maps, in whitted.
     pub photons: Vec<bool>,
@@ -22,13 +22,13 @@ pub struct Toggles {
 /// One way to render a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Method {
-    /// What it is called in tables.
+    /// Name in tables.
     pub name: String,
-    /// What makes it.
+    /// Overrides that make the method.
     pub overrides: Overrides,
 }
 
-/// What a picture depends on, as the scene or the toggles say.
+/// Settings that a picture depends on, by the scene or the toggles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Way {
     integrator: Integrator,
@@ -38,7 +38,7 @@ struct Way {
     accel: Accel,
 }
 
-/// The methods of a scene. Without toggles: paths, whitted with photons, and the scene as it is where that is neither.
+/// The methods of a scene. Without toggles: paths, whitted with photons, and the scene as it is if that is another method.
 pub fn methods(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
     let ways = if *toggles == Toggles::default() { usual(scene) } else { asked(scene, toggles) };
     let mut distinct: Vec<Way> = Vec::new();
@@ -87,7 +87,7 @@ fn way(integrator: Integrator, photons: bool, shadows: Shadows, clamp: f32, acce
     Way { integrator, of_whitted, clamp, accel }
 }
 
-/// Its name has what was asked for more than one of.
+/// A method; its name tells the toggles that have several values.
 fn method(way: Way, toggles: &Toggles) -> Method {
     let mut words = vec![way.integrator.name().to_owned()];
     if let Some((photons, shadows)) = way.of_whitted {

@@ -1,4 +1,4 @@
-//! What is asked for, what is said meanwhile, and why it may not be done.
+//! Orders for a benchmark, news during it, and reasons for its failure.
 
 use std::path::PathBuf;
 
@@ -9,36 +9,36 @@ use crate::pipeline::session::Unrendered;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 
-/// What is measured.
+/// Order for a benchmark.
 #[derive(Clone, Debug, Default)]
 pub struct Order {
     /// The scenes.
     pub scenes: Vec<PathBuf>,
-    /// What holds for all pictures and references. Size, samples, seed, time and noise bound of it are not heeded.
+    /// Overrides of all pictures and references. Size, samples, seed, time and noise threshold are ignored.
     pub common: Overrides,
     /// Pixels across; with [`Self::height`] alone or none, by the scene's aspect.
     pub width: Option<u32>,
     /// Pixels down.
     pub height: Option<u32>,
-    /// What makes the methods.
+    /// Toggles that make the methods.
     pub toggles: Toggles,
-    /// How many samples, or for how long.
+    /// Steps: samples, or times.
     pub steps: Steps,
     /// Pictures of each step.
     pub seeds: u32,
     /// Seed of the first of them.
     pub seed: u32,
-    /// What the pictures are held against.
+    /// Reference of the pictures.
     pub reference: ReferenceOrder,
     /// Seconds that all of it may take, as far as the order leaves it open.
     pub within: f64,
-    /// Where references are kept; none: they are not.
+    /// Folder for references. `None` if they are not kept.
     pub cache: Option<PathBuf>,
     /// Files that will be written, which no scene may read.
     pub targets: Vec<PathBuf>,
 }
 
-/// Where along a method's line the points are.
+/// Points along a method's line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Steps {
     /// At 1, 4, 16, … samples, as long as there is time, and up to a hundredth of the samples of the references.
@@ -50,7 +50,7 @@ pub enum Steps {
     Seconds(Vec<f64>),
 }
 
-/// What the pictures are held against.
+/// Reference of the pictures.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ReferenceOrder {
     /// Paths, as many as there is time for; of a fixed number of samples a hundred times as many at most.
@@ -62,14 +62,14 @@ pub enum ReferenceOrder {
     Files([PathBuf; 2]),
 }
 
-/// What is said while it goes on.
+/// News during a benchmark.
 #[derive(Clone, Debug)]
 pub enum News {
     /// A piece of work begins.
     Begins {
-        /// What it is.
+        /// Name of the task.
         what: String,
-        /// Seconds until everything is done, as far as that can be told.
+        /// Seconds until everything is done, if known.
         left: Option<f64>,
     },
     /// A piece of work is done: a line for logs.
@@ -105,7 +105,7 @@ pub enum Trouble {
     Failed(Failure),
     /// The call is wrong, in words with the way out.
     Call(String),
-    /// It was told to stop.
+    /// A cancel token stopped the benchmark.
     Cancelled,
 }
 

@@ -1,4 +1,4 @@
-//! What may take how long, and how long it will still take.
+//! Times of a benchmark's parts, and the time left.
 
 use std::time::Instant;
 
@@ -14,10 +14,10 @@ pub(super) struct Pace {
     methods: usize,
     /// When the scene under way is to end, in seconds from the beginning.
     scene_end: f64,
-    /// What the last scene took, and when it began.
+    /// Seconds of the last scene, and the time at which it began.
     last_scene: Option<f64>,
     scene_begin: f64,
-    /// What the methods of this scene took that have ended.
+    /// Seconds of this scene's finished methods.
     done: Vec<f64>,
     method_begin: f64,
 }

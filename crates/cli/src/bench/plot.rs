@@ -8,7 +8,7 @@ use plotters::prelude::{IntoDrawingArea, SVGBackend, WHITE};
 use super::results::Results;
 use crate::output::signed;
 
-/// What every panel's axes are called, across and up.
+/// Names of every panel's axes, across and up.
 pub const AXES: [&str; 2] = ["seconds of rendering", "relMSE"];
 /// Size of a panel, in pixels of the SVG.
 const PANEL: (u32, u32) = (640, 480);

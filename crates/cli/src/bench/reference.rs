@@ -33,16 +33,16 @@ pub(super) fn most_measured(of_references: Option<f64>) -> f64 {
     most.clamp(LEAST_MEASURED, MOST_MEASURED)
 }
 
-/// How good the references are to be.
+/// Quality of the references.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Amount {
     pub(super) samples: u32,
-    /// Of both.
+    /// Seconds of both.
     pub(super) seconds: Option<f64>,
 }
 
 impl Amount {
-    /// As good as there is time for, but not better than the most samples ask for.
+    /// The best quality that the time allows, but no better than the most samples need.
     pub(super) fn in_time(seconds: f64, most: Option<u32>) -> Self {
         let samples = most.map_or(NO_END, |most| most.saturating_mul(MORE).min(NO_END));
         Self { samples, seconds: Some(seconds) }
@@ -55,7 +55,7 @@ impl Amount {
     }
 }
 
-/// The references of a scene, with what is to be said of them.
+/// The references of a scene, with remarks about them.
 pub(super) struct Reference {
     pub(super) two: TwoReferences,
     pub(super) result: ReferenceResult,
@@ -64,7 +64,7 @@ pub(super) struct Reference {
     pub(super) unkept: Option<String>,
 }
 
-/// What the two references depend on.
+/// Keys of the two references.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Keys([Key; 2]);
 
@@ -88,19 +88,19 @@ pub(super) fn given(files: &[PathBuf; 2]) -> Result<Reference, Trouble> {
     Ok(Reference { two, result, warnings: Vec::new(), unkept: None })
 }
 
-/// What makes references.
+/// Maker of references.
 pub(super) struct Maker<'a> {
     pub(super) scene: &'a Path,
-    /// Of the size.
+    /// Overrides, with the size.
     pub(super) common: &'a Overrides,
     pub(super) token: &'a CancelToken,
     pub(super) cache: Option<&'a Path>,
-    /// Their samples, where that was asked for.
+    /// Samples of the references, if the call sets them.
     pub(super) asked: Option<u32>,
 }
 
 impl Maker<'_> {
-    /// Of references of a number of samples that was asked for another one than of those that time made.
+    /// Key of the references. Those with samples that the call sets have another key than those that time made.
     fn key(&self, Keys(keys): &Keys) -> Key {
         let mut key = Fingerprint::new("references");
         key.text(env!("CARGO_PKG_VERSION")).u64(self.asked.unwrap_or(0).into());
@@ -117,13 +117,13 @@ impl Maker<'_> {
         Ok(Keys([one?, two?]))
     }
 
-    /// Those that are kept, if they are good enough.
+    /// The stored references, if they are good enough.
     pub(super) fn kept(&self, keys: &Keys, amount: Amount) -> Option<Reference> {
         let stored = cache::load(self.cache?, &self.key(keys)).filter(|stored| amount.is_met(stored.cost))?;
         Some(reference(stored, true, Vec::new(), None))
     }
 
-    /// Renders both; `begin` is told before each how many are left.
+    /// Renders both; tells `begin` before each how many are left.
     pub(super) fn make(
         &self,
         session: &mut Session,
@@ -147,7 +147,7 @@ impl Maker<'_> {
         Ok(Made { keys, stored: Stored { pair, cost }, warnings: first.warnings })
     }
 
-    /// Keeps what was made for later runs, where there is a place for it.
+    /// Stores references for later runs, if there is a folder for them.
     pub(super) fn keep(&self, made: Made) -> Reference {
         let Made { keys, stored, warnings } = made;
         let unkept = self.cache.and_then(|folder| cache::store(folder, &self.key(&keys), &stored).err());

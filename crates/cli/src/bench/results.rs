@@ -1,4 +1,4 @@
-//! What was measured: the JSON of `bench --json`, and what a baseline is read from.
+//! Results: the JSON of `bench --json`, which is also a baseline.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use super::brightness::Brightness;
 use super::slope::{Slope, TimeTo, slope, time_to};
 use super::statistics::mean;
 
-/// Errors whose times are told.
+/// Errors whose times are reported.
 pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 /// Everything that was measured.
@@ -17,7 +17,7 @@ pub struct Results {
     pub glimt: String,
     /// Threads that rendered.
     pub threads: usize,
-    /// What all of it took.
+    /// Seconds of the whole benchmark.
     pub seconds: f64,
     /// In the order of the call.
     pub scenes: Vec<SceneResult>,
@@ -32,7 +32,7 @@ pub struct SceneResult {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// What the pictures were held against.
+    /// Reference of the pictures.
     pub reference: ReferenceResult,
     /// In the order of the table.
     pub methods: Vec<MethodResult>,
@@ -43,13 +43,13 @@ pub struct SceneResult {
 pub struct ReferenceResult {
     /// Samples per pixel of each of the two; none of files.
     pub samples: Option<f64>,
-    /// relMSE of one of them, by how they differ; 0 where one file is both.
+    /// relMSE of one reference, by the difference of both; 0 if one file is both.
     pub noise: f64,
-    /// What it took to render both, now or when they were stored.
+    /// Seconds of rendering both, now or when they were stored.
     pub seconds: Option<f64>,
     /// Whether they were there from before.
     pub is_cached: bool,
-    /// The files, where they were given.
+    /// Files of the references, if the call names them.
     pub files: Vec<String>,
 }
 
@@ -62,9 +62,9 @@ pub struct MethodResult {
     pub setup_seconds: f64,
     /// In the order of their times.
     pub steps: Vec<Step>,
-    /// Of the error over the seconds, of all steps.
+    /// Slope of the error over the seconds, by all steps.
     pub slope: Option<Slope>,
-    /// Of the last two steps.
+    /// Slope of the error over the seconds, by the last two steps.
     pub last_slope: Option<Slope>,
     /// When it reaches the relMSEs that the table asks for, in their order.
     pub time_to: [Option<TimeTo>; TARGETS.len()],
@@ -87,9 +87,9 @@ pub struct Step {
     pub spread: [f64; 2],
     /// The standard error that the noise of the references gives each.
     pub uncertainty: f64,
-    /// What the pictures have in common; none of too few.
+    /// Error that the pictures share. `None` for too few pictures.
     pub bias: Option<Bias>,
-    /// How much brighter they are than the references; none of too few.
+    /// Difference in brightness to the references. `None` for too few pictures.
     #[serde(default)]
     pub brightness: Option<Brightness>,
     /// Each.
@@ -105,7 +105,7 @@ pub struct Picture {
     pub samples: f64,
     /// Seconds of sending photons and tracing.
     pub seconds: f64,
-    /// Its error; by chance below 0 where that is smaller than what the references can tell.
+    /// Its error; by chance below 0 if it is smaller than the references can resolve.
     pub relmse: f64,
 }
 
@@ -137,7 +137,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// What the biases of the steps tell; the error is the mean at the last of them.
+    /// Verdict from the biases of the steps; the error is the mean at the last step.
     pub(super) fn of(steps: &[Step]) -> Self {
         let Some(last) = steps.last() else { return Self::Unknown };
         let Some(bias) = last.bias else { return Self::Unknown };
@@ -157,7 +157,8 @@ impl Verdict {
 
 /// Whether the later bias is smaller, by more than chance.
 fn falls(before: Bias, after: Bias) -> bool {
-    /// What four times the samples leave of the bias of photons is 0.4; of one that stays, 1.
+    /// Least ratio of the bias after four times the samples for a bias that stays. The bias of photons falls to 0.4, one that
+    /// stays to 1.
     const STAYS: f64 = 0.8;
     let error = (before.error * before.error + after.error * after.error).sqrt();
     after.size < STAYS * before.size && before.size - after.size > 2.0 * error

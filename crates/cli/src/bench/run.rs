@@ -17,13 +17,13 @@ use crate::pipeline::words;
 use crate::scene;
 use crate::scene::description::Scene;
 
-/// Pixels on the longer side where nothing else is said.
+/// Pixels on the longer side by default.
 const LONG_SIDE: u32 = 96;
 
 /// Measure what the order asks for. All scenes are looked at before the first of them is measured.
 ///
 /// # Errors
-/// A scene or the call is wrong, the work failed, or it was told to stop; with the scenes that were done by then.
+/// A scene or the call is wrong, the work failed, or a cancel token stopped it; with the scenes that were done by then.
 pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Results, Box<Unfinished>> {
     let mut pace = Pace::new(order.within, order.scenes.len());
     let mut results =
@@ -93,7 +93,7 @@ fn check_seeds(order: &Order) -> Result<(), Trouble> {
     Err(Trouble::Call(format!("--seed {} is too large: {way_out}", order.seed)))
 }
 
-/// What a scene is measured with.
+/// Inputs of a scene's measurement.
 pub(super) struct Run<'a> {
     pub(super) order: &'a Order,
     pub(super) path: &'a Path,
@@ -251,7 +251,7 @@ impl Run<'_> {
 }
 
 impl Steps {
-    /// The most samples, where that is known.
+    /// The most samples, if known.
     fn most_samples(&self) -> Option<u32> {
         match self {
             Self::Samples(list) => list.iter().max().copied(),

@@ -1,4 +1,4 @@
-//! How fast an error falls: the slope of its logarithm over that of the time.
+//! Convergence of an error: the slope of its logarithm over that of the time.
 
 use serde::{Deserialize, Serialize};
 

@@ -70,7 +70,7 @@ fn of_step(name: &str, step: &Step, width: usize) -> String {
     )
 }
 
-/// Whole where it is.
+/// A number of samples, without decimals if it is whole.
 fn count(samples: f64) -> String {
     if samples.fract() == 0.0 { format!("{samples:.0}") } else { format!("{samples:.1}") }
 }
@@ -107,7 +107,7 @@ pub(super) fn signed(Slope { value, error }: Slope) -> String {
     format!("{sign}{:.2} ± {error:.2}", value.abs())
 }
 
-/// What is known of its bias.
+/// Words about a method's bias.
 fn verdict(method: &MethodResult) -> String {
     let at = method.steps.last().map_or(String::new(), |step| format!(" at {}", samples(step.samples)));
     let percent = |share: f64| format!("{:.0} % of the error", share * 100.0);
@@ -125,7 +125,7 @@ fn verdict(method: &MethodResult) -> String {
     }
 }
 
-/// What is known of the mean luminance at the last step.
+/// Words about the mean luminance at the last step.
 fn brightness(method: &MethodResult) -> Option<String> {
     let brightness = method.steps.last()?.brightness?;
     let percent = |part: f64| format!("{:.2} %", 100.0 * part.abs());

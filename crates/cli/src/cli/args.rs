@@ -1,4 +1,4 @@
-//! What can be typed.
+//! Arguments of the command line.
 
 mod bench;
 
@@ -13,8 +13,8 @@ pub use self::bench::BenchArgs;
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
-use crate::pipeline::settings::{CameraChange, Overrides, View};
-use crate::scene::description::{Accel, Integrator, MOST_SCATTERINGS, Shadows};
+use crate::pipeline::settings::{Overrides, View};
+use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
 const EXAMPLES: &str = "\
@@ -25,7 +25,7 @@ Examples:
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
   glimt compare a.exr reference.exr       the error of one picture against another
-  glimt bench ball.toml --plot plot.svg   what time buys: the error of each method against its seconds
+  glimt bench ball.toml --plot plot.svg   measure the error of each method against its seconds
 
 The scene that `glimt new` writes has every key, with comments.
 A scene that is named like a command is given with its folder: glimt ./check
@@ -47,7 +47,7 @@ pub struct Args {
     /// A command other than rendering.
     #[command(subcommand)]
     pub command: Option<Subcommand>,
-    /// What is rendered and how.
+    /// Scene and options of a render.
     #[command(flatten)]
     pub render: RenderArgs,
 }
@@ -86,7 +86,7 @@ pub enum Subcommand {
     /// Measure the error of a picture against a reference
     #[command(after_help = COMPARE_HELP)]
     Compare(CompareArgs),
-    /// Measure what time buys: the error of methods against their seconds, over several seeds
+    /// Benchmark error against time: the error of methods against their seconds, over several seeds
     #[command(after_help = bench::HELP)]
     Bench(Box<BenchArgs>),
 }
@@ -149,7 +149,7 @@ pub struct RenderArgs {
     #[arg(long = "set", value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
-    /// Where the picture goes; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
+    /// Write the picture to this file; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
     /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
     #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
@@ -164,16 +164,16 @@ pub struct RenderArgs {
     pub force: bool,
 
     /// Pixels across
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Picture")]
     pub width: Option<u32>,
     /// Pixels down
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Picture")]
     pub height: Option<u32>,
     /// Samples per pixel, at most
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = samples, help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Picture")]
     pub samples: Option<u32>,
     /// Stop sampling each tile once its noise is below this part of its brightness; 0: never
-    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = error, help_heading = "Picture")]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = number_of("error", ERROR), help_heading = "Picture")]
     pub error: Option<f32>,
     /// Stop after this long; until then, samples go where they lower the error most
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Picture")]
@@ -181,24 +181,24 @@ pub struct RenderArgs {
     /// Render these pixels only (left, top, width, height); the rest stays black
     #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
     pub crop: Option<Rect>,
-    /// What the picture shows
+    /// The view to render: the beauty picture or an AOV
     #[arg(long, value_parser = one_of::<View>(), value_name = "NAME", help_heading = "Picture")]
     pub view: Option<View>,
     /// Seed of all random numbers
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, help_heading = "Picture")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Picture")]
     pub seed: Option<u32>,
 
-    /// How light is followed
+    /// Rendering algorithm
     #[arg(long, value_parser = one_of::<Integrator>(), value_name = "NAME", help_heading = "Method")]
     pub integrator: Option<Integrator>,
     /// Scatterings along one path; 0: emitted light only, 1: direct light
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = depth, help_heading = "Method")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "Method")]
     pub max_depth: Option<u32>,
     /// Shadows; hard: one ray to the middle of an area light
     #[arg(long, value_parser = one_of::<Shadows>(), value_name = "HOW", help_heading = "Method")]
     pub shadows: Option<Shadows>,
     /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection: less noise, but too dark; 0: none
-    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = clamp, help_heading = "Method")]
+    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = number_of("clamp", CLAMP), help_heading = "Method")]
     pub clamp: Option<f32>,
     /// Indirect light and caustics from photon maps, in whitted
     #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "Method")]
@@ -212,14 +212,14 @@ pub struct RenderArgs {
     /// Threads that render; 0: one per core
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Method")]
     pub threads: Option<usize>,
-    /// How far rendering gives way to other programs, from 0, not at all, to 19 [default: 0 with --once, else 10]
+    /// Give way to other programs, from 0, not at all, to 19 [default: 0 with --once, else 10]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, help_heading = "Method")]
     pub nice: Option<u8>,
 
-    /// How progress is said on stderr with --once
+    /// Progress on stderr with --once
     #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: Progress,
-    /// How the preview is drawn
+    /// Kind of preview
     #[arg(long, value_parser = one_of::<PreviewChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub preview: PreviewChoice,
     /// Colours of the preview and of messages; auto looks at the terminal and at NO_COLOR
@@ -231,33 +231,31 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// What they change of a scene.
+    /// Overrides of a scene by these options.
     pub(super) fn overrides(&self) -> Overrides {
-        Overrides {
+        let mut overrides = Overrides {
             sets: self.sets.clone(),
             outputs: self.outputs.clone(),
             report: self.report.clone(),
             replaces_foreign: self.force,
-            width: self.width,
-            height: self.height,
-            samples: self.samples,
-            error: self.error,
             time_seconds: self.time,
-            max_depth: self.max_depth,
-            integrator: self.integrator,
-            shadows: self.shadows,
-            clamp: self.clamp,
             photons: self.photons.map(bool::from),
             dof: self.dof.map(bool::from),
-            accel: self.accel,
             view: self.view,
-            camera: CameraChange::default(),
-            exposure: None,
-            seed: self.seed,
             crop: self.crop,
             threads: self.threads,
             bit_depth: self.bit_depth,
+            ..Overrides::default()
+        };
+        macro_rules! copy {
+            ($(
+                $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+            )*) => {
+                $(overrides.$name = self.$name;)*
+            };
         }
+        render_keys!(copy, option);
+        overrides
     }
 }
 
@@ -280,7 +278,7 @@ choice! {
     pub enum Pictures {
         /// On a terminal of 30 columns or more.
         Auto = "auto",
-        /// For 80 columns where there is no terminal.
+        /// Always; for 80 columns if there is no terminal.
         On = "on",
         /// Never.
         Off = "off",
@@ -323,21 +321,41 @@ fn bit_depth(text: &str) -> Result<u8, String> {
     }
 }
 
-fn side(text: &str) -> Result<u32, String> {
-    whole(text, 1..=65536)
-}
-
-fn samples(text: &str) -> Result<u32, String> {
-    whole(text, 1..=u32::MAX)
-}
-
-fn depth(text: &str) -> Result<u32, String> {
-    whole(text, 0..=MOST_SCATTERINGS)
-}
-
 fn any_whole(text: &str) -> Result<u32, String> {
     whole(text, 0..=u32::MAX)
 }
+
+/// Reads the value of an option that overrides a whole number of `[render]`.
+fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
+    move |text| match Render::key(key).map(|key| key.range) {
+        Some(KeyRange::Whole(range)) => whole(text, range),
+        Some(KeyRange::Number(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
+            Err(format!("`{key}` is no whole number of [render]"))
+        }
+    }
+}
+
+/// Reads the value of an option that overrides a number of `[render]`; `expected` is the message for a wrong one.
+fn number_of(
+    key: &'static str,
+    expected: &'static str,
+) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let range = match Render::key(key).map(|key| key.range) {
+            Some(KeyRange::Number(range)) => range,
+            Some(KeyRange::Whole(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
+                return Err(format!("`{key}` is no number of [render]"));
+            }
+        };
+        let number = text.parse::<f32>().ok().filter(|number| range.contains(&f64::from(*number)));
+        number.ok_or_else(|| expected.to_owned())
+    }
+}
+
+/// The message for a wrong `--error`.
+const ERROR: &str = "expected a part of the brightness, such as 0.02; 0 for none";
+/// The message for a wrong `--clamp`.
+const CLAMP: &str = "expected a radiance from 0 to 1e18; 0 for none";
 
 fn whole(text: &str, range: RangeInclusive<u32>) -> Result<u32, String> {
     let number = text.parse().ok().filter(|number| range.contains(number));
@@ -348,20 +366,6 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds above 0".to_owned()),
-    }
-}
-
-fn error(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(error) if error >= 0.0 && error.is_finite() => Ok(error),
-        _ => Err("expected a part of the brightness, such as 0.02; 0 for none".to_owned()),
-    }
-}
-
-fn clamp(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(most) if (0.0..=1e18).contains(&most) => Ok(most),
-        _ => Err("expected a radiance from 0 to 1e18; 0 for none".to_owned()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! `glimt bench`: what time buys, as a table, as CSV, as JSON, as a plot.
+//! `glimt bench`: error against time, as a table, as CSV, as JSON, as a plot.
 
 mod chart;
 mod outputs;
@@ -32,14 +32,14 @@ pub(super) fn run(args: &BenchArgs, console: &Console) -> Exit {
     measured(args, console).unwrap_or_else(|exit| exit)
 }
 
-/// What was wrong is said, and is the exit code of an error.
+/// Reports errors; `Err` has their exit code.
 fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::give_way(args.nice);
     let order = order(args, console)?;
     let scenes = order.scenes.len();
     let outputs = Outputs::of(args, &order.scenes, console)?;
     let baseline = outputs.baseline(console)?;
-    // The first signal ends what is under way, another one the writing of what was measured by then.
+    // The first signal ends the work under way, another one the writing of the results so far.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::catch(move || stop[usize::from(stop[0].is_cancelled())].cancel())
@@ -62,7 +62,7 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
             // Nothing is measured where the call is wrong.
             if !done.scenes.is_empty() {
                 say(&done, baseline.as_ref(), console);
-                // What could not be written is said; the exit code tells of the first trouble.
+                // Files that cannot be written are reported; the exit code is that of the first trouble.
                 let _ = outputs.write(&done, &said, console, &writing);
             }
             Err(troubled(&trouble, &ended, (done.scenes.len(), scenes), &said, console))
@@ -86,7 +86,7 @@ type Work = JoinHandle<Result<Results, Box<Unfinished>>>;
 fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, Work)> {
     let (sender, news) = mpsc::channel();
     let tell = move |one: News| {
-        // A front end that is gone need not be told.
+        // A front end that is gone needs no news.
         let _ = sender.send(one);
     };
     let work = move || bench::run(&order, &token, &tell);
@@ -94,7 +94,7 @@ fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, W
     Ok((news, thread))
 }
 
-/// Until the work is over.
+/// Reports news until the work is over.
 fn follow(news: &Receiver<News>, said: &mut Said) {
     loop {
         match news.recv_timeout(TICK) {
@@ -154,7 +154,7 @@ fn in_a_line(diagnostic: &Diagnostic) -> String {
     format!("{}: {}", diagnostic.path.display(), diagnostic.message)
 }
 
-/// From what was typed to what it means.
+/// The order that the arguments mean.
 fn order(args: &BenchArgs, console: &Console) -> Result<Order, Exit> {
     let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::folder) };
     let scenes = if args.scenes.is_empty() {

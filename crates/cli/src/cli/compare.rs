@@ -26,7 +26,7 @@ pub(super) fn run(args: &CompareArgs, console: &Console) -> Exit {
     }
 }
 
-/// What was wrong is said, and is the exit code of an error.
+/// Reports errors; `Err` has their exit code.
 fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff = args.diff.as_deref().map(|path| Diff::check(path, args, console)).transpose()?;
     let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
@@ -85,7 +85,7 @@ struct Diff<'a> {
 }
 
 impl<'a> Diff<'a> {
-    /// What can be told before the work.
+    /// Reports the errors that are known before the work.
     fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
         let format = Format::of(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
         check_no_input(path, path, args).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
@@ -149,7 +149,7 @@ fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), Ou
     }
 }
 
-/// What is said, and the keys of the JSON object.
+/// Figures for the table, and keys of the JSON object.
 #[derive(Serialize)]
 struct Summary<'a> {
     a: String,
@@ -211,7 +211,7 @@ fn say_table(summary: &Summary<'_>, console: &Console) {
     table(summary, console.answer_columns()).iter().for_each(|line| console.answer(line));
 }
 
-/// Its lines, broken between words where they are wider than so many columns.
+/// Lines of the table, broken between words if they are wider than so many columns.
 fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     let Summary { a, b, width, height, .. } = summary;
     let title = format!("{a} against the reference {b}, {width}×{height} pixels");
@@ -227,7 +227,7 @@ fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Figures, and beside them what they are of; below them where there is no room for it.
+/// Figures with their description beside them, or below them if there is no room.
 fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
     /// Narrower notes are hard to read.
     const LEAST: usize = 24;

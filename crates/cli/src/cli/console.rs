@@ -1,5 +1,5 @@
-//! What is said on stderr and stdout outside of the terminal UI. Nothing said on stderr can fail: who closed the pipe does
-//! not read. Answers on stdout can, where the disk is full. Every text is made harmless before it is shown.
+//! Texts on stderr and stdout outside of the terminal UI. Text on stderr cannot fail: whoever closed the pipe does not read.
+//! Answers on stdout can, if the disk is full. Every text is made harmless before it is shown.
 
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
@@ -62,7 +62,7 @@ impl Console {
         self.text(&format!("{}\n", visible(text)));
     }
 
-    /// Columns of stdout, where it is a terminal.
+    /// Columns of stdout, if it is a terminal.
     pub(super) fn answer_columns(&self) -> Option<usize> {
         let is_terminal = io::stdout().is_terminal();
         let size = if is_terminal { crossterm::terminal::size().ok() } else { None };
@@ -84,7 +84,7 @@ impl Console {
         }
     }
 
-    /// How the program ends: it failed where an answer did not get through.
+    /// Exit code of the program: a failure if an answer did not get through.
     pub(super) fn end(&self, exit: Exit) -> Exit {
         match self.lost.take() {
             Some(error) if exit == Exit::DONE => self

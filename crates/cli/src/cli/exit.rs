@@ -2,12 +2,12 @@
 
 use std::process::ExitCode;
 
-/// How the program ends.
+/// Exit code of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exit(pub u8);
 
 impl Exit {
-    /// What was asked for is done.
+    /// The work is done.
     pub const DONE: Self = Self(0);
     /// The work failed.
     pub const FAILED: Self = Self(1);

@@ -17,7 +17,8 @@ use crate::scene::{NO_SUCH_FILE, text_now};
 use crate::system::threads::not_started;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
-/// How long the end waits for a picture that is being written, after a signal; after a key until a person is told what it waits for.
+/// Time that the end waits for a picture that is being written, after a signal; and after a key, until a person hears what it
+/// waits for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(order: Order, console: &Console) -> Exit {
@@ -101,7 +102,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// What is said of a scene that is not there from the first; one that goes while it is watched is waited for.
+/// Error about a scene that does not exist at the start; glimt waits for a scene that disappears later.
 fn absent(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
@@ -109,7 +110,7 @@ fn absent(scene: &Path) -> Option<Diagnostic> {
     text_now(scene).err().map(|problem| *problem).filter(|problem| problem.message == NO_SUCH_FILE)
 }
 
-/// What became of pictures.
+/// Outcomes of writing pictures.
 #[derive(Clone, Debug, Default)]
 struct Writes(Arc<Mutex<Heard>>);
 
@@ -186,7 +187,7 @@ impl Writes {
     }
 }
 
-/// Hand events on, and see on the way to what is watched and to what is written.
+/// Passes events on; tells the watcher which files to watch, and notes which pictures were written.
 fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: impl Fn(Event) -> bool) {
     let mut is_heard = true;
     for mut event in events {

@@ -1,4 +1,4 @@
-//! From what was typed to what it means.
+//! Meaning of the arguments.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,10 @@ use crate::tui::{ColorChoice, PreviewChoice};
 /// Standard output, where it stands for a file.
 pub(super) const STANDARD: &str = "-";
 
-/// How far the terminal's renders give way to the front end and to all other programs.
+/// Nice value by which the terminal's renders give way to the front end and to all other programs.
 const POLITE: u8 = 10;
 
-/// What is to be done.
+/// An order of the call.
 #[derive(Clone, Debug)]
 pub(super) struct Order {
     pub(super) scene: PathBuf,
@@ -24,7 +24,7 @@ pub(super) struct Order {
     pub(super) preview: PreviewChoice,
     pub(super) color: ColorChoice,
     pub(super) poll: bool,
-    /// By how much the nice value is raised: with `is_once` that of the program, else that of the render threads.
+    /// Increase of the nice value: with `is_once` that of the program, else that of the render threads.
     pub(super) nice: u8,
 }
 
@@ -75,7 +75,7 @@ mod tests {
     use crate::choice::Choice;
     use crate::film::Rect;
     use crate::pipeline::settings::View;
-    use crate::scene::description;
+    use crate::scene::description::{self, KeyRange};
 
     fn lowered(line: &str) -> Result<Order, String> {
         let words = std::iter::once("glimt").chain(line.split_whitespace());
@@ -159,6 +159,39 @@ mod tests {
             "a.toml --nice -1",
         ] {
             assert!(lowered(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// Options accept and refuse the same values as their keys of `[render]`.
+    #[test]
+    fn options_accept_what_the_keys_accept() {
+        let command = Args::command();
+        for key in description::Render::keys() {
+            let name = key.name.replace('_', "-");
+            let option = command.get_arguments().find(|option| option.get_long() == Some(&*name));
+            assert_eq!(option.is_some(), key.has_option, "--{name}");
+            let Some(option) = option else { continue };
+            assert!(option.get_help().is_some(), "--{name} has help");
+            let (accepted, refused) = match key.range {
+                KeyRange::Whole(range) => {
+                    let (least, most) = (i64::from(*range.start()), i64::from(*range.end()));
+                    ([least, most].map(|end| end.to_string()).to_vec(), vec![least - 1, most + 1])
+                }
+                KeyRange::Number(range) => {
+                    let ends = [*range.start() as f32, *range.end() as f32];
+                    (ends.map(|end| end.to_string()).to_vec(), vec![*range.start() as i64 - 1])
+                }
+                KeyRange::Names(names) => (names.into_iter().map(str::to_owned).collect(), Vec::new()),
+                KeyRange::Color => panic!("--{name} is a colour"),
+            };
+            let refused = refused.iter().map(i64::to_string).chain(["another".to_owned()]);
+            for value in accepted {
+                let order = lowered(&format!("a.toml --{name} {value}")).expect(&name);
+                assert_ne!(order.overrides, Overrides::default(), "--{name} {value} arrives");
+            }
+            for value in refused {
+                assert!(lowered(&format!("a.toml --{name} {value}")).is_err(), "--{name} {value}");
+            }
         }
     }
 

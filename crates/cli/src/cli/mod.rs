@@ -1,6 +1,6 @@
 //! The command line: arguments, the headless front end, and the wiring of the terminal's.
 //!
-//! What was typed ([`args`]) is turned into what it means (`lower`) before anything is done.
+//! Arguments ([`args`]) are turned into their meaning (`lower`) before anything is done.
 
 pub mod args;
 mod bench;
@@ -80,7 +80,7 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
     Exit::WRONG
 }
 
-/// What is said of a first word that is neither a file nor looks like one: a command was meant.
+/// Message about a first word that is neither a file nor looks like one: a command was meant.
 fn unknown_command(arguments: &[OsString]) -> Option<String> {
     // A later word may be the value of an option.
     no_command(Path::new(arguments.get(1)?))

@@ -42,7 +42,7 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
     }
 }
 
-/// What is said of a name that a picture or a mesh has: nobody would find the scene in it, and a render writes pictures.
+/// Message about a name of a picture or a mesh: nobody would find the scene there, and a render writes pictures.
 fn misnamed(file: &Path) -> Option<String> {
     let what = if is_mesh(file) {
         "a mesh"
@@ -76,12 +76,12 @@ fn is_picture(file: &Path) -> bool {
     }
 }
 
-/// Make the file, never taking the place of another one; no part of it is left where that fails.
+/// Makes the file, never in place of another one; leaves no part of it on failure.
 fn create(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
     if written.is_err() && FileIdentity::of(path).is_some_and(|there| there.is_of(&file)) {
-        // It is still ours, and what went wrong is said in any case.
+        // The file is still ours; the caller reports the error in any case.
         let _ = std::fs::remove_file(path);
     }
     written

@@ -16,7 +16,7 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::priority;
 use crate::system::threads::not_started;
 
-/// How long the end may take after a signal.
+/// Longest time that the end may take after a signal.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Between two looks for a signal.
 const TICK: Duration = Duration::from_millis(50);
@@ -58,7 +58,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     ended.by().map_or(exit, Exit::signal)
 }
 
-/// What there is when a signal ends the program.
+/// Words about the pictures when a signal ends the program.
 fn outcome(exit: Exit, written: &[PathBuf]) -> String {
     let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
     match names.as_slice() {
@@ -77,13 +77,13 @@ impl Deadline {
         now >= *self.0.get_or_insert(now + PATIENCE)
     }
 
-    /// What the worker may still take.
+    /// Time that the worker may still take.
     fn left(&self, now: Instant) -> Duration {
         self.0.map_or(PATIENCE, |end| end.saturating_duration_since(now))
     }
 }
 
-/// Until the request is over or a signal ends it.
+/// Follows the request until it is over or a signal ends it.
 fn follow(
     worker: &Handle,
     order: &Order,
@@ -161,7 +161,7 @@ fn warning(message: &str, help: &str) -> Diagnostic {
     }
 }
 
-/// Warnings about options that were asked for and change nothing. The terminal UI says it in its own way.
+/// Warnings about options without effect. The terminal UI has its own words for these.
 fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
         let help = "give the scene's [camera] an `aperture`, such as 0.1";

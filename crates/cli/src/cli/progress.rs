@@ -30,7 +30,7 @@ pub(super) trait Reporter {
     }
 }
 
-/// The reporter that was asked for, of a render that ends after a time if there is one.
+/// The reporter that the call chooses; `time` is the budget of the render, if it has one.
 pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console) -> Box<dyn Reporter> {
     match progress {
         Progress::Auto if console.is_terminal => Box::new(bars::Bars::new(time)),

@@ -1,4 +1,4 @@
-//! What the worker says when a person asks of the picture at hand.
+//! Answers of the worker to questions about the current picture.
 
 use std::path::PathBuf;
 
@@ -16,13 +16,13 @@ pub struct Spot {
 /// A part of a picture, whose own width and height are 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
-    /// Where it begins, from the left.
+    /// Left edge.
     pub left: f64,
-    /// Where it begins, from the top.
+    /// Top edge.
     pub top: f64,
-    /// How wide it is.
+    /// Width.
     pub width: f64,
-    /// How high it is.
+    /// Height.
     pub height: f64,
 }
 
@@ -62,21 +62,21 @@ impl Section {
     }
 }
 
-/// What is at a place of a picture.
+/// The object and the colour at a place of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picked {
     /// Column and row.
     pub pixel: [u32; 2],
-    /// What is seen there first; none: nothing is.
+    /// First object seen there. `None` if the ray meets nothing.
     pub thing: Option<Thing>,
-    /// The pixel's colour so far, linear; none: it has no sample yet.
+    /// Linear colour of the pixel so far. `None` if it has no sample yet.
     pub color: Option<[f32; 3]>,
 }
 
 /// A shape, where a ray meets it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Thing {
-    /// What the scene file calls it.
+    /// Name of the shape's table in the scene file.
     pub shape: &'static str,
     /// Its own name, if it has one.
     pub name: Option<String>,
@@ -84,7 +84,7 @@ pub struct Thing {
     pub path: PathBuf,
     /// The line in which it begins there, from 1.
     pub line: usize,
-    /// What kind of material it has, and its name.
+    /// Type and name of its material.
     pub material: String,
     /// The place on it.
     pub position: [f64; 3],

@@ -93,7 +93,7 @@ impl<N: Hash + Eq, T> Pool<N, T> {
         }
     }
 
-    /// What no request needs any more.
+    /// Values that no request needs any more.
     pub(super) fn spares(&self) -> impl Iterator<Item = Spare> {
         self.entries.values().filter(|entry| !entry.proven).map(|entry| (entry.request, entry.bytes))
     }
@@ -182,7 +182,7 @@ mod tests {
         let mut there = |name| pool.get(&name, key("1")).is_some();
         assert!(!there("a") && !there("b"), "20 bytes of 30 are taken by a newer one");
         assert!(there("c") && there("d") && there("e"));
-        // What is asked for again is the newest, and what was in its place is the oldest then.
+        // The second request makes a value the newest one; the value that it replaces is then the oldest.
         end(&mut pool, true, 4, 30);
         pool.insert("g", key("1"), (Arc::new(1), 30));
         end(&mut pool, true, 5, 30);

@@ -1,12 +1,12 @@
-//! What a person asks of the picture at hand, whatever else is going on: what is at a place of it; and to put the camera
-//! into the scene file.
+//! Errands: a question about a place of the current picture, and the order to write the camera into the scene file. They are
+//! carried out whatever else is going on.
 
 use std::sync::Arc;
 
 use super::inputs::Inputs;
 use super::protocol::{Event, Kept, Picked, Spot, Thing, Viewpoint};
+use super::render::film_state::FilmState;
 use super::sink::Sink;
-use super::stages::canvas::Canvas;
 use super::stages::parse::Parsed;
 use crate::control::CancelToken;
 use crate::film::Quantity;
@@ -17,7 +17,7 @@ use crate::scene::{Loaded, text_now};
 use crate::system::{file, in_words};
 use crate::world::World;
 
-/// What is asked for.
+/// An order that a person gives.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Errand {
     KeepCamera(Viewpoint),
@@ -41,14 +41,14 @@ impl Errand {
 #[derive(Clone)]
 pub(super) struct AtHand {
     pub(super) parsed: Arc<Parsed>,
-    /// What the call sets in the scene.
+    /// Values that the call sets in the scene.
     pub(super) sets: Vec<String>,
     pub(super) world: Arc<World>,
     pub(super) settings: RenderSettings,
 }
 
 impl AtHand {
-    pub(super) fn run(&self, errand: &Errand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
+    pub(super) fn run(&self, errand: &Errand, canvas: Option<&FilmState>, inputs: &Inputs, sink: &Sink) {
         let generation = sink.generation;
         sink.send(match errand {
             Errand::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, canvas)) },
@@ -58,8 +58,8 @@ impl AtHand {
         });
     }
 
-    /// What the ray through the middle of a pixel meets.
-    fn pick(&self, spot: Spot, canvas: Option<&Canvas>) -> Picked {
+    /// The first object on the ray through the middle of a pixel.
+    fn pick(&self, spot: Spot, canvas: Option<&FilmState>) -> Picked {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));

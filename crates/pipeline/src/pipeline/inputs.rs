@@ -1,4 +1,4 @@
-//! Which files a scene reads or names: the one list that every write is held against.
+//! The files that a scene reads or names: the one list that every write is checked against.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -16,7 +16,7 @@ use crate::scene::description::Camera;
 #[derive(Clone, Debug)]
 pub(super) struct Input {
     pub(super) path: PathBuf,
-    /// What it is to the scene, in words.
+    /// Role of the file in the scene, in words.
     pub(super) role: String,
     /// The scene, and where it names the file.
     pub(super) place: Option<(Arc<Loaded>, Range<usize>)>,
@@ -85,13 +85,13 @@ impl Inputs {
         }
     }
 
-    /// Those of another scene as well.
+    /// Adds the inputs of another scene.
     pub(super) fn add(&mut self, others: Self) {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
     }
 
-    /// Which files they are now.
+    /// Current identities of the files.
     pub(super) fn identities(&self) -> HashMap<FileIdentity, &Input> {
         let mut identities = HashMap::new();
         for input in &self.0 {

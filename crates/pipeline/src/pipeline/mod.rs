@@ -1,20 +1,23 @@
 //! Stages as functions of their inputs, the caches between them, the worker that owns both, and the watcher of files.
 //!
-//! [`start`] gives a [`Handle`]: commands in, events out, previews in a slot. One request is run by `engine`
-//! stage by stage; each stage compares a [fingerprint](crate::scene::fingerprint) of what it reads with that of its last value in
-//! `cache` and says whether it was done, reused or skipped. [`watch`] says when a file that a request read has
-//! another content.
+//! [`start`] gives a [`Handle`]: commands in, events out, previews in a slot. `engine` runs one request, stage by stage: `stages` has
+//! one file for each of the eight, `render` the internals of tracing. Each stage compares a [fingerprint](crate::scene::fingerprint)
+//! of its inputs (`keys`) with that of its last value in `cache`, and reports whether it was done, reused or skipped. [`watch`]
+//! reports when a file of a request has another content.
 
 mod answers;
+mod assembly;
 mod cache;
 mod cautions;
 mod check;
 mod engine;
 mod errands;
 mod inputs;
+mod keys;
 mod pace;
 mod plan;
 pub mod protocol;
+mod render;
 mod report;
 pub mod session;
 pub mod settings;

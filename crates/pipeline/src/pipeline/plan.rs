@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::settings::{Effective, Overrides, View};
-use super::targets::NamedBy;
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
@@ -34,6 +33,17 @@ pub(super) struct Plan {
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
     pub(super) effective: Effective,
+}
+
+/// Source of the picture's file names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NamedBy {
+    /// `-o`.
+    Call,
+    /// `output` in `[render]`.
+    Scene,
+    /// Nobody: the scene's name with `.png`.
+    Nobody,
 }
 
 /// Put scene and overrides together.
@@ -95,7 +105,7 @@ fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
-/// A scene may be large: it is copied only where it has to be another one.
+/// The scene with this acceleration structure. A scene may be large: it is copied only if the structure is another one.
 fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {

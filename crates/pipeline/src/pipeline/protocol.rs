@@ -1,14 +1,17 @@
-//! What the front ends and the worker say to each other.
+//! Messages between the front ends and the worker.
 //!
 //! A front end sends [`Command`]s and receives [`Event`]s, each with the generation of the request that it is
 //! about; events of older generations are dropped by the receiver. The queue of requests holds one: a newer one
 //! replaces it and cancels the render under way. Preview pictures do not travel in events but in a slot that
 //! holds the latest only ([`Event::Preview`] says that it changed).
 
+mod stage;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+pub use self::stage::{Stage, StageReport, Status};
 pub use super::answers::{Kept, Picked, Section, Spot, Thing};
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
@@ -48,10 +51,9 @@ pub struct Request {
     pub generation: u64,
     /// The scene file.
     pub scene: PathBuf,
-    /// What the command line and the keys change of it.
+    /// Changes by the command line and by keys.
     pub overrides: Overrides,
-    /// The preview wanted: a picture of at most this many pixels across and down, with the picture's aspect
-    /// ratio; none: no previews.
+    /// The preview: a picture of at most this many pixels across and down, with the image's aspect ratio. `None` for no previews.
     pub preview: Option<PreviewSize>,
     /// Whether the finished picture is written to disk.
     pub write: Writing,
@@ -66,10 +68,10 @@ pub struct Request {
 pub enum Writing {
     /// It is not.
     No,
-    /// It is; where that is not possible, [`Event::WriteFailed`] or [`Event::Refused`] says so, at the beginning and at
-    /// the end, and the picture is rendered and shown all the same.
+    /// Write it. If that is impossible, [`Event::WriteFailed`] or [`Event::Refused`] reports it at the beginning and at the end,
+    /// and the picture is rendered and shown all the same.
     Try,
-    /// It is; a file that cannot be written fails the request, before anything is rendered if that can be told.
+    /// Write it. A file that cannot be written fails the request, if possible before anything is rendered.
     Must,
 }
 
@@ -80,7 +82,7 @@ pub struct PreviewSize {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// As many of the picture's own pixels around this place; none: the whole picture at this size.
+    /// Center of the image's own pixels that are shown, as many as fit. `None` for the whole image at this size.
     pub around: Option<Spot>,
 }
 
@@ -89,45 +91,45 @@ pub struct PreviewSize {
 pub enum Event {
     /// The worker took a request up.
     Started {
-        /// Which.
+        /// Number of the request.
         generation: u64,
     },
     /// A stage began or ended.
     Stage {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// What happened.
+        /// The stage and its status.
         stage: StageReport,
     },
     /// These files were read, or tried: what they hold is what the request is made of. Each such event holds all
     /// files known so far; a front end watches those of the latest.
     Files {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
         /// The scene and everything that it names.
         files: Vec<FileRead>,
-        /// So many of them, the first ones, were read by this request; the others by some before.
+        /// Number of files that this request read, at the head of the list; earlier requests read the others.
         read: usize,
         /// After that.
         since: Instant,
     },
     /// Everything that is there to warn of is known; the picture is yet to be rendered.
     Warnings {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
         /// The same as [`Event::Done`] will have.
         warnings: Vec<Diagnostic>,
     },
     /// An asset is loading.
     Asset {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// How far it is.
+        /// Progress of the asset.
         progress: AssetProgress,
     },
     /// The scene was understood: these settings hold now.
     Settings {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
         /// The settings.
         settings: Box<Effective>,
@@ -138,26 +140,26 @@ pub enum Event {
     },
     /// The scene file holds another text than that of the last scene that could be read.
     Edited {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// What differs, in a few words.
+        /// Differences, in a few words.
         what: String,
     },
     /// The render went on.
     Progress {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// How far it is.
+        /// Progress of the render.
         progress: RenderProgress,
     },
     /// A newer picture is in the slot.
     Preview {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
     },
     /// A picture was written.
     Written {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
         /// The file.
         path: PathBuf,
@@ -166,50 +168,50 @@ pub enum Event {
     },
     /// A picture or a report could not be written; a render under way goes on.
     WriteFailed {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// Which file, and why.
+        /// The file and the reason.
         message: String,
     },
     /// A file was written, and what the one that was there had besides its bytes could not be kept.
     NotKept {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// Which file, and what of it.
+        /// The file and the properties that were lost.
         message: String,
     },
     /// No file is written as long as one of them must not be: it is an input, another of them, or something that a person
     /// did not mean to lose. A render under way goes on.
     Refused {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
         /// One for each such file, with the way out.
         conflicts: Vec<Diagnostic>,
     },
     /// [`Command::Write`] waits until every pixel has a sample.
     WritePostponed {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
     },
-    /// What came of [`Command::KeepCamera`].
+    /// Answer to [`Command::KeepCamera`].
     CameraKept {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// What came of it, or why nothing was written.
+        /// The file with the camera, or the reason why glimt wrote nothing.
         outcome: Result<Kept, String>,
     },
-    /// What is at the place of [`Command::Pick`].
+    /// Answer to [`Command::Pick`].
     Picked {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// What is there.
+        /// The object there.
         picked: Box<Picked>,
     },
-    /// Everything that was asked for is done.
+    /// The request is finished.
     Done {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
-        /// What it took.
+        /// Report of the request.
         report: Box<Report>,
         /// Warnings, and the conflicts of [`Event::Refused`] that still hold.
         warnings: Vec<Diagnostic>,
@@ -218,14 +220,14 @@ pub enum Event {
     },
     /// The request could not be done. The last picture stands.
     Failed {
-        /// Of which request.
+        /// Number of the request.
         generation: u64,
         /// Why.
         failure: Failure,
     },
     /// The request was stopped by a newer one or by [`Command::Cancel`].
     Cancelled {
-        /// Which.
+        /// Number of the request.
         generation: u64,
     },
 }
@@ -239,83 +241,6 @@ pub enum Failure {
     Work(String),
 }
 
-/// The stages, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Stage {
-    /// Reading and validating the scene file.
-    Parse,
-    /// Reading mesh files.
-    Meshes,
-    /// Reading textures.
-    Textures,
-    /// Building trees.
-    Accel,
-    /// Gathering the lights.
-    Lights,
-    /// Shooting photons.
-    Photons,
-    /// Tracing.
-    Render,
-    /// Encoding and writing pictures.
-    Write,
-}
-
-impl Stage {
-    /// All of them, in order.
-    pub const ALL: [Self; 8] = [
-        Self::Parse,
-        Self::Meshes,
-        Self::Textures,
-        Self::Accel,
-        Self::Lights,
-        Self::Photons,
-        Self::Render,
-        Self::Write,
-    ];
-
-    /// Its name in reports and on the screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Parse => "parse",
-            Self::Meshes => "meshes",
-            Self::Textures => "textures",
-            Self::Accel => "accel",
-            Self::Lights => "lights",
-            Self::Photons => "photons",
-            Self::Render => "render",
-            Self::Write => "write",
-        }
-    }
-}
-
-/// How a stage stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Status {
-    /// At work. Never in a finished report.
-    Running,
-    /// Done in this request.
-    Done,
-    /// Its inputs did not change.
-    Reused,
-    /// This scene does not need it.
-    Skipped,
-}
-
-/// One line of the table of stages.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct StageReport {
-    /// Which.
-    pub name: Stage,
-    /// How it stands.
-    pub status: Status,
-    /// What it took.
-    pub seconds: f64,
-    /// Why it was skipped or reused, or what it made, in a few words; may be empty.
-    pub why: String,
-}
-
 /// An asset that is loading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssetProgress {
@@ -327,24 +252,24 @@ pub struct AssetProgress {
     pub total: u64,
 }
 
-/// How far a render is.
+/// Progress of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderProgress {
     /// From 0 to 1, never falling within a generation; 1 when the render is over.
     pub fraction: f64,
     /// Seconds since the render stage began.
     pub elapsed_seconds: f64,
-    /// Seconds still to go, from the work done; none until it can be told.
+    /// Expected seconds until the end. `None` until the rate is known.
     pub eta_seconds: Option<f64>,
     /// Samples per pixel so far, on average.
     pub samples: u32,
     /// Samples per pixel that there will be, on average, as far as that is known.
     pub total_samples: u32,
-    /// What is known of the noise; nothing before half a second and 16 samples.
+    /// Noise so far. `None` before half a second and 16 samples.
     pub noise: Option<NoiseProgress>,
 }
 
-/// How much noise there is, and will be.
+/// Noise now, and noise to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseProgress {
     /// [`Film::relative_error`](crate::film::Film::relative_error), as it is to be expected by now.
@@ -359,13 +284,13 @@ pub type PreviewSlot = Arc<std::sync::Mutex<Option<LatestPreview>>>;
 /// A preview picture with what it is of.
 #[derive(Clone, Debug)]
 pub struct LatestPreview {
-    /// Of which request.
+    /// Number of the request.
     pub generation: u64,
-    /// The picture, at most as large as was asked for.
+    /// The picture, at most of the requested size.
     pub picture: Arc<Picture>,
     /// The numbers at both ends of the range that it is stretched to: near and far of distances, else 0 and the greatest.
     pub range: Option<[f32; 2]>,
-    /// The part of the picture that it shows, pixel by pixel; none: all of it.
+    /// The part of the image that is shown pixel by pixel. `None` for the whole image.
     pub section: Option<Section>,
     /// Whether it lacks the light that photons bring, since they are still being traced.
     pub lacks_photons: bool,

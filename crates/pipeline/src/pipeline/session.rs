@@ -5,41 +5,17 @@ use std::sync::Arc;
 use std::sync::mpsc;
 
 use super::engine::{Engine, Means, Meanwhile, Orders};
+pub use super::engine::{Rendered, Unrendered};
 use super::errands::Errand;
-use super::protocol::{Failure, PreviewSize, PreviewSlot, Report, Request, Writing};
+use super::protocol::{PreviewSize, PreviewSlot, Request, Writing};
 use super::settings::Overrides;
 use super::sink::Sink;
 use crate::control::CancelToken;
-use crate::film::RadianceImage;
-use crate::scene::diagnostic::Diagnostic;
-use crate::scene::fingerprint::Key;
 
 /// An engine with what it keeps from picture to picture.
 pub struct Session {
     engine: Engine,
     generation: u64,
-}
-
-/// A picture in memory.
-#[derive(Clone, Debug)]
-pub struct Rendered {
-    /// Linear light, unexposed.
-    pub image: RadianceImage,
-    /// What it took.
-    pub report: Box<Report>,
-    /// What is probably not meant.
-    pub warnings: Vec<Diagnostic>,
-    /// All that its sums depend on, apart from the number of samples.
-    pub key: Key,
-}
-
-/// Why there is no picture.
-#[derive(Clone, Debug)]
-pub enum Unrendered {
-    /// The scene is wrong, or the work failed.
-    Failed(Failure),
-    /// The work was told to stop.
-    Cancelled,
 }
 
 impl Default for Session {
@@ -106,6 +82,7 @@ impl Orders for NoOrders {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::protocol::Failure;
 
     const SCENE: &str = "[render]\nwidth = 8\nheight = 6\n[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n\
         [materials.m]\n[[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"m\"\n[[light]]\n";

@@ -1,4 +1,4 @@
-//! What the command line and the keys change of a scene, and what then holds.
+//! Overrides of a scene by the command line and by keys, and the settings that result.
 
 use std::path::PathBuf;
 
@@ -7,78 +7,52 @@ use crate::film::Rect;
 use crate::integrators::RenderSettings;
 pub use crate::integrators::View;
 pub use crate::scene::description::CameraChange;
-use crate::scene::description::{Accel, Integrator, Render, Shadows};
+use crate::scene::description::{Accel, Integrator, Render, Shadows, render_keys};
 
-/// Changes to a scene's settings for this run; `None` leaves the scene's own.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Overrides {
-    /// Values in place of those in the file: texts `TABLE.KEY=VALUE`. The other changes come after these.
-    pub sets: Vec<String>,
-    /// Files to write; empty: the scene's own.
-    pub outputs: Vec<PathBuf>,
-    /// Where the report of each finished request is written, as JSON.
-    pub report: Option<PathBuf>,
-    /// Whether the report and the picture that nobody named may replace a file that glimt did not write.
-    pub replaces_foreign: bool,
-    /// Pixels across.
-    pub width: Option<u32>,
-    /// Pixels down.
-    pub height: Option<u32>,
-    /// Samples per pixel.
-    pub samples: Option<u32>,
-    /// Noise that ends the sampling of a tile.
-    pub error: Option<f32>,
-    /// Stop rendering after this long, with what there is.
-    pub time_seconds: Option<f64>,
-    /// Scatterings along a path.
-    pub max_depth: Option<u32>,
-    /// Method.
-    pub integrator: Option<Integrator>,
-    /// Shadows.
-    pub shadows: Option<Shadows>,
-    /// Most that a path brings by one vertex.
-    pub clamp: Option<f32>,
-    /// Photon maps.
-    pub photons: Option<bool>,
-    /// Depth of field.
-    pub dof: Option<bool>,
-    /// Acceleration structure.
-    pub accel: Option<Accel>,
-    /// What is shown.
-    pub view: Option<View>,
-    /// The camera.
-    pub camera: CameraChange,
-    /// In stops.
-    pub exposure: Option<f32>,
-    /// Seed.
-    pub seed: Option<u32>,
-    /// Render these pixels only; the rest of the picture stays black.
-    pub crop: Option<Rect>,
-    /// Threads; none or 0: one per core.
-    pub threads: Option<usize>,
-    /// Bits per channel of PNG files: 8 or 16.
-    pub bit_depth: Option<u8>,
-}
-
-impl Overrides {
-    /// The settings of a scene with these changes.
-    pub(super) fn applied(&self, to: &Render) -> Render {
-        Render {
-            width: self.width.unwrap_or(to.width),
-            height: self.height.unwrap_or(to.height),
-            samples: self.samples.unwrap_or(to.samples),
-            error: self.error.unwrap_or(to.error),
-            max_depth: self.max_depth.unwrap_or(to.max_depth),
-            integrator: self.integrator.unwrap_or(to.integrator),
-            shadows: self.shadows.unwrap_or(to.shadows),
-            clamp: self.clamp.unwrap_or(to.clamp),
-            accel: self.accel.unwrap_or(to.accel),
-            seed: self.seed.unwrap_or(to.seed),
-            exposure: self.exposure.unwrap_or(to.exposure),
-            ..*to
+macro_rules! overrides {
+    ($(
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+    )*) => {
+        /// Changes to a scene's settings for this run; `None` leaves the scene's own.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct Overrides {
+            /// Values in place of those in the file: texts `TABLE.KEY=VALUE`. The other changes come after these.
+            pub sets: Vec<String>,
+            /// Files to write; empty: the scene's own.
+            pub outputs: Vec<PathBuf>,
+            /// File for the report of each finished request, as JSON.
+            pub report: Option<PathBuf>,
+            /// Whether the report and the picture that nobody named may replace a file that glimt did not write.
+            pub replaces_foreign: bool,
+            /// Budget of time: stop rendering after this long, with what there is.
+            pub time_seconds: Option<f64>,
+            /// Photon maps.
+            pub photons: Option<bool>,
+            /// Depth of field.
+            pub dof: Option<bool>,
+            /// The view: beauty or an AOV.
+            pub view: Option<View>,
+            /// The camera.
+            pub camera: CameraChange,
+            /// Render these pixels only; the rest of the picture stays black.
+            pub crop: Option<Rect>,
+            /// Threads; `None` or 0: one per core.
+            pub threads: Option<usize>,
+            /// Bits per channel of PNG files: 8 or 16.
+            pub bit_depth: Option<u8>,
+            $($(#[doc = $doc])* pub $name: Option<$type>,)*
         }
-    }
+
+        impl Overrides {
+            /// The settings of a scene with these changes.
+            pub(super) fn applied(&self, to: &Render) -> Render {
+                Render { $($name: self.$name.unwrap_or(to.$name),)* ..*to }
+            }
+        }
+    };
 }
+
+render_keys!(overrides, changed);
 
 /// The settings a request renders with, for status lines.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -89,7 +63,7 @@ pub struct Effective {
     pub height: u32,
     /// Samples per pixel, at most.
     pub samples: u32,
-    /// Noise that ends the sampling of a tile, relative to its brightness; 0: none does.
+    /// Noise threshold of a tile, relative to its brightness; 0: no threshold.
     pub error: f32,
     /// Method.
     #[serde(serialize_with = "choice::serialize")]
@@ -97,7 +71,7 @@ pub struct Effective {
     /// Shadows.
     #[serde(serialize_with = "choice::serialize")]
     pub shadows: Shadows,
-    /// Most radiance that a path brings by one vertex after its first reflection, which is a bias; 0: no such limit.
+    /// Most radiance that a path brings by one vertex after its first reflection, which makes a bias; 0: no such limit.
     pub clamp: f32,
     /// Whether photons are on.
     pub photons: bool,
@@ -106,7 +80,7 @@ pub struct Effective {
     /// Acceleration structure.
     #[serde(serialize_with = "choice::serialize")]
     pub accel: Accel,
-    /// What is shown.
+    /// The view: beauty or an AOV.
     #[serde(serialize_with = "choice::serialize")]
     pub view: View,
     /// In stops.

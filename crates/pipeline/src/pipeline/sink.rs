@@ -1,4 +1,4 @@
-//! Where a request's events go: every one carries its generation.
+//! The sink of a request's events: each carries the request's generation.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -70,8 +70,8 @@ impl Sink {
         self.send(Event::Preview { generation: self.generation });
     }
 
-    /// Watch the loading of one asset: `load` gets the progress sink to report to; its end is said
-    /// where it succeeds, whatever `load` reports.
+    /// Reports the loading of one asset: `load` reports to the progress sink that it gets. If loading succeeds, its end is
+    /// reported whatever `load` did.
     pub(super) fn asset<T, E>(
         &self,
         name: &str,

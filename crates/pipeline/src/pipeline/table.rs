@@ -9,10 +9,10 @@ use crate::control::CancelToken;
 /// The stages of one request.
 pub(super) struct StageTable<'a> {
     pub(super) sink: &'a Sink,
-    /// By which work is held: that time does not count.
+    /// Token that pauses work: pauses do not count as time.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
-    /// Whether nobody is told.
+    /// Whether the table reports nothing.
     pub(super) is_silent: bool,
 }
 

@@ -5,23 +5,12 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::inputs::{Input, Inputs};
-use super::plan::Plan;
+use super::plan::{NamedBy, Plan};
 use super::report::Marks;
 use super::sink::Sink;
 use crate::output::write::Guard;
 use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-
-/// Who named the files for the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum NamedBy {
-    /// `-o`.
-    Call,
-    /// `output` in `[render]`.
-    Scene,
-    /// Nobody: the scene's name with `.png`.
-    Nobody,
-}
 
 /// A file to be written.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -121,7 +110,7 @@ fn is_twin(target: Target<'_>, twin: &Path) -> Diagnostic {
     of_call(message, Some(format!("each needs a file of its own: {}", way_out(target.kind))))
 }
 
-/// What is there already and was not written by glimt.
+/// A file that exists already and that glimt did not write.
 fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
     let (name, way_out) = (target.path.display(), way_out(target.kind));
     let (replaced, help) = match target.kind {
@@ -146,7 +135,7 @@ fn way_out(kind: Kind) -> &'static str {
     }
 }
 
-/// What is about the call stands at no place of the scene.
+/// A diagnostic about the call, which has no place in the scene.
 fn of_call(message: String, help: Option<String>) -> Diagnostic {
     Diagnostic { severity: Severity::Error, message, path: PathBuf::new(), place: None, help }
 }

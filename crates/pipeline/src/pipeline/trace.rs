@@ -13,7 +13,7 @@ use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_by
 use crate::system::processor::seconds_of_thread;
 use crate::world::World;
 
-/// What renders a tile: see [`crate::integrators::render_tile`].
+/// The function that renders a tile: see [`crate::integrators::render_tile`].
 pub(super) type Kernel = fn(
     &World,
     &RenderSettings,
@@ -37,7 +37,7 @@ pub(super) struct Tracer<'a> {
     pub(super) world: &'a World,
     pub(super) settings: &'a RenderSettings,
     pub(super) token: &'a CancelToken,
-    /// Those of the samples of all jobs, where they are gathered.
+    /// Photon maps of all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
 }
 
@@ -49,16 +49,16 @@ pub(super) struct Job {
     pub(super) samples: Range<u32>,
 }
 
-/// What a job took.
+/// Cost of a job.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cost {
     pub(super) rays: RayCounters,
-    /// Of one processor; nothing of a picture depends on it.
+    /// Processor seconds; the picture does not depend on them.
     pub(super) seconds: f64,
 }
 
 impl Job {
-    /// How many pixels there are.
+    /// Number of pixels.
     pub(super) fn pixel_count(&self) -> u64 {
         self.pixels.count() as u64
     }

@@ -43,9 +43,9 @@ pub(super) fn start_with(means: Means) -> std::io::Result<Handle> {
 /// A running worker. Dropping it ends the worker, which may take as long as a file takes to be written.
 #[derive(Debug)]
 pub struct Handle {
-    /// What the worker says.
+    /// Events of the worker.
     pub events: Receiver<Event>,
-    /// Where it puts pictures.
+    /// Slot for preview pictures.
     pub previews: PreviewSlot,
     remote: Remote,
     contents: Arc<Contents>,
@@ -63,7 +63,7 @@ impl Handle {
         self.remote.clone()
     }
 
-    /// What the worker knows of files, for a watcher of the same ones.
+    /// The worker's knowledge of files, for a watcher of the same files.
     pub fn contents(&self) -> Arc<Contents> {
         Arc::clone(&self.contents)
     }
@@ -96,7 +96,7 @@ impl Drop for Handle {
     fn drop(&mut self) {
         self.send(Command::Quit);
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread was said as an event.
+            // An event has reported a panic of the thread.
             let _ = thread.join();
         }
     }
@@ -117,7 +117,7 @@ struct Mailbox {
     is_write_postponed: bool,
     /// The order to write came when the request that waits was there: it is meant.
     is_write_of_waiting: bool,
-    /// What the request under way shows, and from where.
+    /// View and camera of the request under way.
     shown: (Option<View>, CameraChange),
     /// Another size of the previews.
     preview: Option<Option<PreviewSize>>,
@@ -125,21 +125,21 @@ struct Mailbox {
     /// Whether the newest request is held.
     paused: bool,
     quit: bool,
-    /// Of the request under way.
+    /// Token of the request under way.
     token: CancelToken,
-    /// Of the writing at its end: a picture that is whole is not lost to a pause, to the end of the program or to a request that
-    /// writes nothing.
+    /// Token of the write stage: a whole picture is not lost to a pause, to the end of the program or to a request that writes
+    /// nothing.
     writing: CancelToken,
     /// Generation of the newest request.
     newest: u64,
 }
 
-/// What a request shows, and from where.
+/// View and camera of a request.
 fn shown(request: &Request) -> (Option<View>, CameraChange) {
     (request.overrides.view, request.overrides.camera)
 }
 
-/// What the worker does next.
+/// Next task of the worker.
 enum Task {
     /// With the tokens of the work and of the writing at its end.
     Render(Box<Request>, CancelToken, CancelToken),
@@ -202,7 +202,7 @@ impl Remote {
 
     fn say_cancelled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
-            // A front end that is gone need not be told.
+            // A front end that is gone needs no events.
             let _ = self.events.send(Event::Cancelled { generation: request.generation });
         }
     }
@@ -211,8 +211,8 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keep an order to write for the request that waits where it is meant, or where it shows the same view as the picture at hand
-    /// and that has holes; true: it is kept.
+    /// Keeps an order to write for the waiting request, if it is meant, or if it shows the same view as the current picture and
+    /// that has holes. Returns whether the order is kept.
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;

@@ -1,4 +1,4 @@
-//! What an edit changed in the text of a scene, in a few words.
+//! Changes of an edit in the text of a scene, in a few words.
 
 use super::sanitize::shortened;
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// How bad it is.
+/// Severity of a diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The scene cannot be rendered.
@@ -13,18 +13,18 @@ pub enum Severity {
     Warning,
 }
 
-/// One thing that is wrong with a scene or with a file that it names.
+/// A mistake in a scene, or in a file that it names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnostic {
     /// Error or warning.
     pub severity: Severity,
-    /// What is wrong, in one line, starting with a small letter.
+    /// The mistake, in one line, starting with a small letter.
     pub message: String,
-    /// The file it is about; empty where it is about the call.
+    /// The file with the mistake; empty for the call itself.
     pub path: PathBuf,
     /// The place in that file, if it has one.
     pub place: Option<Place>,
-    /// What was expected, or the way out.
+    /// Expected values, or the way out.
     pub help: Option<String>,
 }
 

@@ -27,7 +27,7 @@ pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, Stri
         .ok_or_else(|| "the table [camera] is written in a way that glimt cannot change".to_owned())
 }
 
-/// What is to be changed in a table.
+/// Edits of a table.
 struct Edits<'t> {
     text: &'t str,
     table: Entries<'t>,
@@ -100,7 +100,7 @@ impl Edits<'_> {
         }
     }
 
-    /// What stands before a key in its line.
+    /// Text before a key in its line.
     fn indent(&self, key: &KeyValue<'_>) -> &str {
         let line = self.text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         &self.text[line..key.span.start]
@@ -112,7 +112,7 @@ impl Edits<'_> {
         indent.is_empty() || indent.ends_with('.')
     }
 
-    /// What stands between a key with its value and the next one.
+    /// Text between a key with its value and the next key.
     fn between(&self, key: &KeyValue<'_>) -> String {
         if self.has_line(key) {
             format!("{}{}", self.line_end(key), self.indent(key))
@@ -121,7 +121,7 @@ impl Edits<'_> {
         }
     }
 
-    /// How the line ends that this key is in; how the one before does if it is the last and has no end.
+    /// Line ending after this key; that of the line before, if this line is the last and has none.
     fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
         let (before, after) = self.text.split_at(key.value.span().end);
         let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();
@@ -267,7 +267,7 @@ mod tests {
         }
     }
 
-    /// What a person wrote for persons: comments and empty lines, with the number of lines that hold keys between them.
+    /// Comments and empty lines, written for persons, with the number of lines with keys between them.
     fn words(text: &str) -> Vec<String> {
         let comment = |line: &str| line.split_once('#').map(|(_, words)| words.to_owned());
         text.lines()

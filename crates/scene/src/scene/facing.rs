@@ -6,7 +6,7 @@ use super::description::{Camera, Mesh, Object, Scene, Shape};
 use crate::math::DVec3;
 use crate::math::transform::Transform;
 
-/// What is said of such a light, beneath its place, and as the way out.
+/// Warning about such a light, with its label and the way out.
 pub(super) const MESSAGE: &str = "this light shines away from everything";
 pub(super) const LABEL: &str = "all shapes are behind it";
 pub(super) const HELP: &str = "swap `u` and `v`: its front is along u × v";
@@ -14,11 +14,11 @@ pub(super) const HELP: &str = "swap `u` and `v`: its front is along u × v";
 /// The least and the greatest coordinates of a mesh file; `None` if it has no vertices.
 pub type MeshBounds = Option<[DVec3; 2]>;
 
-/// What is in front of a light counts from this part of what is behind it on: a ceiling just above it does not.
+/// Least ratio of a reach in front of a light to the reach behind it that counts: a ceiling just above the light does not.
 const LEAST: f64 = 0.02;
 
-/// The quads that send light where nothing is, while all that could be lit is behind them. The bounds of the scene's mesh
-/// files are asked for if there are such lights.
+/// Quads that send light where nothing is, while all that they could light is behind them. Asks for the bounds of the scene's
+/// mesh files only if there are such lights.
 pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Range<usize>> {
     let emits = |object: &Object| object.material.is_some_and(|index| scene.materials[index].emits());
     let quad = |object: &Object| {
@@ -57,7 +57,7 @@ fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     }
 }
 
-/// How far a shape reaches in a direction of length 1, or a little further than that.
+/// Reach of a shape in a direction of length 1, or a little more.
 fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
     let along = |place: DVec3| direction.dot(place);
     let most = |places: &[DVec3]| places.iter().copied().map(along).fold(f64::NEG_INFINITY, f64::max);
@@ -70,7 +70,7 @@ fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
         Shape::Sphere { center, radius } => along(center) + radius,
         Shape::Quad { corner, u, v } => most(&[corner, corner + u, corner + v, corner + u + v]),
         Shape::Triangle { a, b, c } => most(&[a, b, c]),
-        // It has an end where it is parallel alone.
+        // A plane is bounded only in the direction of its normal.
         Shape::Plane { point, normal } => {
             let is_parallel = normal.try_normalize().is_some_and(|normal| along(normal).abs() > 1.0 - 1e-9);
             if is_parallel { along(point) } else { f64::INFINITY }

@@ -1,4 +1,4 @@
-//! What a stage read, as a number: equal fingerprints mean equal inputs.
+//! Fingerprints of the values that a stage read: equal fingerprints mean equal inputs.
 
 use super::description::Texture;
 use crate::choice::Choice;
@@ -11,14 +11,14 @@ pub trait Fingerprinted {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>);
 }
 
-/// What a description refers to by index.
+/// Things that descriptions refer to by index.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Referents<'a> {
     /// The scene's textures.
     pub textures: &'a [Texture],
     /// The contents of the scene's mesh files.
     pub meshes: &'a [Key],
-    /// What the camera's orbiter file says.
+    /// Text of the camera's orbiter file.
     pub orbiter: Option<&'a str>,
 }
 

@@ -40,17 +40,17 @@ const MAX_PARTS: usize = 32 << 20;
 /// A scene file that can be rendered.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// What it means.
+    /// Its meaning.
     pub scene: Arc<Scene>,
     /// Its text, and what the call sets, which every span in [`Self::scene`] points into.
     pub source: Source,
     /// The file, as named by the caller.
     pub path: PathBuf,
-    /// What is probably not meant, in the order of the file.
+    /// Likely mistakes, in the order of the file.
     pub warnings: Vec<Diagnostic>,
     /// Files that the scene file names, where the call sets anything: other ones may be read in their place.
     pub named: Vec<PathBuf>,
-    /// Where the values of settings stand.
+    /// Places of the settings' values.
     pub settings: Vec<Setting>,
 }
 
@@ -88,8 +88,8 @@ impl Loaded {
         document::camera_of(&Source::with_sets(text.into(), sets).ok()?)
     }
 
-    /// A warning for each light that shines away from everything, where that shows only by the meshes: once they are loaded. Their
-    /// bounds, one for each of [`Scene::mesh_files`], are asked for if there are such lights.
+    /// A warning for each light that shines away from everything, as far as only the loaded meshes show it. Asks for their
+    /// bounds, one for each of [`Scene::mesh_files`], if there are such lights.
     pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Diagnostic> {
         if self.scene.mesh_files.is_empty() {
             return Vec::new();
@@ -111,7 +111,7 @@ impl Loaded {
         before.bytes().filter(|byte| *byte == b'\n').count() + 1
     }
 
-    /// Where a setting gets its value: in the file or in what the call sets; none: nowhere.
+    /// Place of a setting's value: in the file or in the values that the call sets. `None` if neither sets it.
     pub fn setting(&self, table: &str, key: &str) -> Option<Range<usize>> {
         let is_it = |setting: &&Setting| setting.table == table && setting.key == key;
         self.settings.iter().find(is_it).map(|setting| setting.span.clone())
@@ -131,14 +131,14 @@ impl Loaded {
     }
 }
 
-/// What a text says, as far as it could be understood.
+/// Meaning of a text, as far as it could be understood.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The scene; none if there is an error.
     pub scene: Option<Scene>,
     /// Errors and warnings, in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
-    /// Where the values of settings stand.
+    /// Places of the settings' values.
     pub settings: Vec<Setting>,
 }
 

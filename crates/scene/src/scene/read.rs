@@ -80,7 +80,7 @@ fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     Ok(bytes)
 }
 
-/// What the memory that a text takes grows with, counted.
+/// Number of the parts with which the memory of a text grows.
 fn parts(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
@@ -123,7 +123,7 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
 /// Files of a folder that are looked at.
 pub(super) const MOST_FILES: usize = 2_000;
 
-/// The file beside a missing one whose name is nearest to it, of those that may be meant.
+/// The file beside a missing one with the nearest name, among those that may be meant.
 pub(super) fn neighbour(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let folder = path.parent()?;
     let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -150,7 +150,7 @@ fn may_be_scene(found: &Path) -> bool {
     found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Whether a name that leads to no file is a link all the same.
+/// Whether a name of a missing file is a link.
 pub(super) fn is_link(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink())
 }
@@ -197,7 +197,7 @@ mod tests {
             .expect("a link");
         let not_regular = message(&folder.path().join("hal.toml"));
         assert!(not_regular.help.expect("a way out").contains("glimt new"));
-        // A picture is no scene.
+        // An image does not count as a scene.
         std::fs::write(folder.path().join("my_hall.png"), "").expect("written");
         let picture = message(&folder.path().join("my_hall.toml"));
         assert!(picture.help.expect("a way out").contains("glimt new"));

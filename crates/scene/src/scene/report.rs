@@ -141,7 +141,7 @@ struct Excerpt {
 }
 
 impl Excerpt {
-    /// Of very long lines only what is near the place is kept.
+    /// Bytes of a very long line that are kept, near the place.
     const NEAR_BYTES: usize = 1_000;
 
     fn new(source: &str, line: Range<usize>, place: &Range<usize>) -> Self {
@@ -177,7 +177,7 @@ fn floor_char(source: &str, offset: usize) -> usize {
     offset
 }
 
-/// Where the lines of a text begin.
+/// Beginnings of a text's lines.
 pub(super) struct LineIndex {
     starts: Vec<usize>,
 }

@@ -1,4 +1,4 @@
-//! What the call sets in a scene.
+//! Tests of values that the call sets in a scene.
 
 use std::path::Path;
 

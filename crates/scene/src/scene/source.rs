@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::diagnostic::{Diagnostic, Place, Severity};
 use super::toml::is_key_value;
 
-/// What messages name in place of a file, where it is about what the call sets.
+/// Name in place of a file in messages about values that the call sets.
 const CALL: &str = "--set";
 
 /// A scene file and what the call sets.
@@ -19,7 +19,7 @@ pub struct Source {
     sets: Vec<Set>,
 }
 
-/// What the call sets: its part of the text, and the same as a text of its own.
+/// A value that the call sets: its part of the text, and the same as a text of its own.
 #[derive(Clone, Debug)]
 struct Set {
     span: Range<usize>,
@@ -32,10 +32,10 @@ impl Source {
         Self { file: text.len(), all: text, sets: Vec::new() }
     }
 
-    /// A file and texts of the form `TABLE.KEY=VALUE`. A value that is not TOML and no number is taken for a text.
+    /// A file with texts of the form `TABLE.KEY=VALUE`. A value that is neither TOML nor a number is taken for a text.
     ///
     /// # Errors
-    /// Each of them that is not of that form.
+    /// Each text that does not have that form.
     pub fn with_sets(file: Arc<str>, sets: &[String]) -> Result<Self, Vec<Diagnostic>> {
         if sets.is_empty() {
             return Ok(Self::file(file));
@@ -68,7 +68,7 @@ impl Source {
         self.all.get(..self.file).unwrap_or_default()
     }
 
-    /// Where the things begin that are set.
+    /// Beginnings of the values that the call sets.
     pub(super) fn sets(&self) -> impl Iterator<Item = usize> + '_ {
         self.sets.iter().map(|set| set.span.start)
     }

@@ -1,4 +1,4 @@
-//! What a key can mean.
+//! The actions that keys trigger.
 
 /// One thing that a person can ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

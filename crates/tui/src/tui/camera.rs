@@ -1,4 +1,5 @@
-//! How keys and the mouse move the camera. A moved camera has short numbers, so that it can be written into a scene as it is shown.
+//! Moves of the camera by keys and the mouse. A moved camera has short numbers, so that glimt can write it into a scene as it is
+//! shown.
 
 use crate::math::DVec3;
 use crate::math::decimal::{rounded, step_at};
@@ -9,7 +10,7 @@ use crate::scene::description::Pose;
 const POLE: f64 = 1.0;
 /// The field of view stays within these angles, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// How many times nearer or farther than the scene's own camera the eye may come.
+/// Greatest ratio between the eye's distance and that of the scene's own camera, nearer and farther.
 pub(super) const REACH: f64 = 1000.0;
 
 /// Around `look_at`: so many degrees to the right and up.

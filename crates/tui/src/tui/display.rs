@@ -1,4 +1,4 @@
-//! What is wanted on the screen, led there slice by slice as the line has room.
+//! The display: leads the screen to the requested cells, slice by slice as the line has room.
 
 use std::time::{Duration, Instant};
 
@@ -6,16 +6,16 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::color::ColorDepth;
+use super::event::FrameReport;
 use super::graphics::{Images, Placement};
-use super::input::Answer;
+use super::known::Answer;
 use super::known::Ask;
 use super::line::{Line, Question};
 use super::paint::{Fidelity, Painter};
-use super::state::FrameReport;
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
 const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
-/// What it is (DA1): the last of the first questions.
+/// Question for the device attributes (DA1): the last of the first questions.
 const ATTRIBUTES: &[u8] = b"\x1b[c";
 /// A status report (DSR).
 const STATUS: &[u8] = b"\x1b[5n";
@@ -24,7 +24,7 @@ const END: &[u8] = b"\x1b[?2026l";
 /// Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 
-/// What is known of the way to the terminal before anything was sent.
+/// The way to the terminal, as far as it is known before anything was sent.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Way {
     /// Inside tmux or screen, which answer themselves and draw when they like.
@@ -33,7 +33,7 @@ pub(super) struct Way {
     pub(super) is_remote: bool,
     /// Whether the terminal knows REP.
     pub(super) can_repeat: bool,
-    /// What the terminal is asked of itself.
+    /// Questions to the terminal.
     pub(super) ask: Ask,
 }
 
@@ -44,13 +44,13 @@ impl Way {
     }
 }
 
-/// What takes bytes for the terminal and does not wait until they are written.
+/// A writer to the terminal that does not wait until the bytes are written.
 pub(super) type Out = Box<dyn FnMut(Vec<u8>)>;
 
 /// The screen as the loop sees it.
 pub(super) struct Display {
     painter: Painter,
-    /// The picture, where it is drawn in pixels.
+    /// The picture, if it is drawn in pixels.
     images: Option<Images>,
     line: Line,
     way: Way,
@@ -62,7 +62,7 @@ pub(super) struct Display {
     is_complete: bool,
     /// Bytes of the picture under way.
     frame: Option<usize>,
-    /// Of the last picture.
+    /// Cost of the last picture.
     report: Option<FrameReport>,
     /// Whether that is news.
     is_reported: bool,
@@ -109,7 +109,7 @@ impl Display {
         self.images.is_some()
     }
 
-    /// The picture in pixels that is to be seen from now on, if there is one; none: cells are in its place.
+    /// Places the picture in pixels. `None` if cells take its place.
     pub(super) fn place(&mut self, wanted: Option<Placement>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.aim(wanted, is_still)) {
             self.painter.damage(uncovered);
@@ -214,7 +214,7 @@ impl Display {
         self.is_complete && !self.line.owes()
     }
 
-    /// What the line takes, as far as it shows; none: more than anybody would notice.
+    /// Rate of the line, as far as it shows. `None` if it is faster than anybody would notice.
     pub(super) fn bytes_per_second(&self) -> Option<f64> {
         self.line.bytes_per_second()
     }
@@ -238,7 +238,7 @@ impl Display {
         (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
     }
 
-    /// How long to wait for answers that would else be typed into the shell; none: nothing is owed.
+    /// Time to wait for answers that would otherwise be typed into the shell. `None` if no answer is due.
     pub(super) fn patience(&self) -> Option<Duration> {
         const LEAST: Duration = Duration::from_millis(200);
         const MOST: Duration = Duration::from_secs(1);

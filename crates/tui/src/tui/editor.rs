@@ -2,7 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use nix::errno::Errno;
@@ -10,20 +10,11 @@ use nix::sys::signal::Signal;
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 
+use super::event::FilePlace;
 use super::signals;
 
-/// Where nothing says which editor it is.
+/// The editor, if the environment names none.
 const DEFAULT: &str = "vi";
-
-/// A place in a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct FilePlace {
-    pub path: PathBuf,
-    /// From 1.
-    pub line: usize,
-    /// From 1.
-    pub column: usize,
-}
 
 /// The editor that the environment names: words for a shell.
 pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {
@@ -69,7 +60,8 @@ fn wait(id: Pid) -> Result<WaitStatus, Errno> {
     }
 }
 
-/// What the shell is to run. Plain words take its place: a shell in between would keep signals from the editor.
+/// Command line for the shell. The editor takes the shell's place where words are plain: a shell in between would keep signals
+/// from the editor.
 fn line(editor: &str) -> String {
     let is_plain = |character: char| character.is_alphanumeric() || " -_./+,:@%".contains(character);
     let is_of_shell = ["command", "eval", "exec", "time", "."].contains(&program(editor));
@@ -77,7 +69,7 @@ fn line(editor: &str) -> String {
     format!("{exec}{editor} \"$@\"")
 }
 
-/// What leads an editor to a place.
+/// Arguments that lead an editor to a place.
 fn arguments(editor: &str, place: &FilePlace) -> Vec<OsString> {
     let FilePlace { path, line, column } = place;
     // A name that begins with a dash is no option.
@@ -101,7 +93,7 @@ fn arguments(editor: &str, place: &FilePlace) -> Vec<OsString> {
                 if editor.contains(" -g") || editor.contains("--goto") { None } else { Some("-g".into()) };
             wait.into_iter().chain(goto).chain([with_place()]).collect()
         }
-        // Of others nobody knows how they are told.
+        // Nobody knows how to tell other editors.
         _ => vec![path.into()],
     }
 }

@@ -1,4 +1,4 @@
-//! What the environment tells of the terminal and of the way to it.
+//! Knowledge about the terminal, and about the way to it, from the environment.
 
 use super::color::{ColorChoice, ColorDepth};
 use super::display::Way;
@@ -7,7 +7,7 @@ use super::options::PreviewChoice;
 use super::paint::can_repeat;
 use super::preview_kind::PreviewKind;
 
-/// What the environment tells of the way to the terminal.
+/// The way to the terminal, from the environment.
 pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
     let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
     let term = variable("TERM").unwrap_or_default();
@@ -22,8 +22,8 @@ pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
     }
 }
 
-/// What to ask the terminal of itself. Multiplexers answer for themselves or not at all, the Linux console and Apple's terminal
-/// may print what they do not know.
+/// Questions to ask the terminal. Multiplexers answer for themselves or not at all; the Linux console and Apple's terminal may
+/// print sequences that they do not know.
 pub(super) fn ask(
     preview: PreviewChoice,
     color: ColorChoice,

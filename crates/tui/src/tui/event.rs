@@ -3,13 +3,12 @@
 use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::editor::FilePlace;
-use super::input::Answer;
+use super::known::Answer;
 use super::options::{Changed, News};
-use super::state::FrameReport;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, Section};
 
@@ -34,8 +33,8 @@ pub(super) enum Event {
     Resize(Window),
     /// The worker says something. Pictures come as [`Event::Picture`].
     Worker(protocol::Event),
-    /// The newest picture of the slot, with the least and the greatest number where it is stretched to them, and the part that it is
-    /// where it is shown pixel by pixel; and whether it lacks the light of photons.
+    /// The newest picture of the slot. `range`: its least and greatest number, if it is stretched to them. `section`: the part of
+    /// the image that it shows pixel by pixel.
     Picture {
         generation: u64,
         picture: Arc<Picture>,
@@ -45,7 +44,7 @@ pub(super) enum Event {
     },
     /// A file that the scene depends on was written.
     Changed(Changed),
-    /// Nobody is writing the files that were said to have changed.
+    /// Nobody is writing the changed files any more.
     Settled,
     /// A signal, or what amounts to one.
     Signal(Signal),
@@ -64,7 +63,7 @@ pub(super) enum Event {
 }
 
 impl Event {
-    /// What the watcher says.
+    /// The event for the watcher's news.
     pub(super) fn of_watcher(news: News) -> Self {
         match news {
             News::Changed(changed) => Self::Changed(changed),
@@ -107,7 +106,7 @@ pub(super) struct Mouse {
     pub row: u16,
 }
 
-/// What the mouse did.
+/// Actions of the mouse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MouseKind {
     Press,
@@ -125,7 +124,7 @@ pub(super) struct Window {
     pub rows: u16,
     /// Height of a cell over its width.
     pub cell_aspect: f32,
-    /// Width and height of a cell in pixels; likely ones where it is not known.
+    /// Width and height of a cell in pixels; likely ones if the terminal does not report them.
     pub cell_pixels: (u16, u16),
 }
 
@@ -148,7 +147,7 @@ pub(super) enum Signal {
     Resize,
 }
 
-/// Where events come from.
+/// Sources of events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     Worker,
@@ -156,7 +155,7 @@ pub(super) enum Source {
     Keys,
 }
 
-/// What the loop has to do for the state.
+/// Side effects that the loop carries out.
 #[derive(Clone, Debug)]
 pub(super) enum Effect {
     /// An order for the worker.
@@ -179,11 +178,29 @@ pub(super) enum Effect {
     Measure,
 }
 
+/// A place in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct FilePlace {
+    pub path: PathBuf,
+    /// From 1.
+    pub line: usize,
+    /// From 1.
+    pub column: usize,
+}
+
+/// Cost of the last picture on its way to the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FrameReport {
+    pub bytes: usize,
+    /// Time until the terminal answers. `None` if it does not.
+    pub round_trip: Option<Duration>,
+}
+
 /// Why a picture is not on disk although it is to be.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unwritten {
     pub why: String,
-    /// Of which request.
+    /// Number of the request.
     pub generation: u64,
 }
 
@@ -192,8 +209,8 @@ pub(super) struct Unwritten {
 pub(super) struct Written {
     pub path: PathBuf,
     pub bytes: u64,
-    /// Of which request.
+    /// Number of the request.
     pub generation: u64,
-    /// What the file holds, in words, as far as it is known.
+    /// Description of the file, in words, as far as it is known.
     pub made: String,
 }

@@ -96,7 +96,7 @@ impl Desk {
 
     /// A render from beginning to end, its picture in one colour.
     pub(super) fn finish(&mut self, color: [u8; 3]) {
-        let generation = self.state.generation;
+        let generation = self.state.request.generation;
         self.worker(protocol::Event::Started { generation });
         self.worker(protocol::Event::Settings {
             generation,
@@ -115,15 +115,16 @@ impl Desk {
     }
 
     pub(super) fn fail(&mut self, diagnostics: Vec<Diagnostic>) {
-        let generation = self.state.generation;
+        let generation = self.state.request.generation;
         self.worker(protocol::Event::Started { generation });
         self.worker(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
     }
 
-    /// What is on the screen.
+    /// The screen as it is drawn now.
     pub(super) fn screen(&mut self) -> Buffer {
         self.state.dirty = false;
-        let mut buffer = Buffer::empty(Rect::new(0, 0, self.state.window.columns, self.state.window.rows));
+        let mut buffer =
+            Buffer::empty(Rect::new(0, 0, self.state.display.window.columns, self.state.display.window.rows));
         view::draw(&self.state, &mut buffer);
         buffer
     }

@@ -1,12 +1,27 @@
 //! The last pictures, within bounds.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::state::Shown;
+use crate::film::Picture;
+use crate::pipeline::protocol::Section;
 
 /// Bytes that all of them take, at most.
 const MOST_BYTES: usize = 16 << 20;
+
+/// A picture and the request that it shows.
+#[derive(Clone, Debug)]
+pub(in crate::tui) struct Shown {
+    pub generation: u64,
+    pub picture: Arc<Picture>,
+    /// Least and greatest number of the view, if the picture is stretched to them.
+    pub range: Option<[f32; 2]>,
+    /// The part of the image that is shown pixel by pixel. `None` if all of the image is shown.
+    pub section: Option<Section>,
+    /// Whether it lacks the light of photons, which are still being traced.
+    pub lacks_photons: bool,
+}
 
 /// The last pictures, and which of them is looked at.
 #[derive(Debug, Default)]
@@ -15,9 +30,9 @@ pub(super) struct History {
     past: VecDeque<Past>,
     /// Edits of the scene so far.
     edits: u64,
-    /// What edits changed, by their numbers.
+    /// Changes by edits, by the edits' numbers.
     texts: BTreeMap<u64, String>,
-    /// Which one is looked at, and the newest picture meanwhile.
+    /// Index of the picture that is looked at, and the newest picture meanwhile.
     open: Option<(usize, Shown)>,
 }
 
@@ -34,17 +49,17 @@ impl History {
         self.edits += 1;
     }
 
-    /// What the last edit changed.
+    /// Notes the changes of the last edit.
     pub(super) fn describe_edit(&mut self, what: String) {
         self.texts.insert(self.edits, what);
     }
 
-    /// What the last edit changed, if it is known.
+    /// Changes of the last edit, if they are known.
     pub(super) fn last_edit(&self) -> Option<&str> {
         self.texts.get(&self.edits).map(String::as_str)
     }
 
-    /// What the edit changed that the picture is after which is looked at.
+    /// Changes of the edit before the picture that is looked at.
     pub(super) fn edit_of_open(&self) -> Option<&str> {
         let (at, _) = self.open.as_ref()?;
         self.texts.get(&self.past.get(*at)?.edits).map(String::as_str)
@@ -58,7 +73,7 @@ impl History {
         }
     }
 
-    /// That edit changed nothing that is seen.
+    /// Forgets the last edit, which changed nothing visible.
     pub(super) fn edited_nothing(&mut self) {
         self.edits = self.edits.saturating_sub(1);
     }
@@ -107,7 +122,7 @@ impl History {
         self.is_open()
     }
 
-    /// So many pictures back; negative: forth.
+    /// Goes so many pictures back; negative: forward.
     pub(super) fn step(&mut self, back: isize, newest: Shown) -> Option<Shown> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
@@ -150,7 +165,7 @@ impl Past {
     }
 }
 
-/// How long ago, in words.
+/// Time that has passed, in words.
 pub(super) fn ago(time: Duration) -> String {
     match time.as_secs() {
         seconds @ ..120 => format!("{seconds} s ago"),

@@ -9,10 +9,10 @@ use super::event::KeyPress;
 pub(super) struct Binding<A = Action> {
     /// The keys that do it.
     pub keys: &'static [KeyPress],
-    /// How they are written in the help; empty: the line before says it.
+    /// Labels of the keys in the help; empty if the line before has them.
     pub label: &'static str,
     pub action: A,
-    /// What it does, for the help; empty: the line before says it.
+    /// Effect of the keys, for the help; empty if the line before tells it.
     pub help: &'static str,
     /// One word for the line of keys; empty: not there.
     pub hint: &'static str,
@@ -55,14 +55,14 @@ pub(super) const KEYMAP: &[Binding] = &[
         &[KeyPress::plain('z')],
         "z",
         Action::RectangleFirst,
-        "then a drag: that comes first; z z the crosshair; z ends it",
+        "drag what to render first; z z: at the crosshair; z: end",
         "",
     ),
     binding(
         &[LEFT, KeyPress::plain('h')],
         "arrows hjkl",
         Action::OrbitLeft,
-        "the camera around what it looks at; a drag too",
+        "orbit the camera; a drag too",
         "",
     ),
     binding(&[DOWN, KeyPress::plain('j')], "", Action::OrbitDown, "", ""),
@@ -80,20 +80,20 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('>')], "", Action::WidenField, "", ""),
     binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "exposure: darker, brighter", ""),
     binding(&[KeyPress::plain(']')], "", Action::Brighten, "", ""),
+    binding(&[KeyPress::plain('f')], "f", Action::Focus, "click to focus there; f f: at the crosshair", ""),
+    binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
     binding(
-        &[KeyPress::plain('f')],
-        "f",
-        Action::Focus,
-        "then a click: focus there; f f at the crosshair",
+        &[KeyPress::special(KeyCode::Enter)],
+        "Enter, click",
+        Action::Inspect,
+        "inspect the object there",
         "",
     ),
-    binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
-    binding(&[KeyPress::special(KeyCode::Enter)], "Enter, click", Action::Inspect, "say what is there", ""),
     binding(
         &[KeyPress::plain('o')],
         "o",
         Action::Edit,
-        "the editor at the error, or at what was clicked",
+        "open the editor at the error or the clicked object",
         "",
     ),
     binding(&[KeyPress::plain('m')], "m", Action::ToggleMouse, "mouse on, off (to select text)", ""),
@@ -101,7 +101,7 @@ pub(super) const KEYMAP: &[Binding] = &[
         &[KeyPress::plain('b')],
         "b",
         Action::BeforeAfter,
-        "before and after the last edit, in turns",
+        "switch between before and after the last edit",
         "",
     ),
     binding(&[KeyPress::plain('n')], "n N", Action::OlderPicture, "older, newer pictures", ""),
@@ -116,7 +116,7 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];
 
-/// What a key can mean while the help, the errors or the list of views are open, before what it means else.
+/// Actions of keys while the help, the errors or the list of views are open; they come before the usual actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Overlay {
     LineUp,
@@ -167,13 +167,13 @@ pub(super) const OVERLAY: &[Binding<Overlay>] = &[
     ),
 ];
 
-/// What a key means to what lies over the picture, if anything.
+/// The action of a key on an overlay, if it has one.
 pub(super) fn overlay(key: KeyPress) -> Option<Overlay> {
     OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// What a key means, if anything. Terminals differ in whether they report shift beside a capital or `?`, so
-/// shift does not count for characters.
+/// The action of a key, if it has one. Terminals differ in whether they report shift beside a capital or `?`, so shift does not
+/// count for characters.
 pub(super) fn action(key: KeyPress) -> Option<Action> {
     let modifiers = match key.code {
         KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,

@@ -1,4 +1,4 @@
-//! What terminals are known to have, by the names that they tell, and what they are asked.
+//! Abilities of terminals by the names that they report, and questions to ask them.
 
 /// The finest blocks that a terminal draws itself, whatever its font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ const KNOWN: [(&str, Option<[u32; 2]>); 6] = [
 ];
 
 impl Blocks {
-    /// By name and version: `foot(1.20.2)`, `ghostty 1.2.0`.
+    /// Blocks by a terminal's name and version: `foot(1.20.2)`, `ghostty 1.2.0`.
     pub(super) fn of(report: &str) -> Self {
         let (name, version) = report.split_at(report.find(['(', ' ']).unwrap_or(report.len()));
         let Some((_, octants)) = KNOWN.iter().find(|(known, _)| name.eq_ignore_ascii_case(known)) else {
@@ -35,11 +35,32 @@ impl Blocks {
     }
 }
 
-/// What the terminal is asked of itself: what is of use, and where it is the terminal that answers. An answer to what was not
-/// asked is not believed.
+/// A report of the terminal, to a question or of its own accord.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// To a status report (DSR 5): all that was sent before has been processed.
+    Ready,
+    /// To a question for the primary device attributes (DA1).
+    Attributes,
+    /// Whether mode 2026 is known, by which large changes appear at once.
+    Synchronized { is_known: bool },
+    /// Its name (XTVERSION), as far as it says which blocks it draws.
+    Blocks(Blocks),
+    /// It has 24 bits of colour (XTGETTCAP).
+    TrueColor,
+    /// Its background, in sRGB (OSC 11).
+    Background([u8; 3]),
+    /// One of its palette, in sRGB (OSC 4).
+    Ink { index: u8, rgb: [u8; 3] },
+    /// Any other report: the cursor's position, modes, colours, names, focus.
+    Other,
+}
+
+/// Questions to the terminal: only useful ones, and only if the terminal itself answers. glimt ignores answers to other
+/// questions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Ask {
-    /// Which blocks it draws, by its name.
+    /// The blocks that it draws, by its name.
     pub(super) blocks: bool,
     /// Whether it has 24 bits of colour.
     pub(super) true_color: bool,

@@ -1,4 +1,4 @@
-//! What the front end is given and what it gives back.
+//! Inputs and results of the front end.
 
 use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
@@ -10,9 +10,9 @@ use crate::pipeline::settings::Overrides;
 pub use crate::pipeline::watch::{Changed, News};
 
 choice! {
-    /// How the preview is drawn.
+    /// Choice of how the preview is drawn.
     pub enum PreviewChoice {
-        /// The finest blocks that the terminal is known to have where there is colour, characters elsewhere.
+        /// The finest blocks that the terminal is known to have if it has colours, else characters.
         Auto = "auto",
         /// Two pixels a cell.
         HalfBlock = "halfblock",
@@ -39,25 +39,25 @@ choice! {
 pub struct Options {
     /// The scene file.
     pub scene: PathBuf,
-    /// What the command line changes of it; the keys change more on top.
+    /// Overrides of the command line; the keys change more on top.
     pub overrides: Overrides,
-    /// How many colours.
+    /// Choice of colours.
     pub color: ColorChoice,
-    /// How the preview is drawn.
+    /// Choice of how the preview is drawn.
     pub preview: PreviewChoice,
-    /// Height of a cell over its width; none: asked of the terminal, else 2.
+    /// Height of a cell over its width. `None` to ask the terminal; if it does not answer, 2.
     pub cell_aspect: Option<f32>,
-    /// Where orders go. Must not block.
+    /// Sends orders to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
-    /// What the worker says. Its end means that the worker is gone, which ends the front end.
+    /// Events of the worker. Their end means that the worker is gone, which ends the front end.
     pub events: Receiver<Event>,
-    /// Where the worker puts pictures.
+    /// Slot of the worker's preview pictures.
     pub previews: PreviewSlot,
-    /// What the watcher says. Its end is said in the message line.
+    /// News from the watcher. A message reports their end.
     pub news: Receiver<News>,
 }
 
-/// How the program is to end: its exit code.
+/// Exit code of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExitStatus(pub u8);
 
@@ -79,14 +79,14 @@ impl ExitStatus {
     }
 }
 
-/// How the front end ended.
+/// Result of the front end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ended {
-    /// How the program is to end.
+    /// Exit code of the program.
     pub status: ExitStatus,
-    /// Whether a picture was asked for and the person does not know yet what came of it.
+    /// Whether a person ordered an image and does not know the outcome yet.
     pub is_write_unanswered: bool,
-    /// What was written, its samples and its seconds, in one line.
+    /// The files written, with their samples and seconds, in one line.
     pub summary: String,
     /// Whether the last picture that was to be written is not on disk.
     pub is_unwritten: bool,
@@ -104,7 +104,7 @@ pub enum TuiError {
     /// The terminal could not be set up or written to.
     #[error("cannot {action} the terminal: {source}; `--once` renders without one")]
     Terminal {
-        /// What was tried.
+        /// The action that failed.
         action: &'static str,
         /// Why not.
         source: std::io::Error,

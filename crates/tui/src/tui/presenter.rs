@@ -1,6 +1,6 @@
 //! Pictures on their way to the screen: which are worth being drawn, when, and how near to them the cells have to come.
 //!
-//! What time it is comes with each call, so that a test can tell it.
+//! The time comes with each call, so that a test can choose it.
 
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
@@ -69,7 +69,7 @@ impl Presenter {
     fn is_other(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Picture| (picture.width, picture.height);
-        latest.as_ref().zip(state.picture.as_ref()).is_some_and(|(new, old)| {
+        latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
             let is_same = what(&new.picture) == what(&old.picture) && new.section == old.section;
             !is_same || new.lacks_photons != old.lacks_photons
         })
@@ -81,7 +81,7 @@ impl Presenter {
     }
 
     fn moment(&self, state: &State, now: Instant) -> Moment {
-        let progress = state.progress.as_ref();
+        let progress = state.work.progress.as_ref();
         let picture = self.drawn.picture.as_ref();
         let is_quick = self.display.is_quick();
         let is_shown = if is_quick { self.display.is_answered() } else { self.display.is_complete() };
@@ -106,8 +106,8 @@ impl Presenter {
         if self.display.draws_pixels() {
             return picture.width * picture.height / 4;
         }
-        let across = state.pixels_across();
-        let pixels = (across * across) as f32 * state.window.cell_aspect;
+        let across = state.display.pixels_across();
+        let pixels = (across * across) as f32 * state.display.window.cell_aspect;
         (f64::from(picture.width) * f64::from(picture.height) / f64::from(pixels)) as u32
     }
 
@@ -134,7 +134,7 @@ impl Presenter {
         self.drawn.is_refined |= is_refined;
         self.postpone(state, now);
         state.dirty = false;
-        let window = state.window;
+        let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         view::draw(state, &mut buffer);
         let is_new = self.note_picture(state, now);
@@ -148,13 +148,13 @@ impl Presenter {
     /// Whether the line stands idle while a key is held that moves the camera: the last picture is there as far as a moving one
     /// has to be, and the next one is not yet.
     fn has_room_to_refine(&self, state: &State) -> bool {
-        let is_step = state.nudge.request == Some(self.drawn.generation);
+        let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
         is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
     }
 
     /// Keeps which picture is drawn; whether it is another one than before.
     fn note_picture(&mut self, state: &State, now: Instant) -> bool {
-        let Some(shown) = &state.picture else { return false };
+        let Some(shown) = &state.picture.shown else { return false };
         if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {
             return false;
         }
@@ -200,12 +200,12 @@ impl Presenter {
 
 /// Samples that a pixel has by now, in the mean.
 fn samples(state: &State) -> f64 {
-    state.progress.as_ref().map_or(0.0, |progress| progress.fraction * f64::from(progress.total_samples))
+    state.work.progress.as_ref().map_or(0.0, |progress| progress.fraction * f64::from(progress.total_samples))
 }
 
 /// Whether the newest picture stays as it is.
 fn is_still(state: &State) -> bool {
-    state.paused || !state.is_running() && view::under::goes_on(state).is_none()
+    state.work.paused || !state.work.is_running() && view::under::goes_on(state).is_none()
 }
 
 /// When the state is to be drawn or told of the time.
@@ -227,7 +227,7 @@ mod tests {
         assert_eq!(next_wake(&state, now), Some(now));
         state.dirty = false;
         assert!(next_wake(&state, now).is_some(), "the clock of a render runs");
-        state.activity = crate::tui::state::Activity::Done;
+        state.work.activity = crate::tui::state::Activity::Done;
         assert_eq!(next_wake(&state, now), None);
     }
 }

@@ -1,11 +1,11 @@
-//! How pictures become cells, by what was asked for and what the terminal can show.
+//! Kinds of previews, by the person's choice and by the terminal's abilities.
 
 use super::color::ColorDepth;
 use super::graphics::Protocol;
 use super::mosaic::Grid;
 use super::options::PreviewChoice;
 
-/// How pictures become cells.
+/// Kinds of previews.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PreviewKind {
     HalfBlock,
@@ -19,7 +19,7 @@ pub(super) enum PreviewKind {
 }
 
 impl PreviewKind {
-    /// How a picture is drawn where it was asked for like this.
+    /// The kind for a choice on a terminal of this depth.
     pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
         match choice {
             PreviewChoice::None => Self::None,
@@ -36,7 +36,7 @@ impl PreviewKind {
         }
     }
 
-    /// The parts of a cell; none: cells have none, or there are no cells.
+    /// The grid of a cell. `None` if cells have no parts, or if there are no cells.
     pub(super) fn grid(self) -> Option<Grid> {
         match self {
             Self::HalfBlock => Some(Grid::Halves),

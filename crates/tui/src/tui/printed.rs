@@ -1,4 +1,4 @@
-//! Pictures among the lines of a terminal: no screen of their own, and the terminal is asked nothing.
+//! Pictures among the lines of a terminal: without a screen of their own, and without questions to the terminal.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

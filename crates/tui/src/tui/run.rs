@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 
 use super::color::{self, ColorDepth};
 use super::display::{Display, Way};
-use super::editor::{self, FilePlace};
+use super::editor;
 use super::environment::{ask, way};
+use super::event::FilePlace;
 use super::event::{Effect, Event, Source};
+use super::exit_summary;
 use super::graphics::Images;
 use super::input;
 use super::options::{Ended, ExitStatus, Options, TuiError};
-use super::parting;
 use super::presenter::Presenter;
 use super::preview_kind::PreviewKind;
 use super::signals::{self, Listener};
@@ -31,11 +32,11 @@ const TURN: Duration = Duration::from_millis(3);
 /// [`Command::Quit`] at the end. To be called once in a process.
 ///
 /// # Errors
-/// [`TuiError`] where there is no terminal, where it cannot be written to, and when the worker is gone.
+/// [`TuiError`] if there is no terminal, if it cannot be written to, or if the worker is gone.
 pub fn run(options: Options) -> Result<Ended, TuiError> {
     terminal::require()?;
     let depth = color::depth(options.color, |name| std::env::var(name).ok());
-    // Otherwise crossterm drops colours that were asked for by name where NO_COLOR is set.
+    // Otherwise crossterm drops colours by name if NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
@@ -115,14 +116,14 @@ struct Ui {
     screen: Screen,
     presenter: Presenter,
     events: Receiver<Event>,
-    /// What came while answers were waited for.
+    /// Events that came while the loop waited for answers.
     postponed: VecDeque<Event>,
     state: State,
     commands: Box<dyn FnMut(Command)>,
     cell_aspect: Option<f32>,
 }
 
-/// How the loop ends.
+/// Ends of the loop.
 enum End {
     Quit(ExitStatus),
     Error(TuiError),
@@ -151,8 +152,9 @@ impl Ui {
             }
             None => ExitStatus::QUIT,
         };
-        let (summary, is_unwritten) = (parting::words(&self.state), self.state.write_failed.is_some());
-        Ok(Ended { status, is_write_unanswered: self.state.asked_to_write, summary, is_unwritten })
+        let (summary, is_unwritten) =
+            (exit_summary::words(&self.state), self.state.saving.write_failed.is_some());
+        Ok(Ended { status, is_write_unanswered: self.state.saving.is_write_requested, summary, is_unwritten })
     }
 
     /// Gives the screen back and waits a little for the answers that the terminal owes: a shell would take them for

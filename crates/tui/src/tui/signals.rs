@@ -25,16 +25,16 @@ use super::ExitStatus;
 use super::event::{Event, Signal};
 use super::terminal;
 
-/// How long the loop has to end after it was told to.
+/// Time for the loop to end after a signal.
 const GRACE: Duration = Duration::from_millis(1500);
-/// How long a stuck terminal has to take the bytes that restore it.
+/// Time for a stuck terminal to take the bytes that restore it.
 const RESCUE: Duration = Duration::from_millis(100);
-/// How often the terminal is looked at.
+/// Interval between looks at the terminal.
 const WATCH: Duration = Duration::from_millis(500);
 
-/// Those that mean something to the front end.
+/// Signals that mean something to the front end.
 const MEANT: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
-/// Those that mean nothing to it and end a program all the same: the terminal is given back before that.
+/// Signals that mean nothing to the front end and end a program all the same: it gives the terminal back before that.
 const OTHERS: [i32; 9] = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGSYS, SIGTRAP];
 
 /// The same of Linux alone, real-time signals among them.
@@ -51,7 +51,7 @@ fn of_linux() -> impl Iterator<Item = i32> {
 /// Only wakes the thread that hears: nobody else sends it, and it means nothing by default.
 const MARK: i32 = SIGURG;
 
-/// Hears signals until it is dropped; after that they do what they do by default.
+/// Hears signals until it is dropped; after that they have their default effects.
 pub(super) struct Listener {
     over: Arc<AtomicBool>,
 }
@@ -84,14 +84,14 @@ impl Drop for Listener {
 /// Whether signals that keys send are a child's.
 static KEYS_OF_CHILD: AtomicBool = AtomicBool::new(false);
 
-/// How often all that had come was heard.
+/// Number of times that all pending signals were heard.
 static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
 fn rounds() -> MutexGuard<'static, u64> {
     ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// How long a thread that hears is waited for. It takes some microseconds; only one that is gone takes this long.
+/// Time to wait for a thread that hears. Hearing takes some microseconds; only a thread that is gone takes this long.
 const HEARING: Duration = Duration::from_secs(10);
 
 /// Returns when all signals that came before have been heard. The first round may have begun before that; the second one
@@ -267,7 +267,7 @@ pub(super) fn has_shell() -> bool {
     }
 }
 
-/// What ctrl-z does outside raw mode: SIGTSTP to the whole job, so that a program around glimt stops too.
+/// Stops the whole job with SIGTSTP, as ctrl-z does outside raw mode, so that a program around glimt stops too.
 pub(super) fn stop_job() -> io::Result<()> {
     kill(Pid::from_raw(0), Number::SIGTSTP).map_err(io::Error::from)
 }

@@ -38,7 +38,7 @@ static RAW: AtomicBool = AtomicBool::new(false);
 static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
 /// The thread whose panic gives the terminal back; those of other threads are kept in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
-/// What the last panic of another thread said.
+/// Message of the last panic of another thread.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// Presses, movements with a button down, in SGR form. (crossterm's own command turns on all movements.)
@@ -49,7 +49,7 @@ const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
 /// A cell of many fonts.
 const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
-/// How long a terminal that takes nothing is waited for, at each step of giving it back.
+/// Time to wait for a terminal that takes nothing, at each step of giving it back.
 const STUCK: Duration = Duration::from_millis(60);
 
 /// The terminal, taken.
@@ -108,7 +108,7 @@ impl Drop for Screen {
     }
 }
 
-/// The modes of the terminal as another program found them; none: no other has it.
+/// The modes of the terminal as another program found them. `None` unless another program has the terminal.
 static LENT: Mutex<Option<Termios>> = Mutex::new(None);
 
 /// Leaves the terminal to another program, until [`take_back`].
@@ -174,7 +174,7 @@ pub(super) fn rescue() {
     }
 }
 
-/// What an abort needs to give the terminal back without an allocation.
+/// Bytes and modes with which an abort gives the terminal back, without an allocation.
 static LAST_WORDS: OnceLock<LastWords> = OnceLock::new();
 
 struct LastWords {
@@ -278,7 +278,7 @@ fn chain_panic_hook() {
     });
 }
 
-/// What the last panic of another thread said.
+/// Message of the last panic of another thread.
 pub(super) fn last_panic() -> Option<String> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }

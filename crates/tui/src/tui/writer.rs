@@ -17,7 +17,7 @@ use nix::unistd::ttyname;
 
 use super::event::Event;
 
-/// What waits to be written. There is one standard output, and one of these.
+/// Bytes that wait to be written. There is one standard output, and one queue.
 static QUEUE: Queue = Queue {
     waiting: Mutex::new(Waiting { slices: VecDeque::new(), is_writing: false, is_given_up: false }),
     changed: Condvar::new(),
@@ -104,8 +104,7 @@ pub(super) fn send(slice: Vec<u8>) {
     QUEUE.changed.notify_all();
 }
 
-/// Drops what has not been begun and waits for what has; after this time the rest of that is dropped as well. False:
-/// it was.
+/// Drops slices that have not begun, and waits for the one that has; after `patience` drops its rest as well, and returns false.
 pub(super) fn discard(patience: Duration) -> bool {
     let mut waiting = QUEUE.lock();
     waiting.slices.clear();
@@ -121,7 +120,7 @@ pub(super) fn discard(patience: Duration) -> bool {
     is_whole
 }
 
-/// How often a terminal that takes nothing is looked at.
+/// Interval between looks at a terminal that takes nothing.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Writes all, until it is given up.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 
-/// Where an axis begins and ends, and its marks, as powers of ten.
+/// Ends of an axis and its marks, as powers of ten.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Axis {
     pub(super) range: Range<f64>,

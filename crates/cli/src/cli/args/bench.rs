@@ -1,10 +1,8 @@
-//! What `glimt bench` takes.
+//! Arguments of `glimt bench`.
 
 use std::path::PathBuf;
 
-use super::{
-    Progress, Switch, any_whole, clamp, depth, nice, one_of, samples, seconds, side, threads, whole,
-};
+use super::{CLAMP, Progress, Switch, any_whole, nice, number_of, one_of, seconds, threads, whole, whole_of};
 use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::tui::ColorChoice;
 
@@ -20,7 +18,7 @@ multiplied: --integrator path,whitted --photons on,off. Without SCENE, the one t
 
 Exit codes: 0 measured; 1 the work failed; 2 the call or a scene is wrong; 130, 143, 129 ended by a signal.";
 
-/// What is measured and where it goes.
+/// Scenes, methods and outputs of a benchmark.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BenchArgs {
     /// The scene files
@@ -44,7 +42,7 @@ pub struct BenchArgs {
     pub baseline: Option<PathBuf>,
 
     /// Samples per pixel to measure at, such as 1,4,16,64
-    #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = samples, help_heading = "Measurement")]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
     pub samples: Vec<u32>,
     /// Seconds of rendering to measure at, in place of samples, such as 0.1,0.5,2
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_negative_numbers = true, value_parser = seconds, conflicts_with = "samples", help_heading = "Measurement")]
@@ -56,10 +54,10 @@ pub struct BenchArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, default_value = "1", help_heading = "Measurement")]
     pub seed: u32,
     /// Pixels across [default: with the scene's aspect, 96 on the longer side]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Measurement")]
     pub width: Option<u32>,
     /// Pixels down
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = side, help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Measurement")]
     pub height: Option<u32>,
     /// Seconds that all of it may take, as far as samples are left open
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, default_value = "240", help_heading = "Measurement")]
@@ -68,16 +66,16 @@ pub struct BenchArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["reference_samples", "width", "height"], help_heading = "Measurement")]
     pub reference: Vec<PathBuf>,
     /// Samples per pixel of each reference [default: by the time, or 100 times the most --samples]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = samples, help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
     pub reference_samples: Option<u32>,
-    /// Where references are kept
+    /// Folder for references
     #[arg(long, value_name = "FOLDER", help_heading = "Measurement")]
     pub cache: Option<PathBuf>,
     /// Make references anew and keep none
     #[arg(long, conflicts_with = "cache", help_heading = "Measurement")]
     pub no_cache: bool,
 
-    /// How light is followed
+    /// Rendering algorithms
     #[arg(long, value_delimiter = ',', value_parser = one_of::<Integrator>(), value_name = "LIST", help_heading = "Methods, each a list")]
     pub integrator: Vec<Integrator>,
     /// Indirect light and caustics from photon maps, in whitted
@@ -87,7 +85,7 @@ pub struct BenchArgs {
     #[arg(long, value_delimiter = ',', value_parser = one_of::<Shadows>(), value_name = "LIST", help_heading = "Methods, each a list")]
     pub shadows: Vec<Shadows>,
     /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection; 0: none
-    #[arg(long, value_delimiter = ',', value_parser = clamp, value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods, each a list")]
+    #[arg(long, value_delimiter = ',', value_parser = number_of("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods, each a list")]
     pub clamp: Vec<f32>,
     /// Acceleration structure
     #[arg(long, value_delimiter = ',', value_parser = one_of::<Accel>(), value_name = "LIST", help_heading = "Methods, each a list")]
@@ -97,7 +95,7 @@ pub struct BenchArgs {
     #[arg(long = "set", value_name = "TABLE.KEY=VALUE", help_heading = "All pictures and references")]
     pub sets: Vec<String>,
     /// Scatterings along one path
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = depth, help_heading = "All pictures and references")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "All pictures and references")]
     pub max_depth: Option<u32>,
     /// Depth of field, where the camera has an aperture
     #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "All pictures and references")]
@@ -105,11 +103,11 @@ pub struct BenchArgs {
     /// Threads that render; 0: one per core
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "All pictures and references")]
     pub threads: Option<usize>,
-    /// How far rendering gives way to other programs, from 0, not at all, to 19
+    /// Give way to other programs, from 0, not at all, to 19
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, default_value = "0", help_heading = "All pictures and references")]
     pub nice: u8,
 
-    /// How progress is said on stderr
+    /// Progress on stderr
     #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: Progress,
     /// Colours of messages and of the plot in the terminal; auto looks at the terminal and at NO_COLOR

@@ -14,10 +14,10 @@ use crate::cli::progress::seconds;
 use crate::scene::sanitize::visible;
 use crate::tui::paint::in_lines;
 
-/// Of the palette of the terminal, in the order of the methods.
+/// Colours of the methods, in their order, from the palette of the terminal.
 const COLORS: [Color; 6] =
     [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
-/// Of their points, in the same order: none comes back with the same colour for thirty methods.
+/// Signs of the methods' points, in their order: no sign comes back with the same colour for thirty methods.
 const SIGNS: [char; 5] = ['o', 'x', '+', '*', '#'];
 /// Rows of a chart.
 const ROWS: u16 = 16;
@@ -62,7 +62,7 @@ impl Lines {
         }
     }
 
-    /// What stands above the bar in a terminal of this size: nothing before there are points, and where there is no room.
+    /// Text above the bar in a terminal of this size: nothing before there are points, or if there is no room.
     pub(super) fn text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
         // A line that is as wide as the terminal would be two in some.
         let size = (columns.saturating_sub(1).min(COLUMNS), rows.saturating_sub(LEFT).min(ROWS));

@@ -14,11 +14,11 @@ use crate::output::write::{self, Guard};
 use crate::output::{self, FileIdentity, Losses, OutputError, replaced_json, replaced_plot, replaced_table};
 use crate::system::{file, in_words};
 
-/// What is written, and what must not be.
+/// Files to write, and files that must not be written.
 pub(super) struct Outputs {
     /// Option, file, and what it holds.
     files: Vec<(&'static str, PathBuf, Kind)>,
-    /// What it is to this call, and the file.
+    /// Role of each input in this call, and its file.
     inputs: Vec<(&'static str, PathBuf)>,
     baseline: Option<PathBuf>,
     /// Whether files that glimt did not write may be replaced.
@@ -33,7 +33,7 @@ enum Kind {
 }
 
 impl Outputs {
-    /// What can be told before the work is said.
+    /// Reports the errors that are known before the work.
     pub(super) fn of(args: &BenchArgs, scenes: &[PathBuf], console: &Console) -> Result<Self, Exit> {
         let all = [
             ("--csv", &args.csv, Kind::Csv),
@@ -94,7 +94,7 @@ impl Outputs {
         if self.replaces_foreign { Ok(()) } else { self.check_own(index, real) }
     }
 
-    /// What is there must be glimt's own: `--csv scene.toml` has its file's name left out.
+    /// Refuses files that glimt did not write: `--csv scene.toml` lacks its own file's name.
     fn check_own(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
@@ -161,9 +161,9 @@ impl Outputs {
     }
 }
 
-/// All of a file of results; nothing that is no file or that large is one.
+/// All bytes of a file of results; refuses anything but a regular file of limited size.
 fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
-    /// Of results of a million pictures.
+    /// Bytes of the results of a million pictures.
     const MOST: u64 = 256 << 20;
     let words = |error: std::io::Error| in_words(&error);
     let (file, metadata) = file::open(path)

@@ -1,4 +1,4 @@
-//! What is said on stderr while it is measured.
+//! Progress of a benchmark on stderr.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -20,7 +20,7 @@ const STEPS: u64 = 1000;
 /// Frames a second at most of the plot and the bar.
 const FRAMES: u8 = 8;
 
-/// Says how it goes on, in the way that was asked for.
+/// Reporter of progress, in the form that the call chooses.
 pub(super) struct Said {
     console: Console,
     way: Way,
@@ -134,7 +134,7 @@ impl Said {
         }
     }
 
-    /// Whether errors are said in words, with their places.
+    /// Whether errors appear in words, with their places.
     pub(super) fn is_for_people(&self) -> bool {
         !matches!(self.way, Way::Json)
     }
@@ -155,7 +155,7 @@ impl Said {
         }
     }
 
-    /// What is said of a file that was written.
+    /// Reports a warning about a file that was written.
     pub(super) fn warned(&self, message: &str) {
         if self.is_for_people() {
             self.console.say(&format!("warning: {message}"));

@@ -15,7 +15,7 @@ use crate::tui::{Named, printed};
 /// Less FLIP than this is hardly seen in its colours.
 const FAINT: f32 = 0.1;
 
-/// What is to be shown on stdout; nothing where a terminal has no room.
+/// Lines for stdout; none if the terminal has no room.
 pub(super) fn lines(args: &CompareArgs, pair: &Pair, measured: &Measured) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
@@ -45,12 +45,12 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// As a display shows it.
+/// An image as a display shows it, with its name.
 fn named(name: &str, image: &RadianceImage) -> Named {
     Named { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
 }
 
-/// FLIP in colours, or, where that is all but black, |a - b| as large as it can be shown.
+/// FLIP in colours; if that is all but black, |a - b| as bright as it can be shown.
 fn difference(pair: &Pair, measured: &Measured) -> (RadianceImage, String) {
     let errors = &measured.errors;
     if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= FAINT) {

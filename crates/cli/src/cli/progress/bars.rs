@@ -88,7 +88,7 @@ impl Reporter for Bars {
     }
 }
 
-/// What stands beside the bar: as much as leaves it [`LEAST_BAR`] columns. Under a time limit, seconds are counted.
+/// Words beside the bar: as many as leave it [`LEAST_BAR`] columns. Under a time limit they count seconds.
 fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
     let done = match time {
         Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),

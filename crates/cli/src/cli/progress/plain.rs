@@ -13,7 +13,7 @@ const STEPS: f64 = 10.0;
 
 pub(super) struct Plain {
     console: Console,
-    /// Steps of the render that were said.
+    /// Steps of the render that were reported.
     said: f64,
     last: Instant,
     last_line: String,

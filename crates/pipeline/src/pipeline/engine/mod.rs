@@ -18,34 +18,37 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub(super) use self::orders::{Meanwhile, Orders};
 use self::outcome::Outcome;
+pub use self::outcome::{Rendered, Unrendered};
 use self::unfinished::Good;
+use super::assembly::{Eye, Keyed, world};
 use super::cache::{Memo, Pool};
 use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
+use super::keys;
 use super::pace::Stopwatch;
-use super::plan::{Plan, cores, plan};
+use super::plan::{NamedBy, Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
-use super::report::{Finished, report};
+use super::render::film_cache::FilmCache;
+use super::render::film_state::FilmState;
+use super::render::first_picture::FirstPictures;
+use super::render::preview::Screen;
+use super::render::scheduler::Rendering;
+use super::report::finish::{Finished, report};
 use super::settings::Overrides;
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
-use super::stages::canvas::Canvas;
-use super::stages::coarse::Coarse;
-use super::stages::films::Films;
 use super::stages::glass::glass;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, Meshes, meshes};
 use super::stages::parse::{Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
-use super::stages::preview::Screen;
-use super::stages::render::{Rendering, render};
+use super::stages::render::render;
 use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::world::{Eye, Keyed, world};
 use super::stages::write::{Destination, Written, check_targets, write_by_hand};
-use super::stages::{Findings, Reading, Staged, Stop, keys};
+use super::stages::{Findings, Reading, Staged, Stop};
 use super::table::StageTable;
-use super::targets::{NamedBy, conflicts};
+use super::targets::conflicts;
 use super::trace::{Kernel, Tracer};
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
@@ -60,13 +63,13 @@ use crate::system::priority;
 use crate::system::threads::not_started;
 use crate::world::{Bodies, Lookups, World};
 
-/// What an engine works with; tests work with other means.
+/// Means of an engine; tests replace some of them.
 #[derive(Clone, Copy)]
 pub(super) struct Means {
     pub(super) kernel: Kernel,
-    /// What one film may take, at most.
+    /// Most bytes of one film.
     pub(super) most_film_bytes: u64,
-    /// By how much the nice value of render threads is above that of the thread that starts them.
+    /// Difference between the nice values of the render threads and of the thread that starts them.
     pub(super) nice: u8,
 }
 
@@ -85,15 +88,15 @@ pub(super) struct Engine {
     bodies: Memo<Arc<Bodies>>,
     textures: TextureCache,
     accel: AccelCache,
-    /// How many requests there were.
+    /// Number of requests so far.
     requests: u64,
     lights: Memo<Arc<Lights>>,
     sky: SkyMemo,
     world: Memo<Arc<World>>,
     photons: PhotonCache,
-    films: Films,
+    films: FilmCache,
     written: Written,
-    /// What the current film is rendered by.
+    /// Plan of the current film.
     plan: Option<Plan>,
     at_hand: Option<AtHand>,
     /// The last scene that could be read, with what it names.
@@ -115,7 +118,7 @@ struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
     world: Keyed,
-    /// What light meets, and where its coordinates start.
+    /// Key of all surfaces and of the origin of their coordinates.
     surfaces: Key,
     origin: DVec3,
     texels_loaded: u64,
@@ -137,7 +140,7 @@ impl Engine {
             sky: SkyMemo::default(),
             world: Memo::default(),
             photons: PhotonCache::default(),
-            films: Films::default(),
+            films: FilmCache::default(),
             written: Written::default(),
             plan: None,
             at_hand: None,
@@ -150,7 +153,7 @@ impl Engine {
         }
     }
 
-    /// Do what is asked for and say what came of it.
+    /// Carries out a request and reports its outcome.
     pub(super) fn request(&mut self, request: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
         let generation = request.generation;
         let outcome = self.outcome(request, sink, meanwhile);
@@ -168,7 +171,7 @@ impl Engine {
         }
     }
 
-    /// Do what is asked for.
+    /// Carries out a request.
     fn outcome(
         &mut self,
         request: &Request,
@@ -215,7 +218,7 @@ impl Engine {
         }
     }
 
-    /// Do what is asked of the picture at hand, outside of a request.
+    /// Answers a question about the current picture, outside of a request.
     pub(super) fn errand(&self, errand: &Errand, sink: &Sink) {
         match &self.at_hand {
             Some(at_hand) => at_hand.run(errand, self.films.current(), &self.inputs, sink),
@@ -287,7 +290,7 @@ impl Engine {
         // A person sees the scene while the first photons are traced.
         let of_film = keys::render(ready.world.0, &plan.settings, plan.crop);
         let is_new = request.force || !self.films.holds(of_film);
-        let coarse = Coarse {
+        let coarse = FirstPictures {
             tracer: tracer(self.means.kernel, &pool, ready, meanwhile.token),
             plan,
             is_moved: request.overrides.camera.is_any(),
@@ -426,7 +429,7 @@ impl Engine {
         let (plan, orders) = (&ready.plan, meanwhile.orders);
         let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
         let written = std::cell::RefCell::new(&mut self.written);
-        let pulse = |canvas: &Canvas, is_covered: bool| {
+        let pulse = |canvas: &FilmState, is_covered: bool| {
             if !is_covered {
                 meanwhile.postpone_write(sink);
             } else if orders.take_write() {
@@ -529,7 +532,7 @@ impl Engine {
     }
 }
 
-/// What renders a scene, by no photons.
+/// Tracer of a scene, without photons.
 fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a CancelToken) -> Tracer<'a> {
     Tracer { kernel, pool, world: &ready.world.1, settings: &ready.plan.settings, token, photons: None }
 }

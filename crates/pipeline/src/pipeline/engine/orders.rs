@@ -1,4 +1,4 @@
-//! What is heard while a request is under way.
+//! Orders that a request hears while it is under way.
 
 use std::cell::Cell;
 
@@ -6,8 +6,8 @@ use crate::control::CancelToken;
 use crate::pipeline::errands::{AtHand, Errand};
 use crate::pipeline::inputs::Inputs;
 use crate::pipeline::protocol::{Event, PreviewSize};
+use crate::pipeline::render::film_state::FilmState;
 use crate::pipeline::sink::Sink;
-use crate::pipeline::stages::canvas::Canvas;
 
 /// Orders that come while a request is under way.
 pub(in crate::pipeline) trait Orders {
@@ -17,17 +17,17 @@ pub(in crate::pipeline) trait Orders {
     fn take_write(&self) -> bool;
     /// The size that previews are to have from now on.
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
-    /// The next thing that is asked of the picture at hand.
+    /// The next question about the current picture.
     fn take_errand(&self) -> Option<Errand>;
 }
 
-/// What a request goes by while it is under way.
+/// Tokens and orders of a request while it is under way.
 pub(in crate::pipeline) struct Meanwhile<'a> {
     pub(in crate::pipeline) token: &'a CancelToken,
-    /// Of the last stage, which writes.
+    /// Token of the write stage, the last one.
     pub(in crate::pipeline) writing: &'a CancelToken,
     pub(in crate::pipeline) orders: &'a dyn Orders,
-    /// Whether it was said that an order to write waits.
+    /// Whether the front end knows that its order to write waits.
     is_postponed: Cell<bool>,
 }
 
@@ -40,15 +40,21 @@ impl<'a> Meanwhile<'a> {
         Self { token, writing, orders, is_postponed: Cell::new(false) }
     }
 
-    /// An order to write waits until every pixel has a sample, which is said once.
+    /// Tells the front end once that its order to write waits until every pixel has a sample.
     pub(super) fn postpone_write(&self, sink: &Sink) {
         if self.orders.wants_write() && !self.is_postponed.replace(true) {
             sink.send(Event::WritePostponed { generation: sink.generation });
         }
     }
 
-    /// Do the next thing that is asked of the picture at hand.
-    pub(super) fn run_errand(&self, at_hand: &AtHand, canvas: Option<&Canvas>, inputs: &Inputs, sink: &Sink) {
+    /// Answers the next question about the current picture.
+    pub(super) fn run_errand(
+        &self,
+        at_hand: &AtHand,
+        canvas: Option<&FilmState>,
+        inputs: &Inputs,
+        sink: &Sink,
+    ) {
         if let Some(errand) = self.orders.take_errand() {
             at_hand.run(&errand, canvas, inputs, sink);
         }

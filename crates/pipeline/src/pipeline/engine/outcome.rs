@@ -1,28 +1,50 @@
-//! What came of a request, for those who ask for one picture and wait for it.
+//! Outcome of a request, for callers who ask for one picture and wait for it.
 
 use std::path::Path;
 
 use super::super::protocol::{Failure, Report, Request};
-use super::super::session::{Rendered, Unrendered};
 use super::super::sink::Sink;
 use super::super::stages::Stop;
 use super::{Engine, Meanwhile};
-use crate::film::Quantity;
+use crate::film::{Quantity, RadianceImage};
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::fingerprint::Key;
 
-/// Of a request that was done.
+/// A picture in memory.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// Linear light, unexposed.
+    pub image: RadianceImage,
+    /// Report of the request.
+    pub report: Box<Report>,
+    /// Likely mistakes in the scene.
+    pub warnings: Vec<Diagnostic>,
+    /// All that its sums depend on, apart from the number of samples.
+    pub key: Key,
+}
+
+/// Why there is no picture.
+#[derive(Clone, Debug)]
+pub enum Unrendered {
+    /// The scene is wrong, or the work failed.
+    Failed(Failure),
+    /// A cancel token stopped the work.
+    Cancelled,
+}
+
+/// Outcome of a finished request.
 pub(super) struct Outcome {
     pub(super) report: Report,
     /// Why nothing is written.
     pub(super) conflicts: Vec<Diagnostic>,
-    /// What is probably not meant.
+    /// Likely mistakes in the scene.
     pub(super) warnings: Vec<Diagnostic>,
     /// Whether neither the picture nor its view changed.
     pub(super) unchanged: bool,
 }
 
 impl Engine {
-    /// Do what is asked for; gives the picture as well, and what it is made of.
+    /// Carries out a request; returns its picture too, with the key of all inputs.
     ///
     /// # Errors
     /// Why there is no picture.

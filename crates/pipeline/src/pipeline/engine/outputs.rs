@@ -2,9 +2,9 @@
 
 use super::super::plan::Plan;
 use super::super::protocol::{Report, Request, Writing};
-use super::super::report::write_report;
+use super::super::render::film_state::FilmState;
+use super::super::report::finish::write_report;
 use super::super::sink::Sink;
-use super::super::stages::canvas::Canvas;
 use super::super::stages::write::{Destination, write_by_hand, write_if_wanted};
 use super::super::stages::{Findings, Staged, Stop};
 use super::super::targets::conflicts;
@@ -15,7 +15,7 @@ use crate::output::OutputError;
 impl Engine {
     /// Whether there is a picture without holes.
     pub(in crate::pipeline) fn can_write(&self) -> bool {
-        self.films.current().is_some_and(Canvas::is_covered)
+        self.films.current().is_some_and(FilmState::is_covered)
     }
 
     /// Write the picture as it is, outside of a request.
@@ -41,8 +41,8 @@ impl Engine {
         pool.install(|| write_by_hand(canvas, to, written));
     }
 
-    /// Whether a file that is to be written must not be. Where that need not end the request, it is said, and the
-    /// findings have it.
+    /// Looks for outputs that must not be written. If the request can go on without them, tells the front end and keeps the
+    /// conflicts in the findings.
     ///
     /// # Errors
     /// All conflicts, where the picture must be written.

@@ -1,4 +1,4 @@
-//! What scenes of before leave behind: it stays while there is room.
+//! Values of earlier scenes, kept while there is room.
 
 use super::Engine;
 use crate::pipeline::cache::first_with_room;

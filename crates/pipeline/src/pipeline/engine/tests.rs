@@ -1,4 +1,4 @@
-//! What is kept from request to request.
+//! Tests of the values that are kept from request to request.
 
 use std::fs;
 use std::sync::mpsc;
@@ -9,7 +9,7 @@ use crate::pipeline::session::NoOrders;
 use crate::pipeline::tests::{OBJ, SCENE};
 use crate::world::{Geometry, MeshTree};
 
-/// What was made for a request.
+/// Values that a request made.
 struct Made {
     geometry: Arc<Geometry>,
     mesh: Arc<MeshTree>,
@@ -32,7 +32,7 @@ impl Desk {
         Self { folder, engine: Engine::new(Means::default(), Arc::default()), text: text.to_owned() }
     }
 
-    /// A request for the scene as it is: what is said of it.
+    /// Sends a request for the current scene; returns its events.
     fn send(&mut self) -> Vec<Event> {
         let scene = self.folder.path().join("scene.toml");
         fs::write(&scene, &self.text).expect("written");
@@ -61,7 +61,7 @@ impl Desk {
         Made { geometry, mesh, lights, world: self.engine.world.latest().expect("it was made").clone() }
     }
 
-    /// Which of geometry, mesh, lights and world an edit leaves as they are, not equal but the same.
+    /// Which of geometry, mesh, lights and world survive an edit as the same value, not as an equal one.
     fn kept(&mut self, from: &str, to: &str) -> [bool; 4] {
         let before = self.request();
         assert!(self.text.contains(from), "{from}");

@@ -23,7 +23,7 @@ pub(super) struct Good {
     pub(super) meshes: Meshes,
     pub(super) bodies: Arc<Bodies>,
     pub(super) textures: Arc<Textures>,
-    /// What the textures were loaded for.
+    /// Purposes that the textures were loaded for.
     pub(super) needed: Needed,
 }
 
@@ -31,7 +31,7 @@ impl Engine {
     /// Shows and writes the last good scene with what the newest request changes of it, as that request is of a scene that
     /// cannot be read. Files that the scene might name by now are not written.
     pub(super) fn go_on(&mut self, newest: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
-        // A newer request asks for it again; what cannot be rendered was said by the request that failed.
+        // A newer request asks again; the request that failed has reported its errors.
         let _ = self.render_last_good(newest, sink, meanwhile);
     }
 
@@ -59,7 +59,7 @@ impl Engine {
         // Render and write.
         self.render(&request, &ready, photons, sink, meanwhile)?;
         if self.written.not_ours(&ready.plan.outputs, &self.contents).is_none() {
-            // What cannot be written is said by the stage.
+            // The stage reports files that cannot be written.
             let _ = self.write(&request, &ready.plan, &Findings::default(), sink, meanwhile.writing);
         }
         Ok(())

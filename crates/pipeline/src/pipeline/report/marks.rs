@@ -1,4 +1,4 @@
-//! What tells a report from other JSON.
+//! Marks that tell a report from other JSON.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;

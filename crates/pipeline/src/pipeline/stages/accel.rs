@@ -4,19 +4,20 @@
 use std::sync::Arc;
 
 use super::super::cache::{Pool, Spare};
+use super::super::keys;
 use super::meshes::Meshes;
-use super::{Reading, Staged, Stop, keys};
+use super::{Reading, Staged, Stop};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{Geometry, MeshTree};
 
-/// What the stage keeps.
+/// Cache of the stage.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct AccelCache {
     trees: Pool<Key, MeshTree>,
     geometry: Pool<Key, Geometry>,
-    /// Of what the last one over all objects is.
+    /// Key of the last tree over all objects.
     last: Option<Key>,
 }
 
@@ -35,14 +36,14 @@ impl AccelCache {
         self.geometry.drop_before(request);
     }
 
-    /// What was built or found last.
+    /// The geometry that was built or found last.
     #[cfg(test)]
     pub(in crate::pipeline) fn latest(&self) -> Option<&Arc<Geometry>> {
         self.geometry.latest(&self.last?)
     }
 }
 
-/// What the stage makes.
+/// Result of the stage.
 #[derive(Clone)]
 pub(in crate::pipeline) struct Built {
     /// One for each of the scene's mesh files.

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::super::cache::Memo;
+use super::super::keys;
 use super::meshes::Meshes;
-use super::{Findings, Stop, keys};
+use super::{Findings, Stop};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::scene::Loaded;

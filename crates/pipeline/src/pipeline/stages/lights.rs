@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::super::cache::Memo;
+use super::super::keys;
+use super::Staged;
 use super::textures::Textures;
-use super::{Staged, keys};
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::{Lights, Receivers, SkyMap};
 use crate::scene::description::{Scene, TextureUse};
@@ -47,7 +48,7 @@ pub(in crate::pipeline) fn lights(
     })
 }
 
-/// What is said of lights that are too many to look at all of them.
+/// Words for lights that are too many to sample all of them.
 fn picked(by_whom: &str, lights: &Lights) -> String {
     format!(", of which {by_whom} at a time; their tree has {} kB", lights.memory_bytes().div_ceil(1000))
 }

@@ -24,7 +24,7 @@ pub(in crate::pipeline) struct KeptMesh {
     /// All contents that the mesh was made of.
     pub(in crate::pipeline) key: Key,
     companions: Vec<FileRead>,
-    /// Those of the mesh, once they were asked for.
+    /// Bounds of the mesh, once they have been computed.
     bounds: OnceLock<MeshBounds>,
 }
 
@@ -200,7 +200,7 @@ pub(super) fn canonical(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
-/// Of each mesh file, whether an object shows its own materials.
+/// Whether an object shows the file's own materials, for each mesh file.
 fn with_own_materials(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
@@ -208,7 +208,7 @@ fn with_own_materials(scene: &Scene) -> Vec<bool> {
     shown
 }
 
-/// What is said of a file, whose own materials count where they are shown.
+/// Warnings about a file. Those about its own materials count only if an object shows these.
 fn warnings_of(mesh: &LoadedMesh, uses_own: bool) -> impl Iterator<Item = String> {
     let of_materials = mesh.material_warnings.iter().filter(move |_| uses_own);
     dropped(&mesh.dropped).into_iter().chain(mesh.warnings.iter().chain(of_materials).cloned())
@@ -284,7 +284,7 @@ mod tests {
             Contents::default().read(&path, &CancelToken::new()).expect("not cancelled")
         }
 
-        /// A request for `a.obj` that sees files as this snapshot does: the mesh and what is said to be in the files.
+        /// Requests `a.obj` with the files of this snapshot: returns the mesh and the files with their contents.
         fn read(&mut self, contents: &Snapshot) -> (Arc<KeptMesh>, Vec<FileRead>) {
             let (meshes, findings) = self.find("[[mesh]]\nfile = \"a.obj\"\n", contents);
             assert!(findings.errors.is_empty(), "{:?}", findings.errors);

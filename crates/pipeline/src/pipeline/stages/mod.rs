@@ -1,23 +1,13 @@
 //! The stages, one file each: a function of its inputs and of what is kept from before.
 
 pub(super) mod accel;
-mod adaptive;
-pub(super) mod canvas;
-pub(super) mod coarse;
-mod cost;
-pub(super) mod films;
 pub(super) mod glass;
-pub(super) mod keys;
 pub(super) mod lights;
 pub(super) mod meshes;
-mod outlook;
 pub(super) mod parse;
 pub(super) mod photons;
-pub(super) mod preview;
 pub(super) mod render;
-mod spread;
 pub(super) mod textures;
-pub(super) mod world;
 pub(super) mod write;
 
 use std::collections::HashSet;
@@ -56,7 +46,7 @@ impl Stop {
     }
 }
 
-/// What a stage made, and how.
+/// Result of a stage, and how it came about.
 #[derive(Debug)]
 pub(super) struct Staged<T> {
     pub(super) value: T,
@@ -78,7 +68,7 @@ impl<T> Staged<T> {
     }
 }
 
-/// What stages that read files share.
+/// Inputs shared by stages that read files.
 pub(super) struct Reading<'a> {
     pub(super) sink: &'a Sink,
     pub(super) token: &'a CancelToken,
@@ -86,7 +76,7 @@ pub(super) struct Reading<'a> {
     pub(super) pool: &'a ThreadPool,
 }
 
-/// What a request found out about files on its way.
+/// Findings of a request about files, errors and warnings.
 #[derive(Debug)]
 pub(super) struct Findings {
     /// Before anything was read.
@@ -189,7 +179,7 @@ pub(super) fn loaded_and_kept<T>(value: T, counts: Counts) -> Staged<T> {
     Staged::done(value, parts.join(", "))
 }
 
-/// What became of the files of a stage.
+/// Counts of a stage's files.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
     pub(super) loaded: usize,

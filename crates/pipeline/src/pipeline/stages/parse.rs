@@ -64,7 +64,7 @@ pub(in crate::pipeline) fn parse(
     Ok(Staged::done(parsed, ""))
 }
 
-/// What the scene file is made of without the call's changes, with the files and pictures of meshes that are not read for these.
+/// Files of the scene without the call's changes, with the files and pictures that only its unread meshes name.
 fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
     let mut named = loaded.named.clone();
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);

@@ -70,12 +70,12 @@ struct Sent {
 
 impl PhotonStore {
     /// Whether each pass has photons: something throws light.
-    pub(super) fn are_sent(&self) -> bool {
+    pub(in crate::pipeline) fn are_sent(&self) -> bool {
         self.photons.are_sent()
     }
 
     /// Passes that may be in use at once, of the size of the first.
-    pub(super) fn at_once(&self) -> u32 {
+    pub(in crate::pipeline) fn at_once(&self) -> u32 {
         if !self.are_sent() {
             return MOST_WITHOUT;
         }
@@ -84,7 +84,7 @@ impl PhotonStore {
     }
 
     /// Seconds that a pass takes to send; 0 where none was sent.
-    pub(super) fn seconds_of_pass(&self) -> f64 {
+    pub(in crate::pipeline) fn seconds_of_pass(&self) -> f64 {
         let Sent { passes, seconds, .. } = self.sent.get();
         if self.are_sent() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
@@ -93,7 +93,7 @@ impl PhotonStore {
     ///
     /// # Errors
     /// Cancelled.
-    pub(super) fn maps(
+    pub(in crate::pipeline) fn maps(
         &self,
         samples: Range<u32>,
         sending: Sending<'_>,

@@ -29,7 +29,8 @@ const MOST_BYTES: u64 = 2 << 30;
 /// A file and the reading of its numbers, however the scene spells it.
 type Name = (PathBuf, ImageEncoding);
 
-/// The cache of textures: one entry per file and reading of its numbers, and one for its levels where they are asked for.
+/// The cache of textures: one entry for each file and reading of its numbers, and one for its mipmap levels if a material uses
+/// them.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct TextureCache {
     texels: Pool<Name, Texels>,
@@ -64,15 +65,15 @@ impl TextureCache {
     }
 }
 
-/// The textures that were asked for, without those that failed.
+/// The requested textures, without those that failed.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct Textures {
     pub(in crate::pipeline) images: Images,
-    /// Of what each image was made.
+    /// Key of each image.
     pub(in crate::pipeline) key_of: HashMap<TextureSource, Key>,
-    /// Of what each was made, in the order asked for.
+    /// Key of each texture, in the order of the requests.
     pub(in crate::pipeline) keys: Vec<Key>,
-    /// The same of those that materials of mesh files name.
+    /// Keys of the textures that materials of mesh files name.
     pub(in crate::pipeline) of_files: Vec<Key>,
     /// The map of the environment, with its key.
     pub(in crate::pipeline) environment: Option<(Key, Arc<Texels>)>,
@@ -86,7 +87,7 @@ pub(in crate::pipeline) struct Textures {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::pipeline) struct Needed {
     pub(in crate::pipeline) textures: Vec<NeededTexture>,
-    /// How many more the scene shows that this view does not look up.
+    /// Number of other textures, which the scene shows and this view does not look up.
     pub(in crate::pipeline) left_out: usize,
 }
 
@@ -116,7 +117,7 @@ struct Wanted<'a> {
     asked_by: Vec<&'a NeededTexture>,
 }
 
-/// What the cache has of an image.
+/// Cached parts of an image.
 #[derive(Debug, Default)]
 struct Kept {
     texels: Option<Arc<Texels>>,
@@ -209,7 +210,7 @@ fn warn_of_unusable(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findin
     findings.warn(loaded, place(loaded, image.asked_by[0]), message);
 }
 
-/// Where the scene names the map of its environment.
+/// Place in the scene of the name of the environment map.
 fn environment_span(scene: &Scene) -> Option<Range<usize>> {
     scene.environment.as_ref()?.file.as_ref().map(|file| file.span.clone())
 }
@@ -355,7 +356,7 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
     }
 }
 
-/// Where the scene names it: its own table, or the mesh whose materials look it up.
+/// Place in the scene of a texture: its own table, or the mesh whose materials look it up.
 fn place(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
     let scene = &loaded.scene;
     let declared = one.declared.map(|index| scene.textures[index].file.span.clone());

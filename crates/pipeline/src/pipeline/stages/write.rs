@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
 use super::super::protocol::{Failure, Writing};
+use super::super::render::film_state::FilmState;
 use super::super::sink::Sink;
 use super::super::targets::{conflicts, guarded};
 use super::super::watch::content::{Content, Contents};
-use super::canvas::Canvas;
 use super::{Staged, Stop};
 use crate::choice::Choice;
 use crate::control::CancelToken;
@@ -20,12 +20,12 @@ use crate::integrators::{Measure, Shown};
 use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// What was written where, and what the file held then.
+/// Files that glimt wrote, with the picture's key and the file's content at that time.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
 
 impl Written {
-    /// The first of these that is there and does not hold what was written to it.
+    /// The first of these paths that exists and holds something else than glimt wrote there.
     pub(in crate::pipeline) fn not_ours<'a>(
         &self,
         paths: &'a [PathBuf],
@@ -46,7 +46,7 @@ impl Written {
     }
 }
 
-/// Where pictures go, and what must not be lost there.
+/// Destination of pictures, and files that must not be lost there.
 #[derive(Clone, Copy)]
 pub(in crate::pipeline) struct Destination<'a> {
     pub(in crate::pipeline) plan: &'a Plan,
@@ -95,7 +95,7 @@ fn find_targets(
 /// What went wrong, where the picture must be written.
 pub(in crate::pipeline) fn write_if_wanted(
     writing: Writing,
-    canvas: &Canvas,
+    canvas: &FilmState,
     to: Destination<'_>,
     written: &mut Written,
     token: &CancelToken,
@@ -116,9 +116,9 @@ pub(in crate::pipeline) fn write_if_wanted(
 /// Write the film as it is to every output that does not hold it already. All outputs are tried.
 ///
 /// # Errors
-/// What went wrong with the last of those that could not be written; the others are said. Cancelled.
+/// The last file that could not be written, and why; the other failures are reported as events. Or cancelled.
 pub(in crate::pipeline) fn write(
-    canvas: &Canvas,
+    canvas: &FilmState,
     to: Destination<'_>,
     written: &mut Written,
     token: &CancelToken,
@@ -139,8 +139,8 @@ pub(in crate::pipeline) fn write(
         match write_one(image, canvas, to, path, token) {
             Ok(bytes) => {
                 count += 1;
-                // The picture is on disk: a cancel from here on does not undo that. What it holds is looked at before
-                // anybody is told, who may put something else there.
+                // The picture is on disk: a cancel from here on does not undo that. Look at the content before anybody hears of
+                // the file and may change it.
                 let content = contents.read(path, &CancelToken::new())?;
                 written.0.insert(path.clone(), (key, content));
                 sink.written(path, bytes);
@@ -152,7 +152,7 @@ pub(in crate::pipeline) fn write(
     written.0.retain(|path, _| plan.outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
-            // Each is said by itself; the last one is the reason why the request fails.
+            // Report each failure by itself; the last one is the reason why the request fails.
             let last = errors.pop().unwrap_or_default();
             errors.into_iter().for_each(|error| sink.write_failed(error));
             Err(Stop::work(last))
@@ -163,14 +163,14 @@ pub(in crate::pipeline) fn write(
     }
 }
 
-/// [`write`] for a person who asked for it, whatever is on disk. What goes wrong is said.
-pub(in crate::pipeline) fn write_by_hand(canvas: &Canvas, to: Destination<'_>, written: &mut Written) {
+/// [`write`] by a person's order, whatever is on disk. Failures are reported as events.
+pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>, written: &mut Written) {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
         return to.sink.refused(conflicts);
     }
     written.forget();
-    // A token that nobody cancels: this picture was asked for.
+    // Nobody cancels this token: a person ordered this picture.
     if let Err(Stop::Failed(Failure::Work(message))) = write(canvas, to, written, &CancelToken::new()) {
         to.sink.write_failed(message);
     }
@@ -178,7 +178,7 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &Canvas, to: Destination<'_>, w
 
 fn write_one(
     image: &RadianceImage,
-    canvas: &Canvas,
+    canvas: &FilmState,
     Destination { plan, inputs, sink, .. }: Destination<'_>,
     path: &Path,
     token: &CancelToken,
@@ -194,8 +194,8 @@ fn write_one(
     Ok(bytes.len() as u64)
 }
 
-/// What a picture says of itself: enough to make it again.
-fn metadata(canvas: &Canvas, plan: &Plan, range: Option<Range>) -> Vec<(String, String)> {
+/// Metadata of a picture: enough to make it again.
+fn metadata(canvas: &FilmState, plan: &Plan, range: Option<Range>) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let SampleStats { min, mean, max } = canvas.film.samples();
     let samples = if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
@@ -214,7 +214,7 @@ fn metadata(canvas: &Canvas, plan: &Plan, range: Option<Range>) -> Vec<(String, 
     pairs.into_iter().chain(range).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
-fn key(canvas: &Canvas, plan: &Plan, path: &Path) -> Key {
+fn key(canvas: &FilmState, plan: &Plan, path: &Path) -> Key {
     let SampleStats { min, mean, max } = canvas.film.samples();
     let mut key = Fingerprint::new("write");
     key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());

@@ -24,7 +24,7 @@ use crate::pipeline::worker::{Handle, start_with};
 use crate::scene::Loaded;
 use crate::scene::diagnostic::Diagnostic;
 
-/// A scene of this text; a camera is added where there is none.
+/// The scene of this text, with a camera added if it has none.
 pub(in crate::pipeline) fn loaded_of(text: &str) -> Loaded {
     let place = "position = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let text = if text.contains("[camera]\n") {

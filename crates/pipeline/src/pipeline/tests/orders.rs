@@ -12,7 +12,7 @@ use crate::pipeline::engine::Means;
 use crate::pipeline::settings::View;
 use crate::world::World;
 
-/// As the real one, and slowly: a tile takes until it is told to stop.
+/// A kernel as the real one, but slow: a tile takes until its token is cancelled.
 fn endless(
     _: &World,
     _: &RenderSettings,
@@ -166,7 +166,7 @@ fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is
     assert_statuses(&report, "rrrrrsrr");
 }
 
-/// What is written of this scene by these changes, without any fault.
+/// The picture of this scene that these changes write, without any fault.
 fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
     let mut bench = Bench::new(scene);
     change(&mut bench);
@@ -466,7 +466,7 @@ fn warnings_are_said_before_anything_is_rendered() {
     assert_eq!((early, early.len()), (warnings, 1));
 }
 
-/// As the real one, a little later.
+/// A kernel as the real one, but a little slower.
 fn leisurely(
     world: &World,
     settings: &RenderSettings,

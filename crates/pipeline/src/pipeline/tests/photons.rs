@@ -1,4 +1,4 @@
-//! Photons in the worker: what is kept of them, and what is heard while they are sent.
+//! Tests of photons in the worker: which are kept, and which orders are heard while photons are sent.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +15,7 @@ fn wrapped(count: u32) -> String {
     format!("{SCENE}{glass}[photons]\nenabled = true\ncount = {count}\n")
 }
 
-/// Until the stage of the first photons is at work.
+/// Waits until the stage of the first photons is at work.
 fn until_first_are_sent(bench: &Bench) {
     let is_it = |event: &Event| match event {
         Event::Stage { stage, .. } => stage.name == Stage::Photons && stage.status == Status::Running,
@@ -47,7 +47,7 @@ fn write_is_heard_while_the_photons_of_later_samples_are_sent() {
     let mut bench = Bench::new(&text);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
-    // Nearly all time is that of photons under way, but not the moment in which progress is said.
+    // Nearly all time belongs to the photons under way, but not the moment in which progress is reported.
     std::thread::sleep(Duration::from_millis(50));
     bench.worker.send(Command::Pause(true));
     std::thread::sleep(Duration::from_millis(100));

@@ -1,4 +1,4 @@
-//! What each edit redoes, and what is said of files.
+//! Tests of reuse: the stages that each edit runs again, and the events about files.
 
 use super::*;
 use crate::integrators::View;
@@ -137,7 +137,7 @@ fn a_scene_without_files_says_why_stages_are_skipped() {
 
 #[test]
 fn photons_are_sent_again_only_where_what_they_meet_changed() {
-    // What stands in for them where they are off shows that they are.
+    // The ambient light that replaces the photons shows that they are off.
     let text = SCENE.replace("exposure = 0.0", "exposure = 0.0\nambient = 0.3");
     let mirror = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n";
     let steel = "[materials.steel]\ntype = \"mirror\"\n";

@@ -78,7 +78,7 @@ fn bumpy(scene: &str, view: View) -> Bench {
     bench
 }
 
-/// The textures stage, and the texels that were loaded, of a view of a scene that was not seen before.
+/// The textures stage and the texels loaded, for a view of a scene that is seen for the first time.
 fn textures_of(scene: &str, view: View) -> (char, String, u64) {
     let report = bumpy(scene, view).done().0;
     let stage = &report.stages[Stage::Textures as usize];

@@ -1,4 +1,4 @@
-//! What is never written over.
+//! Tests of files that are never overwritten.
 
 use std::ops::Range;
 use std::os::unix::fs::symlink;
@@ -11,7 +11,7 @@ use crate::integrators::{RayCounters, RenderSettings};
 use crate::output::FileIdentity;
 use crate::world::World;
 
-/// The conflicts that were said first, and how the request ended.
+/// The first conflicts reported, and the end of the request.
 fn conflicts_and_end(events: &[Event]) -> (Vec<String>, Option<&Event>) {
     let conflicts = events.iter().find_map(|event| match event {
         Event::Refused { conflicts, .. } => Some(conflicts.iter().map(|one| one.message.clone()).collect()),

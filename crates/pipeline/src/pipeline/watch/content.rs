@@ -1,4 +1,4 @@
-//! What a file holds, cheap to ask again: a hash that is taken anew only when the file may have changed.
+//! Contents of files, cheap to ask for again: a hash that is computed anew only if the file may have changed.
 
 use std::collections::HashMap;
 use std::fs::{self, Metadata};
@@ -17,11 +17,11 @@ use crate::system::file::{self, Kind};
 pub struct FileRead {
     /// Its name.
     pub path: PathBuf,
-    /// What it held just before it was read.
+    /// Its content just before it was read.
     pub content: Content,
 }
 
-/// What a file holds.
+/// Content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Content {
     /// There is no such file.
@@ -45,7 +45,8 @@ impl Content {
 
 /// Younger changes than this are not told apart by every file system's time stamps.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
-/// Of longer files the stamp counts instead of what they hold: a sparse one of terabytes is not read through.
+/// Most bytes that are hashed. For longer files the stamp counts instead of the content, so that nobody reads through a sparse
+/// file of terabytes.
 const MOST_HASHED: u64 = 256 << 20;
 /// Bytes between two looks at the token.
 const CHUNK: usize = 1 << 20;
@@ -59,8 +60,8 @@ pub struct Contents {
     pub(in crate::pipeline) hashed: Mutex<Vec<PathBuf>>,
 }
 
-/// What files hold as one request sees them: each is asked for once, so that everything made of a file goes by the
-/// same answer. A file that changes after that is found by whoever watches it.
+/// Contents of files as one request sees them: each file is looked at once, so that everything made of it goes by the same
+/// content. The watcher finds files that change later.
 #[derive(Debug)]
 pub(in crate::pipeline) struct Snapshot {
     contents: Arc<Contents>,
@@ -72,7 +73,7 @@ impl Snapshot {
         Self { contents, seen: Mutex::default() }
     }
 
-    /// What the file held when this request first asked.
+    /// Content of the file when this request first looked at it.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -84,7 +85,7 @@ impl Snapshot {
         Ok(*self.seen().entry(path.to_owned()).or_insert(content))
     }
 
-    /// What was answered before.
+    /// Content that this snapshot has seen already.
     pub(in crate::pipeline) fn known(&self, path: &Path) -> Option<Content> {
         self.seen().get(path).copied()
     }
@@ -99,7 +100,7 @@ pub(in crate::pipeline) fn may_have_changed(path: &Path, since: SystemTime) -> b
     fs::metadata(path).is_ok_and(|metadata| !Stamp::of(&metadata).is_settled(since))
 }
 
-/// What changes with every change of a file, given some time between changes.
+/// Properties that change with every change of a file, given some time between changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     device: u64,
@@ -120,7 +121,7 @@ impl Stamp {
         }
     }
 
-    /// What stands for the content of a file that is too long to be hashed.
+    /// Substitute for the content of a file that is too long to hash.
     fn content(&self) -> Content {
         Content::Hash(*blake3::hash(format!("{self:?}").as_bytes()).as_bytes())
     }
@@ -134,7 +135,7 @@ impl Stamp {
 }
 
 impl Contents {
-    /// What the file holds now.
+    /// Current content of the file.
     ///
     /// # Errors
     /// [`Cancelled`], looked for once per mebibyte.

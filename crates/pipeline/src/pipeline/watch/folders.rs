@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use notify::event::{AccessKind, AccessMode, EventKind, ModifyKind, RenameMode};
 use notify::{Event, RecommendedWatcher, RecursiveMode, Watcher};
 
-/// What happened to a watched name.
+/// An event about a watched name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Hint {
     /// It was closed after writing, or renamed into its place.
@@ -31,7 +31,7 @@ pub(super) struct Folders {
     names: Arc<Mutex<HashSet<OsString>>>,
     /// All folders that are to be watched, and whether each is on another machine, which says nothing.
     wanted: HashMap<PathBuf, bool>,
-    /// Those that are, and which ones they were then.
+    /// Watched folders, with their identities at that time.
     watched: HashMap<PathBuf, Identity>,
 }
 
@@ -56,7 +56,7 @@ impl Folders {
         Self { watcher, names, wanted: HashMap::new(), watched: HashMap::new() }
     }
 
-    /// Whether changes of all files are told by themselves.
+    /// Whether the system reports changes of all files.
     pub(super) fn gives_hints(&self) -> bool {
         self.watcher.is_some() && self.watched.len() == self.wanted.len()
     }
@@ -76,7 +76,7 @@ impl Folders {
                 add(&canonical);
             }
         }
-        // That a folder itself goes is said by its own name.
+        // An event under a folder's own name reports that the folder is gone.
         let own = folders
             .iter()
             .filter_map(|folder| folder.canonicalize().ok()?.file_name().map(ToOwned::to_owned));
@@ -134,7 +134,7 @@ impl Folders {
     }
 }
 
-/// What an event says of these names. Reading is no change: a watcher that reads must not wake itself.
+/// Meaning of an event for these names. Reading does not count as a change: a watcher that reads must not wake itself.
 fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
     let mut of_paths = event.paths.iter().map(|path| path.file_name());
     let named = of_paths.clone().flatten().find(|name| names.contains(*name)).map(ToOwned::to_owned);
@@ -147,7 +147,7 @@ fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
         EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(Hint::Whole(name)),
         EventKind::Access(_) => None,
         EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(Hint::Whole(name)),
-        // Its two ends are said as well, each by itself.
+        // Both of its ends have events of their own.
         EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => None,
         EventKind::Modify(ModifyKind::Data(_)) => Some(Hint::Written(name)),
         EventKind::Modify(ModifyKind::Name(RenameMode::From)) | EventKind::Remove(_) => {

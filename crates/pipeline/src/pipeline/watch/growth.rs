@@ -15,7 +15,7 @@ pub(super) struct Growth {
     /// Names that were written to and not closed since.
     open: HashSet<OsString>,
     unsettled: Option<Unsettled>,
-    /// No change is said before this.
+    /// Earliest time of the next report of a change.
     not_before: Option<Instant>,
 }
 
@@ -29,7 +29,7 @@ struct Signs {
     is_whole: bool,
 }
 
-/// A change that was said and may not be the last.
+/// A change that was reported and may not be the last.
 #[derive(Clone, Copy, Debug)]
 struct Unsettled {
     since: Instant,
@@ -70,7 +70,7 @@ impl Growth {
         }
     }
 
-    /// When the next look is due; none: not by any hint.
+    /// Time of the next look. `None` if no hint asks for one.
     pub(super) fn due(&self) -> Option<Instant> {
         let look = self.signs.map(|signs| signs.due);
         [look, self.unsettled.map(|unsettled| self.settled_at(unsettled))].into_iter().flatten().min()
@@ -104,7 +104,7 @@ impl Growth {
         is_early
     }
 
-    /// The change is said: when its first sign came.
+    /// Notes that the change is reported; returns the time of its first sign.
     pub(super) fn said(&mut self, now: Instant) -> Instant {
         let noticed = self.signs.take().map_or(now, |signs| signs.first);
         self.not_before = Some(now + BETWEEN_CHANGES);
@@ -113,7 +113,7 @@ impl Growth {
         noticed
     }
 
-    /// Whether what was said is settled now: true once.
+    /// Whether the reported change is settled now; true only once.
     pub(super) fn settles(&mut self, now: Instant) -> bool {
         let settles = self.unsettled.is_some_and(|unsettled| self.settled_at(unsettled) <= now);
         self.unsettled = self.unsettled.filter(|_| !settles);

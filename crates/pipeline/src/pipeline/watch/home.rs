@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Where the process was when it began to watch.
+/// The working folder when watching began.
 static HOME: OnceLock<PathBuf> = OnceLock::new();
 
 /// Remember where the process is.
@@ -16,7 +16,7 @@ pub(super) fn remember() {
     }
 }
 
-/// Whether the working folder is there. One that is gone is exchanged for the one that has its name now.
+/// Whether the working folder exists. If it is gone, the folder that has its name now replaces it.
 pub(super) fn is_there() -> bool {
     !is_lost() || HOME.get().is_some_and(|home| env::set_current_dir(home).is_ok())
 }

@@ -7,8 +7,8 @@
 //! the contents' time stamps are looked at several times a second, and every two seconds everywhere. So they are while
 //! a folder is gone, the working folder too, until one of its name is there.
 //!
-//! A program may write in pieces. So what was said of a file is followed by [`News::Settled`] once nothing more is to be
-//! expected: whoever finds the file broken waits for that before saying so.
+//! A program may write in pieces. So [`News::Settled`] follows a change once no more changes are expected: whoever finds the file
+//! broken waits for that before reporting errors.
 
 pub mod content;
 mod folders;
@@ -31,10 +31,10 @@ use crate::control::CancelToken;
 const HEARTBEAT: Duration = Duration::from_secs(2);
 /// Between two looks where no hints are had.
 const POLL: Duration = Duration::from_millis(200);
-/// Between two changes that are said, at least: time for a first picture where saves never stop.
+/// Shortest time between two reports of a change: enough for a first picture while saves never stop.
 const BETWEEN_CHANGES: Duration = Duration::from_millis(100);
 
-/// How long files may be still or in motion before something is made of it.
+/// Times that files must be still, or may be in motion, before the watcher reacts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Waits {
     /// Without a hint, after which a file that is being written is looked at.
@@ -64,12 +64,12 @@ impl Default for Waits {
     }
 }
 
-/// What a watcher says.
+/// News from a watcher.
 #[derive(Clone, Copy, Debug)]
 pub enum News {
-    /// Some file holds something else, whole as far as can be told.
+    /// A file has another content, whole as far as can be told.
     Changed(Changed),
-    /// What was said to have changed stays as it is: nobody seems to be writing.
+    /// The files that changed stay as they are: nobody seems to be writing.
     Settled,
 }
 
@@ -95,8 +95,8 @@ enum Message {
 }
 
 impl Watcher {
-    /// Watch nothing yet. `poll`: do not rely on the system's notifications. `contents`: what the worker knows, so
-    /// that no file is hashed twice.
+    /// Starts without watching anything. `poll`: do not rely on the system's notifications. `contents`: the worker's knowledge of
+    /// files, so that no file is hashed twice.
     ///
     /// # Errors
     /// The system has no thread left.
@@ -128,8 +128,8 @@ impl Watcher {
         Ok(Self { orders })
     }
 
-    /// Watch these files and no others: those read after `since`, and those known from before. A file that holds something else than
-    /// given counts as changed, unless something was said of it since it was read.
+    /// Watches these files and no others: files read after `since`, and files known from before. A file with another content than
+    /// given counts as changed, unless a change was reported since it was read.
     pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
         let _ = self.orders.send(Message::Files(read, before, since));
     }
@@ -146,10 +146,10 @@ struct Watch<F> {
     /// Whether the working folder is there.
     is_home: bool,
     contents: Arc<Contents>,
-    /// What the files held when that was last said, or when they were last read, whichever is later; and when.
+    /// Contents of the files when a change was last reported, or when they were last read, whichever is later; and that time.
     files: HashMap<PathBuf, (Content, Instant)>,
     growth: Growth,
-    /// What the last look found and did not say.
+    /// Changes that the last look found and did not report.
     pending: Vec<FileRead>,
     say: F,
 }
@@ -180,8 +180,7 @@ impl<F: FnMut(News)> Watch<F> {
             self.files.insert(path, said.unwrap_or((content, since)));
         }
         for FileRead { path, content } in read {
-            // What was said of a file after that is newer than what was read of it; what was said before is not, and the file may be
-            // as it was then again.
+            // A report after `since` is newer than what was read; an earlier report is not, and the file may be as it was again.
             let said = before.get(&path).copied().filter(|(_, when)| *when > since);
             self.files.insert(path, said.unwrap_or((content, since)));
         }

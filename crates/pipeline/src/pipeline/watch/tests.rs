@@ -254,7 +254,7 @@ fn a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_
     // What is known from before a save says nothing.
     scratch.watcher.set_files(Vec::new(), between, Instant::now());
     scratch.expect_none();
-    // What was said after a request began is newer than what that read.
+    // A report after a request began is newer than what the request read.
     let begun = Instant::now();
     fs::write(&path, "said later").expect("written");
     scratch.expect_one();

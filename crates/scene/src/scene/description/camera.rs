@@ -28,11 +28,11 @@ pub enum Camera {
     Orbiter {
         /// The file.
         file: Located<PathBuf>,
-        /// Vertical whole angle in degrees, in (0, 180); none: the file's.
+        /// Vertical whole angle in degrees, in (0, 180). `None` for the file's angle.
         fov: Option<f64>,
         /// Lens radius, ≥ 0.
         aperture: f64,
-        /// Distance to the plane in focus; none: the file's distance to its centre.
+        /// Distance to the plane in focus. `None` for the file's distance to its centre.
         focus: Option<f64>,
     },
 }
@@ -40,7 +40,7 @@ pub enum Camera {
 /// A camera by vectors, however the scene gives it. What [`Camera::LookAt`] says of its fields holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// Where it is, and which way up.
+    /// Position and orientation.
     pub pose: Pose,
     /// Vertical whole angle in degrees.
     pub fov: f64,
@@ -50,7 +50,7 @@ pub struct Viewpoint {
     pub focus: f64,
 }
 
-/// Where a camera is, what it looks at and which way up.
+/// Position of a camera, the point that it looks at, and its upward direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// The eye.
@@ -61,10 +61,10 @@ pub struct Pose {
     pub up: DVec3,
 }
 
-/// What is changed of a camera; `None` leaves its own.
+/// Changes of a camera; `None` leaves its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraChange {
-    /// Where it is.
+    /// Position and orientation.
     pub pose: Option<Pose>,
     /// Vertical whole angle in degrees, in (0, 180).
     pub fov: Option<f64>,

@@ -21,11 +21,11 @@ pub enum Light {
 /// A light without extent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointLight {
-    /// Where.
+    /// Position.
     pub position: DVec3,
     /// W·sr⁻¹; with [`Falloff::None`] irradiance at normal incidence.
     pub intensity: Vec3,
-    /// How it weakens with distance.
+    /// Fall of the light with distance.
     pub falloff: Falloff,
 }
 
@@ -49,7 +49,7 @@ pub struct DirectionalLight {
     pub direction: DVec3,
     /// On a surface that faces it.
     pub irradiance: Vec3,
-    /// Apparent diameter in degrees, up to 180; 0: no extent.
+    /// Apparent diameter in degrees, up to 180; 0 for no extent.
     pub angle: f64,
 }
 
@@ -60,7 +60,7 @@ pub struct Environment {
     pub color: Vec3,
     /// An equirectangular map, resolved against the scene's folder.
     pub file: Option<Located<PathBuf>>,
-    /// How far the map is turned about +y, in degrees, counterclockwise seen from above.
+    /// Turn of the map about +y, in degrees, counterclockwise seen from above.
     pub rotate: f64,
 }
 
@@ -105,7 +105,7 @@ impl Fingerprinted for PointLight {
     }
 }
 
-/// How it is looked up; its texels have a key of their own.
+/// Key of the look-up; the texels have a key of their own.
 impl Fingerprinted for Environment {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self { color, file, rotate } = self;

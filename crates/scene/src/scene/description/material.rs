@@ -19,14 +19,14 @@ pub struct Texture {
     pub filter: TextureFilter,
     /// Outside [0, 1].
     pub wrap: Wrap,
-    /// How often it fits into u and v; not 0.
+    /// Repetitions in u and v; not 0.
     pub repeat: Vec2,
-    /// What its numbers are.
+    /// Meaning of its numbers.
     pub encoding: Encoding,
 }
 
 choice! {
-    /// What a texture's numbers are.
+    /// Meaning of a texture's numbers.
     pub enum Encoding {
         /// sRGB for 8-bit colour, linear for normal maps and float files.
         Auto = "auto",
@@ -70,16 +70,16 @@ impl EmissionSource {
 pub struct Material {
     /// Its name in the scene.
     pub name: String,
-    /// What it does with light that arrives.
+    /// Its reflection or transmission of light.
     pub kind: MaterialKind,
     /// Radiance on the front side.
     pub emission: EmissionSource,
-    /// What bends the shading normals.
+    /// The map that bends the shading normals.
     pub normal_map: Option<NormalMap>,
 }
 
 impl MaterialKind {
-    /// What a scene file calls it.
+    /// Name of the type in a scene file.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Phong { .. } => "phong",
@@ -106,7 +106,7 @@ pub struct NormalMap {
     pub strength: f32,
 }
 
-/// What a texture is looked up for.
+/// Purpose of a texture's look-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureUse {
     /// Colours.
@@ -115,7 +115,7 @@ pub enum TextureUse {
     Normal,
 }
 
-/// What a texture is to a material.
+/// Role of a texture in a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureRole {
     /// kd.
@@ -126,12 +126,12 @@ pub enum TextureRole {
     Ambient,
     /// Radiance.
     Emission,
-    /// What bends its normals.
+    /// Map that bends its normals.
     NormalMap,
 }
 
 impl TextureRole {
-    /// What its numbers are.
+    /// Meaning of its numbers.
     pub fn texture_use(self) -> TextureUse {
         match self {
             Self::Diffuse | Self::Specular | Self::Ambient | Self::Emission => TextureUse::Color,
@@ -140,7 +140,7 @@ impl TextureRole {
     }
 }
 
-/// What a material does with light that arrives.
+/// Reflection or transmission of light by a material.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MaterialKind {
     /// Normalised Phong.
@@ -151,7 +151,7 @@ pub enum MaterialKind {
         specular: ColorSource,
         /// α ≥ 0.
         shininess: f32,
-        /// ka; none: the diffuse colour.
+        /// ka. `None` for the diffuse colour.
         ambient: Option<ColorSource>,
     },
     /// A perfect mirror of this reflectance in [0, 1].
@@ -203,7 +203,7 @@ impl Material {
     }
 }
 
-/// How it is looked up; its texels have keys of their own.
+/// Key of the look-up; the texels have keys of their own.
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self { name: _, file, filter, wrap, repeat, encoding } = self;

@@ -18,7 +18,10 @@ pub use material::{
     ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,
     TextureRole, TextureUse, Wrap,
 };
-pub use render::{Accel, Integrator, MOST_SCATTERINGS, PixelFilter, Render, Shadows, Tonemap};
+pub use render::{
+    Accel, Integrator, KeyRange, MOST_SCATTERINGS, PixelFilter, Render, RenderKey, Shadows, Tonemap,
+    render_keys,
+};
 pub use shape::{Lowered, Mesh, Object, Shape};
 
 /// A whole scene.
@@ -26,7 +29,7 @@ pub use shape::{Lowered, Mesh, Object, Shape};
 pub struct Scene {
     /// The `[render]` table.
     pub render: Render,
-    /// Where the picture goes, if the scene says so, resolved against the scene's folder.
+    /// Output file, if the scene names one, resolved against the scene's folder.
     pub output: Option<PathBuf>,
     /// The `[camera]` table.
     pub camera: Camera,

@@ -1,50 +1,201 @@
 //! `[render]`.
 
+use std::ops::RangeInclusive;
+
 use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use crate::choice;
+use crate::choice::Choice;
 pub use crate::film::tone::Tonemap;
 use crate::math::Vec3;
+use crate::math::limits::LARGEST;
 pub use crate::sampling::filter::PixelFilter;
 
 /// Most scatterings along one path that a scene may ask for: between perfect mirrors a path ends nowhere else.
 pub const MOST_SCATTERINGS: u32 = 10_000;
 
-/// Settings of the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Render {
-    /// Pixels across, 1 … 65536.
-    pub width: u32,
-    /// Pixels down, 1 … 65536.
-    pub height: u32,
-    /// Most samples per pixel, ≥ 1.
-    pub samples: u32,
-    /// Noise at which a tile gets no more samples, relative to its brightness; 0: none ends it.
-    pub error: f32,
-    /// Shadow rays towards each light from each shaded point, ≥ 1.
-    pub shadow_samples: u32,
-    /// Scatterings along one path: 0 = emitted light only, 1 = direct light.
-    pub max_depth: u32,
-    /// The method.
-    pub integrator: Integrator,
-    /// Shadows.
-    pub shadows: Shadows,
-    /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection; 0: no such limit.
-    pub clamp: f32,
-    /// Ambient radiance of the Phong model.
-    pub ambient: Vec3,
-    /// Radiance seen by a ray that leaves the scene.
-    pub background: Vec3,
-    /// Reconstruction filter.
-    pub filter: PixelFilter,
-    /// Stops.
-    pub exposure: f32,
-    /// Tone curve of 8-bit and 16-bit files.
-    pub tonemap: Tonemap,
-    /// Acceleration structure.
-    pub accel: Accel,
-    /// Seed of every random number.
-    pub seed: u32,
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __render_keys {
+    ($callback:ident $(, $which:ident)?) => {
+        $crate::scene::description::render_keys! {
+            @pass $callback [$($which)?] []
+
+            /// Pixels across, 1 … 65536.
+            width: u32 = 640, whole(1, 65_536), option;
+            /// Pixels down, 1 … 65536.
+            height: u32 = 480, whole(1, 65_536), option;
+            /// Most samples per pixel, ≥ 1.
+            samples: u32 = 64, whole(1, u32::MAX), option;
+            /// Noise threshold, relative to a tile's brightness, below which the tile gets no more samples; 0: no threshold.
+            error: f32 = 0.0, at_least(0.0), option;
+            /// Shadow rays towards each light from each shaded point, ≥ 1.
+            shadow_samples: u32 = 1, whole(1, 4096), scene;
+            /// Scatterings along one path: 0 = emitted light only, 1 = direct light.
+            max_depth: u32 = 8, whole(0, MOST_SCATTERINGS), option;
+            /// Rendering method.
+            integrator: Integrator = Integrator::Whitted, choice, option;
+            /// Shadows.
+            shadows: Shadows = Shadows::Soft, choice, option;
+            /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection; 0: no such limit.
+            clamp: f32 = 0.0, at_least(0.0), option;
+            /// Ambient radiance of the Phong model.
+            ambient: Vec3 = Vec3::ZERO, color, scene;
+            /// Radiance seen by a ray that leaves the scene.
+            background: Vec3 = Vec3::ZERO, color, scene;
+            /// Reconstruction filter.
+            filter: PixelFilter = PixelFilter::Box, choice, scene;
+            /// Exposure in stops.
+            exposure: f32 = 0.0, between(-100.0, 100.0), live;
+            /// Tone curve of 8-bit and 16-bit files.
+            tonemap: Tonemap = Tonemap::None, choice, scene;
+            /// Acceleration structure.
+            accel: Accel = Accel::Bvh, choice, option;
+            /// Seed of every random number.
+            seed: u32 = 0, whole(0, u32::MAX), option;
+        }
+    };
+    // Pass the keys on that are wanted.
+    (@pass $callback:ident [$($which:ident)?] [$($kept:tt)*]) => { $callback! { $($kept)* } };
+    (@pass $callback:ident [] [] $($all:tt)*) => { $callback! { $($all)* } };
+    (
+        @pass $callback:ident [$which:ident] [$($kept:tt)*]
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, option; $($rest:tt)*
+    ) => {
+        $crate::scene::description::render_keys! {
+            @pass $callback [$which]
+            [$($kept)* $(#[doc = $doc])* $name: $type = $default, $range $(($($limit),*))?, option;]
+            $($rest)*
+        }
+    };
+    (
+        @pass $callback:ident [changed] [$($kept:tt)*]
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, live; $($rest:tt)*
+    ) => {
+        $crate::scene::description::render_keys! {
+            @pass $callback [changed]
+            [$($kept)* $(#[doc = $doc])* $name: $type = $default, $range $(($($limit),*))?, live;]
+            $($rest)*
+        }
+    };
+    (
+        @pass $callback:ident [$which:ident] [$($kept:tt)*]
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $other:ident; $($rest:tt)*
+    ) => {
+        $crate::scene::description::render_keys! { @pass $callback [$which] [$($kept)*] $($rest)* }
+    };
 }
+
+/// Calls a macro with the keys of `[render]`, each as `doc name: type = default, range, change;`: their one definition. The parser,
+/// [`Render`], the overrides of a run and the options of the command line are made from it or read it.
+///
+/// The ranges are `whole(LEAST, MOST)`, `at_least(LEAST)`, `between(LEAST, MOST)`, `choice` and `color`. The changes:
+///
+/// | | |
+/// | --- | --- |
+/// | `option` | an option of the command line overrides the key, which has the key's name with `-` for `_` |
+/// | `live` | the terminal UI overrides it |
+/// | `scene` | nothing but the scene sets it |
+///
+/// `render_keys!(callback)` passes all of them on, `render_keys!(callback, changed)` those with `option` or `live`,
+/// `render_keys!(callback, option)` those with an option.
+///
+/// To add a key: a line here; [`Render::add_to`](Fingerprinted::add_to), which says whether pictures depend on it; a line of the
+/// starter scene; and the help of its option, if it has one, in the command line's arguments. Tests compare these.
+#[doc(inline)]
+pub use __render_keys as render_keys;
+
+/// Values that a key of `[render]` accepts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum KeyRange {
+    /// Whole numbers.
+    Whole(RangeInclusive<u32>),
+    /// Numbers, up to [`LARGEST`](crate::math::limits::LARGEST).
+    Number(RangeInclusive<f64>),
+    /// These names.
+    Names(Vec<&'static str>),
+    /// A colour.
+    Color,
+}
+
+/// A key of `[render]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderKey {
+    /// The key.
+    pub name: &'static str,
+    /// Description, one sentence.
+    pub doc: String,
+    /// Accepted values.
+    pub range: KeyRange,
+    /// The default, as a scene file has it.
+    pub default: String,
+    /// Whether an option of the command line overrides it.
+    pub has_option: bool,
+}
+
+macro_rules! range {
+    (whole($least:expr, $most:expr), $type:ty) => {
+        KeyRange::Whole($least..=$most)
+    };
+    (at_least($least:expr), $type:ty) => {
+        KeyRange::Number($least..=LARGEST)
+    };
+    (between($least:expr, $most:expr), $type:ty) => {
+        KeyRange::Number($least..=$most)
+    };
+    (choice, $type:ty) => {
+        KeyRange::Names(<$type>::ALL.iter().map(|one| one.name()).collect())
+    };
+    (color, $type:ty) => {
+        KeyRange::Color
+    };
+}
+
+macro_rules! in_toml {
+    (choice, $value:expr) => {
+        format!("\"{}\"", $value.name())
+    };
+    (color, $value:expr) => {
+        format!("{:?}", $value.to_array())
+    };
+    ($range:ident, $value:expr) => {
+        format!("{:?}", $value)
+    };
+}
+
+macro_rules! settings {
+    ($(
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+    )*) => {
+        /// Settings of the picture.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Render {
+            $($(#[doc = $doc])* pub $name: $type,)*
+        }
+
+        impl Render {
+            /// Settings of a scene that has none.
+            pub const DEFAULT: Self = Self { $($name: $default),* };
+
+            /// The keys of `[render]`, but for `output`.
+            pub fn keys() -> Vec<RenderKey> {
+                vec![$(RenderKey {
+                    name: stringify!($name),
+                    doc: concat!($($doc),*).trim().to_owned(),
+                    range: range!($range $(($($limit),*))?, $type),
+                    default: in_toml!($range, Self::DEFAULT.$name),
+                    has_option: stringify!($change) == "option",
+                }),*]
+            }
+
+            /// The key of a name. `None` if there is none.
+            pub fn key(name: &str) -> Option<RenderKey> {
+                Self::keys().into_iter().find(|key| key.name == name)
+            }
+        }
+    };
+}
+
+render_keys!(settings);
 
 choice! {
     /// Rendering methods.
@@ -57,7 +208,7 @@ choice! {
 }
 
 choice! {
-    /// How shadows are made.
+    /// Methods for shadows.
     pub enum Shadows {
         /// Nothing stops light.
         Off = "off",
@@ -91,7 +242,7 @@ impl Render {
     }
 }
 
-/// What the samples of a picture depend on.
+/// Key of the settings that samples depend on.
 impl Fingerprinted for Render {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self {

@@ -20,9 +20,9 @@ use crate::math::DVec3;
 pub struct Object {
     /// The geometry.
     pub shape: Shape,
-    /// Index into [`Scene::materials`](super::Scene::materials); none: the mesh file's own.
+    /// Index into [`Scene::materials`](super::Scene::materials). `None` for the mesh file's own materials.
     pub material: Option<usize>,
-    /// What the file calls it.
+    /// Name in the file.
     pub name: Option<Box<str>>,
     /// The table in the file.
     pub span: Range<usize>,
@@ -133,7 +133,7 @@ pub struct Mesh {
     pub smooth: bool,
 }
 
-/// What a shape becomes before it is traced.
+/// Forms that shapes have when they are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lowered<'a> {
     /// One that is computed from its numbers alone.
@@ -170,7 +170,7 @@ impl Shape {
         })
     }
 
-    /// What a scene file calls it.
+    /// Name of the shape's table in a scene file.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Sphere { .. } => "sphere",

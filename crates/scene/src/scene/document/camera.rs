@@ -6,7 +6,7 @@ use super::limits::Limits;
 use super::table::Table;
 use crate::math::DVec3;
 
-/// Where a scene does not say.
+/// Field of view of a scene that has none.
 pub(in super::super) const FOV_DEGREES: f64 = 40.0;
 
 /// Below this sine of the angle between them, `up` and the view count as parallel.

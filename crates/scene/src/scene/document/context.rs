@@ -1,4 +1,4 @@
-//! What all readers of one file share: its text, its place, and the list of what is wrong.
+//! Context of all readers of one file: its text, its place, and the list of its mistakes.
 
 use std::cell::{Cell, OnceCell, RefCell};
 use std::ops::Range;
@@ -18,7 +18,7 @@ pub(super) struct Context<'a> {
     searches: Cell<Searches>,
 }
 
-/// How often a name was looked for among many, and with how many it was compared.
+/// Number of searches for a name among many, and of comparisons.
 #[derive(Clone, Copy, Default)]
 struct Searches {
     count: usize,
@@ -35,14 +35,14 @@ pub(super) struct Issue {
     cause: Cause,
 }
 
-/// What an issue follows from: this decides whether it is worth showing beside errors of syntax.
+/// Cause of an issue: it decides whether the issue is worth showing beside errors of syntax.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Cause {
     /// The TOML is broken.
     Syntax,
-    /// What stands at the place.
+    /// The value at the place.
     Value,
-    /// What stands elsewhere, or nowhere: perhaps in a line that is broken.
+    /// A value elsewhere, or one that is missing: perhaps it stands in a broken line.
     Absence,
 }
 
@@ -60,7 +60,7 @@ impl Issue {
         }
     }
 
-    /// What is at `span` is probably not meant.
+    /// A likely mistake at `span`.
     pub(super) fn warning(span: Range<usize>, message: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, cause: Cause::Absence, ..Self::error(span, message) }
     }
@@ -102,7 +102,7 @@ impl<'a> Context<'a> {
         self.report_with(|| issue);
     }
 
-    /// Adds to the list; where it is too long already, the issue is counted and not made.
+    /// Adds an issue to the list; if the list is too long already, counts it without making it.
     pub(super) fn report_with(&self, make: impl FnOnce() -> Issue) {
         if self.issues.borrow().len() < MOST_COLLECTED {
             let issue = make();
@@ -137,7 +137,7 @@ impl<'a> Context<'a> {
         look()
     }
 
-    /// How many names were compared.
+    /// Number of names compared.
     #[cfg(test)]
     pub(super) fn comparisons(&self) -> usize {
         self.searches.get().comparisons
@@ -163,8 +163,8 @@ impl<'a> Context<'a> {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
-    /// Everything reported, in the order of the file. Where TOML is broken, what may only follow from that is
-    /// left out: the lines named, and what is said to be missing.
+    /// All issues, in the order of the file. If the TOML is broken, leaves out issues that may only follow from that: those in
+    /// the lines named, and missing values.
     pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
         let mut issues = self.issues.take();
         if !broken_lines.is_empty() {

@@ -7,7 +7,7 @@ use super::table::Table;
 use super::textures::PICTURES;
 use crate::math::Vec3;
 
-/// Gives nothing where it is wrong, and in that nothing where there is none.
+/// The environment. `None` if it is invalid, `Some(None)` if it is absent.
 pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
     let key = root.optional("environment");
     let Some(table) = root.table("environment") else {

@@ -1,5 +1,5 @@
-//! One key of a table, read as what it should be. Each reader gives nothing where the key is absent, and
-//! reports and gives nothing where it is wrong.
+//! One key of a table, read as the expected type. Each reader returns `None` if the key is absent, and reports an error and
+//! returns `None` if it is invalid.
 
 mod color;
 mod file;
@@ -17,7 +17,7 @@ use crate::choice::Choice;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 use crate::math::{DVec3, Vec2};
 
-/// A key that was asked for.
+/// A key that a reader asked for.
 pub(super) struct Key<'a> {
     pub(super) context: &'a Context<'a>,
     pub(super) name: &'static str,
@@ -102,7 +102,7 @@ impl<'a> Key<'a> {
         None
     }
 
-    /// What a shape is called, if it has a name: one that cannot be taken for a number.
+    /// Name of a shape, if it has one; a name that could be a number is an error.
     pub(super) fn shape_name(&self) -> Option<Option<Box<str>>> {
         if !self.is_given() {
             return Some(None);
@@ -185,7 +185,7 @@ impl<'a> Key<'a> {
         self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
     }
 
-    /// As many numbers as the array has room for; every wrong one is reported.
+    /// Numbers of an array of that length; reports every wrong one.
     fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.array().filter(|array| array.len() == N) else {

@@ -9,7 +9,7 @@ use crate::choice;
 use crate::math::{DVec3, Vec3};
 
 choice! {
-    /// What a light is.
+    /// Types of lights.
     enum Kind {
         /// Without extent.
         Point = "point",

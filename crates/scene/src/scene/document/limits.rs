@@ -23,7 +23,7 @@ pub(super) enum Limits {
 }
 
 impl Limits {
-    /// What is wrong with a number, to be read after its name: `must be greater than 0`.
+    /// The fault of a number, to be read after its name: `must be greater than 0`.
     pub(super) fn violation(self, number: f64) -> Option<String> {
         if number.is_nan() || number.is_infinite() {
             return Some("must be a finite number".to_owned());

@@ -11,11 +11,11 @@ use crate::math::{DVec3, Vec3};
 
 /// The materials of a file.
 pub(super) struct Materials {
-    /// What they are called.
+    /// Names of the materials.
     pub(super) names: Names,
     /// In the order of the names; none if one of them is wrong.
     pub(super) list: Option<Vec<Material>>,
-    /// Which of them emit light.
+    /// Whether each material emits light.
     emissive: Vec<bool>,
 }
 
@@ -37,7 +37,7 @@ pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
 }
 
 choice! {
-    /// What a material does.
+    /// Types of materials.
     enum Kind {
         /// Diffuse and glossy.
         Phong = "phong",

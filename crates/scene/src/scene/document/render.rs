@@ -2,61 +2,54 @@
 
 use std::path::PathBuf;
 
-use super::super::description::{Accel, Integrator, MOST_SCATTERINGS, PixelFilter, Render, Shadows, Tonemap};
+use super::super::description::{MOST_SCATTERINGS, Render, render_keys};
 use super::context::Issue;
 use super::limits::Limits;
 use super::table::Table;
-use crate::math::Vec3;
 
-const MAX_SIDE: i128 = 65_536;
 const MAX_PIXELS: u64 = 1 << 30;
-const MAX_U32: i128 = u32::MAX as i128;
 
 /// Endings of pictures that can be written.
 pub(super) const PICTURES: [&str; 6] = ["png", "exr", "ppm", "hdr", "jpg", "jpeg"];
 
-/// The values of a scene that says nothing.
-const DEFAULT: Render = Render {
-    width: 640,
-    height: 480,
-    samples: 64,
-    error: 0.0,
-    shadow_samples: 1,
-    max_depth: 8,
-    integrator: Integrator::Whitted,
-    shadows: Shadows::Soft,
-    clamp: 0.0,
-    ambient: Vec3::ZERO,
-    background: Vec3::ZERO,
-    filter: PixelFilter::Box,
-    exposure: 0.0,
-    tonemap: Tonemap::None,
-    accel: Accel::Bvh,
-    seed: 0,
-};
+macro_rules! read {
+    ($key:expr, whole($least:expr, $most:expr)) => {
+        $key.whole(i128::from($least)..=i128::from($most))
+    };
+    ($key:expr, at_least($least:expr)) => {
+        $key.number32(Limits::AtLeast($least))
+    };
+    ($key:expr, between($least:expr, $most:expr)) => {
+        $key.number32(Limits::Between($least, $most))
+    };
+    ($key:expr, choice) => {
+        $key.choice()
+    };
+    ($key:expr, color) => {
+        $key.color()
+    };
+}
+
+macro_rules! reader {
+    ($(
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+    )*) => {
+        /// Reads every key; what is absent or wrong has its default.
+        fn settings(table: &Table<'_>) -> Render {
+            let key = |name| table.optional(name);
+            Render {
+                $($name: read!(key(stringify!($name)), $range $(($($limit),*))?).unwrap_or(Render::DEFAULT.$name),)*
+            }
+        }
+    };
+}
+
+render_keys!(reader);
 
 /// The settings, and where the picture goes if the scene says so.
 pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
-    let Some(table) = root.table("render") else { return (Some(DEFAULT), None) };
-    let key = |name| table.optional(name);
-    let render = Render {
-        width: key("width").whole(1..=MAX_SIDE).unwrap_or(DEFAULT.width),
-        height: key("height").whole(1..=MAX_SIDE).unwrap_or(DEFAULT.height),
-        samples: key("samples").whole(1..=MAX_U32).unwrap_or(DEFAULT.samples),
-        error: key("error").number32(Limits::AtLeast(0.0)).unwrap_or(DEFAULT.error),
-        shadow_samples: key("shadow_samples").whole(1..=4096).unwrap_or(DEFAULT.shadow_samples),
-        max_depth: key("max_depth").whole(0..=i128::from(MOST_SCATTERINGS)).unwrap_or(DEFAULT.max_depth),
-        integrator: key("integrator").choice().unwrap_or(DEFAULT.integrator),
-        shadows: key("shadows").choice().unwrap_or(DEFAULT.shadows),
-        clamp: key("clamp").number32(Limits::AtLeast(0.0)).unwrap_or(DEFAULT.clamp),
-        ambient: key("ambient").color().unwrap_or(DEFAULT.ambient),
-        background: key("background").color().unwrap_or(DEFAULT.background),
-        filter: key("filter").choice().unwrap_or(DEFAULT.filter),
-        exposure: key("exposure").number32(Limits::Between(-100.0, 100.0)).unwrap_or(DEFAULT.exposure),
-        tonemap: key("tonemap").choice().unwrap_or(DEFAULT.tonemap),
-        accel: key("accel").choice().unwrap_or(DEFAULT.accel),
-        seed: key("seed").whole(0..=MAX_U32).unwrap_or(DEFAULT.seed),
-    };
+    let Some(table) = root.table("render") else { return (Some(Render::DEFAULT), None) };
+    let render = settings(&table);
     let output = output(&table);
     check_size(&table, &render);
     table.finish();
@@ -77,5 +70,83 @@ fn check_size(table: &Table<'_>, render: &Render) {
             Issue::error(spans().unwrap_or_default(), format!("{width} × {height} pixels are too many"))
                 .help(format!("a picture has at most {MAX_PIXELS} pixels"));
         table.context.report(issue);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::super::description::{KeyRange, Render};
+    use super::super::super::{Outcome, parse, starter};
+
+    /// The settings of a scene whose `[render]` has this line; or the messages.
+    fn read(line: &str) -> Result<Render, Vec<String>> {
+        let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
+        let Outcome { scene, diagnostics, .. } =
+            parse(format!("[render]\n{line}\n{camera}").into(), Path::new("a.toml"));
+        scene.map(|scene| scene.render).ok_or(diagnostics.into_iter().map(|one| one.message).collect())
+    }
+
+    #[test]
+    fn every_key_has_its_default_and_accepts_it() {
+        assert_eq!(read(""), Ok(Render::DEFAULT));
+        for key in Render::keys() {
+            let line = format!("{} = {}", key.name, key.default);
+            assert_eq!(read(&line), Ok(Render::DEFAULT), "{line}");
+        }
+    }
+
+    #[test]
+    fn every_key_accepts_its_range_and_nothing_beside_it() {
+        for key in Render::keys() {
+            let (name, mut accepted, mut refused) = (key.name, Vec::new(), Vec::new());
+            match key.range {
+                KeyRange::Whole(range) => {
+                    accepted.extend([range.start().to_string(), range.end().to_string()]);
+                    refused.push((i64::from(*range.start()) - 1).to_string());
+                    refused.push((i64::from(*range.end()) + 1).to_string());
+                }
+                KeyRange::Number(range) => {
+                    accepted.extend([range.start(), range.end()].map(|end| format!("{end:?}")));
+                    refused.push(format!("{:?}", range.start() - 0.001));
+                    refused.push(format!("{:?}", range.end() * 1.001));
+                }
+                KeyRange::Names(names) => {
+                    accepted.extend(names.into_iter().map(|name| format!("\"{name}\"")));
+                    refused.push("\"another\"".to_owned());
+                }
+                KeyRange::Color => {
+                    accepted.push("[0.5, 2, 0]".to_owned());
+                    refused.push("[0.5, -2, 0]".to_owned());
+                }
+            }
+            for value in accepted {
+                // A picture of the greatest width is a low one.
+                let other = match name {
+                    "width" => "height = 1\n",
+                    "height" => "width = 1\n",
+                    _ => "",
+                };
+                assert!(read(&format!("{other}{name} = {value}")).is_ok(), "{name} = {value}");
+            }
+            for value in refused {
+                assert!(read(&format!("{name} = {value}")).is_err(), "{name} = {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_starter_scene_shows_every_key_with_its_choices() {
+        let table = starter().split("[camera]").next().unwrap_or_default();
+        for key in Render::keys() {
+            let shown = |line: &&str| line.trim_start_matches("# ").starts_with(&format!("{} = ", key.name));
+            let line = table.lines().find(shown).unwrap_or_else(|| panic!("no line of `{}`", key.name));
+            if let KeyRange::Names(names) = key.range {
+                for name in names {
+                    assert!(line.contains(&format!("\"{name}\"")), "{name}: {line}");
+                }
+            }
+        }
     }
 }

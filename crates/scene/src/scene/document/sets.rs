@@ -1,4 +1,4 @@
-//! What the call sets in a scene.
+//! Values that the call sets in a scene.
 
 use super::super::nearest::nearest;
 use super::super::sanitize::shortened;

@@ -107,7 +107,7 @@ fn open_at_end(text: &str) -> Option<usize> {
     }
 }
 
-/// How to close a list: all of it, where it is one of numbers in one line.
+/// Way to close a list: all of the list, if it holds numbers in one line.
 fn closed(context: &Context<'_>, open: usize) -> String {
     let end =
         context.text(&(open..context.file().len())).find('\n').map_or(context.file().len(), |at| open + at);
@@ -117,7 +117,7 @@ fn closed(context: &Context<'_>, open: usize) -> String {
     }
 }
 
-/// What is said of a list in one line between whose values commas are missing; `at` is where the first one is missing.
+/// Issue about missing commas between the values of a list in one line; `at` is the place of the first.
 fn with_commas(context: &Context<'_>, lists: &Lists<'_>, at: usize) -> Option<String> {
     let open = lists.open_at(at)?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -132,7 +132,7 @@ fn with_commas(context: &Context<'_>, lists: &Lists<'_>, at: usize) -> Option<St
     Some(format!("{words}: write {list}"))
 }
 
-/// What is said of numbers in one line in brackets of another kind: `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0, 1, 0)`.
+/// Issue about numbers in one line in other brackets: `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0, 1, 0)`.
 fn in_other_brackets(context: &Context<'_>, at: usize) -> Option<Issue> {
     let line = context.line_text(context.line(at))?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -160,7 +160,7 @@ fn of_numbers(text: &str) -> Option<String> {
     listed(&values).filter(|_| values.iter().all(is_number))
 }
 
-/// What stands between commas, semicolons and spaces.
+/// Values between commas, semicolons and spaces.
 fn values(text: &str) -> Vec<&str> {
     text.split([',', ';', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect()
 }
@@ -230,7 +230,7 @@ fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue 
     }
 }
 
-/// What TOML takes for a text without quotes.
+/// Issue about a text without quotes, which is no TOML value.
 fn not_a_value(span: Range<usize>, written: &str) -> Issue {
     const VALUES: &str = "expected a number, true or false, a text in quotes, or values in brackets";
     if written.trim().is_empty() {

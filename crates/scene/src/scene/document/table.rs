@@ -1,4 +1,4 @@
-//! A TOML table that knows which of its keys were asked for.
+//! A TOML table that knows its keys which readers asked for.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -11,7 +11,7 @@ use super::context::{Context, Issue};
 use super::key::Key;
 use super::value::{Item, Value, found};
 
-/// What messages call a table.
+/// Name of a table in messages.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Title<'a> {
     /// The file itself.
@@ -61,7 +61,7 @@ impl<'a> Table<'a> {
         Self::new(context, entries, 0..0, Title::Root)
     }
 
-    /// A value as a table; an error where it is something else.
+    /// A value as a table; reports an error if it is something else.
     pub(super) fn of(context: &'a Context<'a>, value: Value<'a>, title: Title<'a>) -> Option<Self> {
         match value.item() {
             Item::Table(entries) => Some(Self::new(context, entries, value.span(), title)),

@@ -12,7 +12,7 @@ pub(super) const PICTURES: [&str; 12] =
 
 /// The textures of a file.
 pub(super) struct Textures {
-    /// What they are called.
+    /// Names of the textures.
     pub(super) names: Names,
     /// In the order of the names; none if one of them is wrong.
     pub(super) list: Option<Vec<Texture>>,

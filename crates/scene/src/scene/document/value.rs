@@ -22,7 +22,7 @@ pub(super) fn found(context: &Context<'_>, value: Value<'_>) -> String {
     }
 }
 
-/// An integer or a float; the largest double where it is larger. None: something else.
+/// An integer or a float; the largest double if it is larger. `None` for other values.
 pub(super) fn number(value: Value<'_>) -> Option<f64> {
     match value.item() {
         // Rounding to the nearest double is what writing the number as a float would do.
@@ -38,7 +38,7 @@ pub(super) fn number(value: Value<'_>) -> Option<f64> {
     }
 }
 
-/// An integer by its digits; none where it is beyond all uses.
+/// An integer by its digits. `None` if it is beyond all uses.
 pub(super) fn whole(digits: &str, radix: u32) -> Option<i128> {
     i128::from_str_radix(digits, radix).ok()
 }

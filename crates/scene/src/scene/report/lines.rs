@@ -12,13 +12,13 @@ pub type Line = Vec<Piece>;
 /// A run of text of one role.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// What it is.
+    /// Its role.
     pub role: Role,
     /// Without control characters.
     pub text: String,
 }
 
-/// What a piece of a report is, so that each front end gives it its own colour.
+/// Role of a piece of a report, so that each front end gives it its own colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// Source text, paths.

@@ -23,9 +23,9 @@ pub(super) struct Header<'s> {
 /// A document that grows.
 pub(super) struct Assembly<'s> {
     pub(super) document: Document<'s>,
-    /// Where keys go.
+    /// Table that keys go to.
     table: TableId,
-    /// That of `table`, which is put in its place when the next one begins; none: `table` is the root.
+    /// Header of `table`, which is put in its place when the next one begins. `None` if `table` is the root.
     header: Option<Header<'s>>,
     /// A header whose end was not found yet: what follows is searched for it.
     pub(super) open: Option<Header<'s>>,
@@ -178,7 +178,7 @@ impl<'s> Assembly<'s> {
         }
     }
 
-    /// The table that a path leads to; made where there is none.
+    /// The table that a path leads to; makes it if it does not exist.
     fn descend(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {

@@ -1,4 +1,4 @@
-//! What is wrong with the TOML itself.
+//! Syntax errors of the TOML itself.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ pub(in super::super) struct SyntaxError {
     pub(in super::super) span: Range<usize>,
     /// In a few words.
     pub(in super::super) what: String,
-    /// What would be right there: a list, or `nothing`.
+    /// Expected tokens: a list, or `nothing`.
     pub(in super::super) expected: Option<String>,
 }
 

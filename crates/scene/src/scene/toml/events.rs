@@ -1,7 +1,7 @@
 //! The events of `toml_parser` become headers, keys and values.
 //!
-//! Where the text is broken, the events are too: a close without its open, a key where a value is due. What is made of
-//! those is what the `toml` crate makes of them.
+//! Events of a broken text are broken too: a close without its open, a key in place of a value. They become the same values as in
+//! the `toml` crate.
 
 use std::borrow::Cow;
 
@@ -89,7 +89,7 @@ impl<'s> Events<'_, 's> {
         self.assembly.key_value(&path, key, value);
     }
 
-    /// What stands for a value that is missing.
+    /// Substitute for a missing value.
     fn no_value(&mut self) -> Node {
         let span = Span::default();
         let text = self.assembly.text(span, Cow::Borrowed("0"));

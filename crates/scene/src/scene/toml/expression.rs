@@ -53,9 +53,8 @@ fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: 
 
 /// Finds the end of an expression.
 ///
-/// The brackets that are open here hold those that are open in the parser, in order: of both kinds each is closed by
-/// its own only. Where brackets are wrong, the parser may be done earlier, but is never within a value where none is
-/// open here.
+/// Open brackets. They include those open in the parser, in order: each is closed only by its own kind. If brackets are wrong,
+/// the parser may be done earlier, but it is never within a value while none is open here.
 #[derive(Default)]
 struct Cut {
     phase: Phase,

@@ -4,6 +4,21 @@
 //! other expression is cut out by [`expression`], read by the events of `toml_parser` and made into values by
 //! [`events`]. [`assembly`] puts the keys and values into tables by the rules of TOML, [`tree`] holds them. Nothing here
 //! knows what a scene is. Documents with errors are read as far as they can be understood.
+//!
+//! ## Why the tree is not that of the crate `toml`
+//!
+//! `toml::de::DeTable::parse_recoverable` (1.2) has spans and recovery too. Both were measured on a scene of a million spheres,
+//! 77 MB of text, on the same machine in turns:
+//!
+//! | | this tree | `DeTable` |
+//! | --- | --- | --- |
+//! | processor time, user + system | 0.21 + 0.18 s | 1.5 + 1.4 s or more |
+//! | memory of the tree | 192 MB | 985 MB |
+//! | most memory at once, beside the text | 192 MB | 2.67 GB |
+//! | errors in `tests/broken` | | the same messages and places, but no place where dotted keys are too deep |
+//!
+//! The library stays the reference of tests: both have the grammar of `toml_parser`, and therefore its errors. Scenes of that
+//! size are in use, and the library's tree would take more memory than the spheres that are rendered.
 
 mod assembly;
 mod brackets;
@@ -25,7 +40,7 @@ pub(super) use tree::{Document, Entries, Item, KeyValue, Value};
 /// Arrays and tables may lie in each other this deep, and dotted keys have at most this many parts.
 const DEEPEST: u32 = 80;
 
-/// A byte order mark, which may begin a text and is no part of it.
+/// A byte order mark, which may begin a text and does not belong to it.
 const MARK: &str = "\u{feff}";
 
 /// Whether a text is one value with a key that leads into a table, and nothing else.

@@ -45,7 +45,7 @@ pub(super) fn read<'s>(source: &'s str, at: usize, assembly: &mut Assembly<'s>) 
     Some(line.at)
 }
 
-/// What stands after the `=`; without a kind it is an array.
+/// Value after the `=`; without a kind it is an array.
 struct Written {
     span: Span,
     kind: Option<Kind>,

@@ -13,35 +13,35 @@ pub(in super::super) struct NoPlace {
     pub(in super::super) above: Vec<String>,
     /// The part itself.
     pub(in super::super) part: String,
-    /// What is wrong with it.
+    /// The fault of the key.
     pub(in super::super) why: Why,
 }
 
-/// What is wrong with a part of a key.
+/// Faults of a part of a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in super::super) enum Why {
     /// A table of this name is not there, and is not made.
     Unknown {
-        /// Those that are there.
+        /// Keys that exist.
         known: Vec<String>,
     },
     /// A list has no such entry.
     NoEntry {
-        /// How many it has.
+        /// Number of its entries.
         count: usize,
-        /// The names of those that have one.
+        /// Names of the entries that have one.
         names: Vec<String>,
     },
     /// Several entries have this name.
     Ambiguous {
-        /// How many.
+        /// Number of entries.
         count: usize,
     },
     /// An element of an array of values.
     Element,
 }
 
-/// What keys lead through.
+/// Tables and lists that keys lead through.
 #[derive(Clone, Copy, Debug)]
 pub(in super::super) struct Layout {
     /// Tables at the top that hold tables by names of the file's own: those are not made.
@@ -78,7 +78,7 @@ impl<'s> Document<'s> {
         Ok(())
     }
 
-    /// Where the part of a key leads that is not the last one.
+    /// The step of a key's part that is not the last one.
     fn step(
         &mut self,
         keys: &[Name<'s>],
@@ -149,7 +149,7 @@ impl<'s> Document<'s> {
     }
 }
 
-/// Where a part of a key leads.
+/// The step of a key's part.
 enum Step {
     /// To a table.
     Table(TableId),

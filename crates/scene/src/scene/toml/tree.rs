@@ -47,7 +47,7 @@ pub(super) enum Radix {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct TableId(u32);
 
-/// What a node is.
+/// Kind of a node.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
     String(Text),
@@ -63,7 +63,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Which table it is.
+    /// Index of the table, if it is one.
     pub(super) fn table(self) -> Option<TableId> {
         if let Self::Table(table) = self { Some(table) } else { None }
     }
@@ -90,12 +90,12 @@ struct Entry {
 /// No entry.
 const NONE: u32 = u32::MAX;
 
-/// How a table came about, which decides what may be added to it.
+/// Origin of a table, which decides whether keys may be added to it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Origin {
-    /// By a longer header or key than its own.
+    /// Whether a longer header or key than its own made it.
     pub(super) is_implicit: bool,
-    /// By a dotted key.
+    /// Whether a dotted key made it.
     pub(super) is_dotted: bool,
     /// Within braces.
     pub(super) is_inline: bool,
@@ -128,7 +128,7 @@ pub(in super::super) struct Document<'s> {
     texts: Vec<String>,
     tables: Vec<Table>,
     entries: Vec<Entry>,
-    /// Of each array its part of the elements.
+    /// Each array's part of the elements.
     arrays: Vec<Span>,
     elements: Vec<Node>,
     lists: Vec<Vec<Node>>,
@@ -196,7 +196,7 @@ impl<'s> Document<'s> {
         &mut self.lists[list as usize]
     }
 
-    /// Where the text of something at `span` is kept.
+    /// Keeps the text of something at `span`.
     pub(super) fn add_text(&mut self, span: Span, text: Cow<'s, str>) -> Text {
         let written = self.source.get(span.range()).unwrap_or_default();
         if text == written {
@@ -272,7 +272,7 @@ impl<'s> Document<'s> {
         self.find_entry(table, name).map(|entry| self.entries[entry as usize].node)
     }
 
-    /// Gives a key of a table another value; adds it where there is none.
+    /// Replaces the value of a key in a table; adds the key if it does not exist.
     pub(super) fn put(&mut self, table: TableId, name: Name<'s>, node: Node) {
         let Some(found) = self.find_entry(table, &name.text) else {
             return self.add_entry(table, name, node);
@@ -282,7 +282,7 @@ impl<'s> Document<'s> {
         (entry.key, entry.text, entry.node) = (name.span, text, node);
     }
 
-    /// The only value below a table, and the dotted key that leads to it; none where there are several, or headers.
+    /// The only value below a table, and the dotted key that leads to it. `None` if there are several, or headers.
     pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, Node)> {
         let mut keys = Vec::new();
         let mut table = Some(table);
@@ -310,7 +310,7 @@ impl<'s> Document<'s> {
         if let Kind::String(text) = node.kind { Some(self.text(node.span, text)) } else { None }
     }
 
-    /// The elements of an array or a list; none where it is something else.
+    /// The elements of an array or a list; empty for other values.
     pub(super) fn elements_of(&self, kind: Kind) -> Vec<Node> {
         let value = Value { document: self, node: Node { span: Span::default(), kind } };
         value.array().map_or_else(Vec::new, |elements| elements.nodes.to_vec())
@@ -371,14 +371,14 @@ pub(in super::super) struct Value<'d> {
     node: Node,
 }
 
-/// What a value is.
+/// A value.
 #[derive(Clone, Copy, Debug)]
 pub(in super::super) enum Item<'d> {
     /// Decoded.
     String(&'d str),
     /// Digits with a sign, without underscores and prefix.
     Integer { digits: &'d str, radix: u32 },
-    /// As `f64::from_str` reads it.
+    /// Text that `f64::from_str` reads.
     Float(&'d str),
     /// `true` or `false`.
     Boolean(bool),
@@ -401,7 +401,7 @@ impl<'d> Value<'d> {
         if let Item::Array(array) = self.item() { Some(array) } else { None }
     }
 
-    /// What it is.
+    /// The value.
     pub(in super::super) fn item(&self) -> Item<'d> {
         let (document, span) = (self.document, self.node.span);
         match self.node.kind {
@@ -430,7 +430,7 @@ pub(in super::super) struct Elements<'d> {
 }
 
 impl<'d> Elements<'d> {
-    /// How many there are.
+    /// Number of entries.
     pub(in super::super) fn len(&self) -> usize {
         self.nodes.len()
     }

@@ -15,15 +15,15 @@ use crate::math::color::srgb8_to_linear;
 pub(super) const PARTS: usize = 16;
 /// Inks that are looked at for a recipe: those nearest to the colour.
 const NEAREST: usize = 32;
-/// So many recipes are kept.
+/// Most recipes that are kept.
 const MOST_RECIPES: usize = 1 << 16;
 
-/// What is mixed from.
+/// An ink: a colour or a pattern to mix from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ink {
     linear: Vec3,
     lab: Vec3,
-    /// How far it is from being one colour, as a squared distance.
+    /// Its distance from a single colour, squared.
     texture: f32,
 }
 
@@ -34,7 +34,7 @@ impl Ink {
         Self { linear, lab: oklab(linear), texture: 0.0 }
     }
 
-    /// So much of one in another, in a fine pattern.
+    /// A share of one ink in another, in a fine pattern.
     pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
         /// A pattern within a cell is seen less than one of cells.
         const FINENESS: f32 = 0.25;
@@ -50,7 +50,7 @@ impl Ink {
 #[derive(Debug, Default)]
 pub(super) struct Mixer {
     inks: Vec<Ink>,
-    /// What distance between inks weighs beside the distance of their mean.
+    /// Weight of the distance between inks, beside the distance of their mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }

@@ -3,10 +3,10 @@
 use super::mix::{Ink, Mixer};
 use super::pattern::threshold;
 
-/// How much calm counts among colours that were chosen for the picture.
+/// Weight of calm among colours that were chosen for the picture.
 const CALM: f32 = 1.0;
 
-/// What a picture is mixed from.
+/// The inks that a picture is mixed from.
 #[derive(Debug)]
 pub(in crate::tui) struct Mixture(Mixer);
 

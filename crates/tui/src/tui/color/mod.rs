@@ -1,4 +1,4 @@
-//! How many colours the terminal has, and how others are shown by them.
+//! Colours of the terminal, and how they show other colours.
 
 mod mix;
 mod mixture;
@@ -18,7 +18,7 @@ pub(super) use self::shades::Shades;
 use crate::choice;
 
 choice! {
-    /// Which colours are used.
+    /// Choice of colours.
     pub enum ColorChoice {
         /// What the terminal can show.
         Auto = "auto",
@@ -33,7 +33,7 @@ choice! {
     }
 }
 
-/// What the terminal gets.
+/// Colours that the terminal gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorDepth {
     /// 24 bits.

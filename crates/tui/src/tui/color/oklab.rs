@@ -26,7 +26,7 @@ pub(in crate::tui) fn oklab(linear: Vec3) -> Vec3 {
     product(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
 }
 
-/// How Oklab changes with linear light around a colour. In the dark it changes without bounds, and less is assumed.
+/// Derivative of Oklab by linear light, around a colour. In the dark the derivative has no bound, and a smaller one is assumed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slope(Vec3);
 

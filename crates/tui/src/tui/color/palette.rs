@@ -10,7 +10,7 @@ pub(in crate::tui) const FIRST_FIXED: u8 = 16;
 /// First grey.
 pub(in crate::tui) const FIRST_GREY: u8 = 232;
 
-/// What the 16 colours of a terminal look like, in sRGB.
+/// The 16 colours of a terminal, in sRGB.
 pub(in crate::tui) type Ansi = [[u8; 3]; 16];
 
 /// The 16 colours as xterm draws them by default; people change them.
@@ -53,12 +53,12 @@ const VGA: Ansi = [
     [255, 255, 255],
 ];
 
-/// The 16 colours of a terminal that has not said what they are.
+/// The likely 16 colours of a terminal that has not reported its own.
 pub(in crate::tui) fn ansi(term: &str) -> &'static Ansi {
     if term.starts_with("linux") { &VGA } else { &XTERM }
 }
 
-/// What a colour of the palette looks like; none of the first 16, which are the user's.
+/// sRGB values of a palette colour. `None` for the first 16, which are the user's.
 pub(in crate::tui) fn fixed(index: u8) -> Option<[u8; 3]> {
     match index {
         0..FIRST_FIXED => None,
@@ -70,7 +70,7 @@ pub(in crate::tui) fn fixed(index: u8) -> Option<[u8; 3]> {
     }
 }
 
-/// What a colour looks like in xterm as it comes; none: the terminal's own.
+/// sRGB values of a colour in xterm by default. `None` for the terminal's own colour.
 pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
     let ansi = match color {
         Color::Reset => return None,

@@ -11,7 +11,7 @@ use crate::math::color::srgb8_to_linear;
 use crate::tui::mosaic::{Fitted, Tile};
 use ratatui::style::Color;
 
-/// How much calm counts in the palette of 256, whose colours are near to each other, and in that of 16.
+/// Weight of calm in the palette of 256, whose colours are near to each other, and in that of 16.
 const CALM_256: f32 = 3.0;
 const CALM_16: f32 = 3.0;
 /// The same where the two colours of a cell are halves, which show the edges of things.
@@ -36,12 +36,12 @@ struct Pair {
     colors: [usize; 2],
 }
 
-/// How colours are shown on a terminal.
+/// Colours as a terminal shows them.
 #[derive(Debug)]
 pub(in crate::tui) struct Shades {
     depth: ColorDepth,
     plain: RefCell<Mixer>,
-    /// Of 16 colours: of cells of two of them.
+    /// Mixer of cells of two colours, for terminals of 16.
     mixed: RefCell<Mixer>,
     pairs: Vec<Pair>,
 }

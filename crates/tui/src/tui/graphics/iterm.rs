@@ -3,7 +3,7 @@
 use ratatui::layout::Rect;
 
 use super::base64::encoded;
-use super::png;
+use super::png::png;
 use crate::film::Picture;
 
 /// The command that shows a picture at the cursor over these cells.

@@ -3,7 +3,7 @@
 use ratatui::layout::Rect;
 
 use super::base64::encoded;
-use super::png;
+use super::png::png;
 use crate::film::Picture;
 
 /// The two images that take turns. Numbers that others are not likely to use.

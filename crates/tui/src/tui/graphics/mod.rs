@@ -7,6 +7,7 @@ mod base64;
 mod iterm;
 mod kitty;
 mod palette;
+mod png;
 mod seen;
 mod sixel;
 
@@ -21,7 +22,7 @@ use crate::film::Picture;
 pub(super) use self::kitty::delete_all;
 pub use self::seen::PixelScreen;
 
-/// How a terminal takes pixels.
+/// Protocols for pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Protocol {
     /// kitty's: kitty, Ghostty, Konsole, WezTerm.
@@ -51,7 +52,7 @@ impl PartialEq for Placement {
 const PIXEL_BYTES: f64 = 2.0;
 /// The largest picture. What passes through tmux must stay below a megabyte.
 const MOST_BYTES: f64 = 600_000.0;
-/// How long a picture that others follow may be on its way, and one that stays.
+/// Longest time on the way, of a picture that others follow and of one that stays.
 const MOVING_SECONDS: f64 = 0.4;
 const STILL_SECONDS: f64 = 1.5;
 
@@ -62,15 +63,15 @@ pub(super) struct Images {
     /// Inside tmux, which passes on what is wrapped.
     is_wrapped: bool,
     wanted: Option<Placement>,
-    /// What is on the screen once the pieces are.
+    /// The picture on the screen once all pieces have arrived.
     shown: Option<Placement>,
     is_still: bool,
     /// Whether what is shown was made coarser than the picture, to be shorter.
     is_coarse: bool,
     pieces: VecDeque<Vec<u8>>,
-    /// Of kitty's images, the one that is shown: they take turns, so that one goes when the next is there.
+    /// Whether kitty's second image is shown: the two take turns, so that one goes when the next is there.
     turn: bool,
-    /// What the last sixels were shown in.
+    /// Palette of the last sixels.
     palette: Option<Palette>,
 }
 
@@ -119,8 +120,8 @@ impl Images {
             && (self.wanted.is_none() || (self.shown == self.wanted && !(self.is_coarse && self.is_still)))
     }
 
-    /// Bytes to be sent next, at most so many unless a piece is longer; none: all that is wanted has been sent. `rate`: bytes that
-    /// the line takes in a second, where it is known.
+    /// Next bytes to send: at most `most`, unless a piece is longer. `None` if everything has been sent. `rate`: bytes per second
+    /// of the line, if known.
     pub(super) fn slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
             self.encode(rate);
@@ -143,7 +144,7 @@ impl Images {
             Protocol::Sixel => wanted.picture.clone(),
             Protocol::Kitty | Protocol::Iterm => {
                 let (width, height) = (side(wanted.picture.width), side(wanted.picture.height));
-                Arc::new(super::view::preview::resized(&wanted.picture, width, height))
+                Arc::new(super::rescale::resized(&wanted.picture, width, height))
             }
         };
         self.is_coarse = scale < 1.0 && !self.is_still;
@@ -192,22 +193,6 @@ fn wrapped(body: &[u8]) -> Vec<u8> {
         bytes.push(byte);
     }
     bytes.extend_from_slice(b"\x1b\\");
-    bytes
-}
-
-/// The picture as PNG, quickly; empty where that is not possible.
-fn png(picture: &Picture) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, picture.width, picture.height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
-    let outcome = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(picture.pixels.as_flattened()).and_then(|()| writer.finish())
-    });
-    if outcome.is_err() {
-        bytes.clear();
-    }
     bytes
 }
 

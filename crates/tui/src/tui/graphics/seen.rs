@@ -39,7 +39,7 @@ impl PixelScreen {
         self.shown.as_ref()
     }
 
-    /// How many pictures were shown so far.
+    /// Number of pictures shown so far.
     pub fn count(&self) -> usize {
         self.count
     }

@@ -4,7 +4,7 @@ use ratatui::layout::Rect;
 
 use super::palette::Palette;
 use crate::film::Picture;
-use crate::tui::view::preview::resized;
+use crate::tui::rescale::resized;
 
 /// The register of the first colour: those below are the terminal's own.
 const FIRST: u8 = 16;
@@ -54,7 +54,7 @@ pub(super) fn encode(
 /// Six rows: for each colour its sixels.
 struct Band {
     width: usize,
-    /// Of all registers, one after the other.
+    /// Sixels of all registers, one register after the other.
     sixels: Vec<u8>,
     is_used: [bool; REGISTERS],
 }

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use crossterm::event::KeyCode;
 
-use super::Input;
 use super::keys::Meaning;
 use super::paste::Paste;
+use super::sent::Input;
 use crate::tui::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
@@ -20,9 +20,9 @@ const SEQUENCE: Duration = Duration::from_secs(1);
 /// A sequence ends within this time and length, whatever comes: alt and `]` begin one that no key ends.
 const LONGEST: Duration = Duration::from_secs(2);
 const MOST_BYTES: usize = 4096;
-/// So long after the key was taken for pressed, `[` can still show that it was the beginning of a sequence.
+/// Time after an escape key within which `[` can still show that a sequence began.
 const REGRET: Duration = Duration::from_secs(2);
-/// How long such a `[` waits for the next byte, and how many bytes are kept in doubt.
+/// Time that such a `[` waits for the next byte; and most bytes kept in doubt.
 const DOUBT: Duration = Duration::from_millis(300);
 const LONGEST_ANSWER: usize = 32;
 
@@ -38,7 +38,7 @@ pub(super) struct Decoder {
     escaped: Option<Instant>,
 }
 
-/// What began and has not ended.
+/// A sequence that has begun and not ended.
 #[derive(Debug, Default)]
 enum Held {
     #[default]
@@ -56,7 +56,7 @@ enum Held {
 }
 
 impl Decoder {
-    /// What these bytes say, together with those before.
+    /// Decodes these bytes, together with those before.
     pub(super) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<Input> {
         // An escape character and a doubt are not over: what had to follow them is here, if late. Nor is a paste: its text
         // may have waited for a busy reader, which is no silence.
@@ -82,7 +82,7 @@ impl Decoder {
         }
     }
 
-    /// What silence says.
+    /// Decodes silence.
     pub(super) fn expire(&mut self, now: Instant) -> Vec<Input> {
         self.expire_into_found(now);
         std::mem::take(&mut self.meaning.found)

@@ -4,13 +4,14 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
 
 use super::reports::{self, Report};
-use super::{Answer, Input};
+use super::sent::Input;
 use crate::tui::event::{KeyPress, Mouse, MouseKind};
+use crate::tui::known::Answer;
 
-/// What the parser calls back; it holds the meaning of what was read last.
+/// The parser's callbacks; holds the meaning of what was read last.
 #[derive(Debug, Default)]
 pub(super) struct Meaning {
-    /// What came out, in order.
+    /// Decoded input, in order.
     pub found: Vec<Input>,
     /// Whether a sequence has ended, known or not.
     pub has_ended: bool,
@@ -20,7 +21,7 @@ pub(super) struct Meaning {
     report: Report,
 }
 
-/// What the next character is.
+/// Kind of the next character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Next {
     #[default]
@@ -34,7 +35,7 @@ enum Next {
 }
 
 impl Meaning {
-    /// What began does not go on.
+    /// Drops the sequence that has begun.
     pub(super) fn forget(&mut self) {
         self.next = Next::Character;
         self.is_paste = false;

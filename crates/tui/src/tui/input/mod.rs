@@ -1,4 +1,4 @@
-//! What comes from the terminal: keys, pasted text, and the terminal's answers.
+//! Input from the terminal: keys, pasted text, and the terminal's answers.
 //!
 //! One thread polls the terminal and reads whatever is there, so that nothing waits for the next byte. [`Decoder`]
 //! turns bytes into [`Input`], and is the one place that knows how keys are encoded.
@@ -7,6 +7,7 @@ mod decoder;
 mod keys;
 mod paste;
 mod reports;
+mod sent;
 
 use std::io;
 use std::os::fd::AsFd;
@@ -19,50 +20,8 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use self::decoder::Decoder;
-use super::event::{Event, KeyPress, Mouse, Source};
-use super::known::Blocks;
-
-/// One thing that the terminal sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Input {
-    Key(KeyPress),
-    Mouse(Mouse),
-    /// Text was pasted; what it was is not kept.
-    Paste,
-    Answer(Answer),
-}
-
-/// What a terminal says when it is asked, or of its own accord.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Answer {
-    /// To a status report (DSR 5): all that was sent before has been processed.
-    Ready,
-    /// To a question for the primary device attributes (DA1).
-    Attributes,
-    /// Whether mode 2026 is known, by which large changes appear at once.
-    Synchronized { is_known: bool },
-    /// Its name (XTVERSION), as far as it says which blocks it draws.
-    Blocks(Blocks),
-    /// It has 24 bits of colour (XTGETTCAP).
-    TrueColor,
-    /// Its background, in sRGB (OSC 11).
-    Background([u8; 3]),
-    /// One of its palette, in sRGB (OSC 4).
-    Ink { index: u8, rgb: [u8; 3] },
-    /// Any other report: the cursor's position, modes, colours, names, focus.
-    Other,
-}
-
-impl From<Input> for Event {
-    fn from(input: Input) -> Self {
-        match input {
-            Input::Key(key) => Self::Key(key),
-            Input::Mouse(mouse) => Self::Mouse(mouse),
-            Input::Paste => Self::Paste,
-            Input::Answer(answer) => Self::Answer(answer),
-        }
-    }
-}
+pub(super) use self::sent::Input;
+use super::event::{Event, Source};
 
 /// Reads standard input, on a thread of its own, until it ends: then [`Source::Keys`] is lost.
 ///
@@ -102,7 +61,7 @@ fn was_held() -> bool {
     was_held
 }
 
-/// What the next bytes mean, or that there are none for as long as the decoder waits; none: the terminal is gone.
+/// Input of the next bytes; empty if there are none while the decoder waits. `None` if the terminal is gone.
 fn next(decoder: &mut Decoder) -> Option<Vec<Input>> {
     let mut bytes = [0; 4096];
     let waited = wait(decoder.deadline());

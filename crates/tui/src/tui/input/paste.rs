@@ -1,10 +1,9 @@
 //! Bracketed paste: text between two marks, which is skipped.
 //!
-//! Where the closing mark never comes (the line broke, a program in between swallowed it), the keyboard must not be
-//! held for ever: the paste is over after a second without text, and once it has taken ten seconds or 1 MiB, after a fifth
-//! of a second. It is never over while text comes: the rest of it would be keys. Control sequences are no text: the
-//! terminal's answers come all the time while a picture is drawn. What comes later counts as keys again, a late closing
-//! mark as nothing.
+//! If the closing mark never comes (the line broke, a program in between swallowed it), the keyboard must not be held for ever.
+//! The paste is over after a second without text; once it has taken ten seconds or 1 MiB, after a fifth of a second. It is never
+//! over while text comes: the rest would count as keys. Control sequences do not count as text: the terminal's answers come all
+//! the time while a picture is drawn. Bytes that come later count as keys again, and a late closing mark does nothing.
 
 use std::time::{Duration, Instant};
 
@@ -21,12 +20,12 @@ pub(super) struct Paste {
     begin: Instant,
     last: Instant,
     bytes: usize,
-    /// How much of the closing mark has been seen.
+    /// Bytes of the closing mark that have been seen.
     matched: usize,
     sequence: Sequence,
 }
 
-/// How far a control sequence has come.
+/// State of a control sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sequence {
     /// There is none.
@@ -38,7 +37,7 @@ enum Sequence {
 }
 
 impl Sequence {
-    /// After one more byte; none: the byte is text.
+    /// State after one more byte. `None` if the byte is text.
     fn after(self, byte: u8) -> Option<Self> {
         match (self, byte) {
             (Self::Outside | Self::Escape | Self::Parameters, 0x1b) => Some(Self::Escape),

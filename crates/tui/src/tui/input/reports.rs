@@ -1,6 +1,6 @@
-//! What a terminal reports in strings: its name, its colours, what it can do.
+//! Reports of a terminal in strings: its name, its colours, its abilities.
 
-use super::Answer;
+use crate::tui::known::Answer;
 use crate::tui::known::Blocks;
 
 /// A report in a control string (DCS) as it comes.

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::tui::event::{Mouse, MouseKind};
-use crate::tui::input::Answer;
+use crate::tui::known::Answer;
 use crate::tui::known::Blocks;
 
 /// A decoder and its clock.

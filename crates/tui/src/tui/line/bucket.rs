@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 /// Below a line of 1 Mbit/s, 125 kB a second, so that its queue drains.
 pub(super) const RATE: f64 = 100_000.0;
-/// What may be sent at once: 100 ms of that line.
+/// Most tokens: 100 ms of that line.
 const FULL: f64 = 12_000.0;
 
 /// The bytes that may be sent.
@@ -19,7 +19,7 @@ impl Bucket {
         Self { tokens: FULL, at: now }
     }
 
-    /// How many there are now.
+    /// Current number of tokens.
     pub(super) fn tokens(&self, now: Instant) -> usize {
         self.level(now).max(0.0) as usize
     }

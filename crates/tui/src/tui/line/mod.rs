@@ -1,10 +1,9 @@
 //! Flow control: how much may be sent to the terminal now.
 //!
-//! Between glimt and the eye lie buffers that would hold seconds of old pictures. So the terminal is asked after every
-//! slice whether it has come so far (a status report), and only so much is on its way as the line carries in its round
-//! trip and [`QUEUE`] more, [`MOST`] at most: what is sent next, the answer to a key, waits no longer than that. The
-//! window follows the round trips as in TCP Vegas (Brakmo and Peterson, 1995): the least one is the line's own, what is
-//! above it is queue.
+//! Between glimt and the eye lie buffers that would hold seconds of old pictures. So glimt asks the terminal after every slice
+//! whether it has come so far (a status report). Only as much is on its way as the line carries in its round trip and [`QUEUE`]
+//! more, at most [`MOST`]: the next bytes, the answer to a key, wait no longer than that. The window follows the round trips as
+//! in TCP Vegas (Brakmo and Peterson, 1995): the least round trip is the line's own, and the rest is queue.
 //!
 //! A terminal that answers nothing within [`PATIENCE`] is paced by time, and so is one inside a multiplexer, which
 //! answers itself and says nothing of the line behind it.
@@ -26,9 +25,9 @@ const MOST: usize = 23_800;
 /// The window at the beginning, and the least one.
 const START: f64 = 8_000.0;
 const LEAST: f64 = 1_500.0;
-/// How long what is sent may wait in the line's queue.
+/// Longest time in the line's queue.
 const QUEUE: Duration = Duration::from_millis(60);
-/// How long a terminal has to give its first answer.
+/// Time for a terminal's first answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// After this silence, or after so many round trips, answers are taken for lost.
 const SILENCE: Duration = Duration::from_secs(1);
@@ -42,7 +41,7 @@ const AGE: Duration = Duration::from_secs(15);
 const SLICE: usize = 8_000;
 const LEAST_SLICE: usize = 400;
 
-/// What the terminal can be asked.
+/// Questions that a terminal answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     /// Primary device attributes: the last of the first questions. What has not answered before it never will.
@@ -83,7 +82,8 @@ pub(super) struct Line {
     /// When the window last shrank: slices from before say nothing new.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
-    /// Of the last slices, small ones too: else one that was slow for a moment would get no more that could tell otherwise.
+    /// Round trips of the last slices, small ones too: otherwise a line that was slow for a moment would get no more slices that
+    /// could show it to be quick again.
     recent: VecDeque<Duration>,
     /// When an answer last came, or one began to be owed.
     heard: Instant,
@@ -110,7 +110,7 @@ impl Line {
         }
     }
 
-    /// Bytes that the next slice may have, its question not counted; 0: not now.
+    /// Bytes that the next slice may have, beside its question; 0 if it has to wait.
     pub(super) fn room(&mut self, now: Instant) -> usize {
         self.lose_patience(now);
         let window = self.window_bytes().saturating_sub(self.in_flight);
@@ -128,7 +128,7 @@ impl Line {
         if room < LEAST_SLICE { 0 } else { room }
     }
 
-    /// What to ask after the next slice.
+    /// The question after the next slice.
     pub(super) fn question(&self) -> Option<Question> {
         (self.pace != Pace::Silent).then_some(Question::Status)
     }
@@ -191,12 +191,12 @@ impl Line {
         !self.flight.is_empty()
     }
 
-    /// How long the terminal takes to answer when nothing is in its way; none: it does not answer.
+    /// Time until the terminal answers when the line is free. `None` if it does not answer.
     pub(super) fn round_trip(&self) -> Option<Duration> {
         self.round_trips.least().filter(|_| self.pace == Pace::Answers)
     }
 
-    /// What the line takes, as far as it shows; none: more than anybody would notice.
+    /// Rate of the line, as far as it shows. `None` if it is faster than anybody would notice.
     pub(super) fn bytes_per_second(&self) -> Option<f64> {
         /// Pictures take no time on such a line.
         const FAST: f64 = 2e6;
@@ -245,7 +245,7 @@ impl Line {
         }
     }
 
-    /// How long answers may be out before they are taken for lost.
+    /// Time after which missing answers count as lost.
     fn silence(&self) -> Duration {
         SILENCE.max(self.round_trips.least().unwrap_or_default() * SILENT_TRIPS)
     }

@@ -9,7 +9,7 @@ use crate::tui::color::oklab;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::tui) struct Fitted {
     pub(in crate::tui) tile: Tile,
-    /// Of the first and of the second part.
+    /// Colours of the first and of the second part.
     pub(in crate::tui) pair: [[u8; 3]; 2],
 }
 

@@ -3,8 +3,7 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Rows of the grid on which the parts of a cell are told apart: as many as halves, thirds and quarters need. It has two
-/// columns.
+/// Rows of the grid of a cell's parts: enough for halves, thirds and quarters. The grid has two columns.
 pub(in crate::tui) const GRID_ROWS: u32 = 12;
 /// Places of the grid.
 pub(in crate::tui) const PLACES: u32 = 2 * GRID_ROWS;
@@ -40,20 +39,21 @@ impl Tile {
         self.symbols
     }
 
-    /// How many places each part has.
+    /// Number of places in each part.
     pub(in crate::tui) fn sizes(self) -> [u32; 2] {
         let first = self.first.count_ones();
         [first, PLACES - first]
     }
 
-    /// How many places are in this part of this tile and in that part of that one.
+    /// Number of places that each part of this tile shares with each part of the other.
     pub(in crate::tui) fn shared(self, other: Self) -> [[u32; 2]; 2] {
         let parts = |tile: Self| [tile.first, ALL & !tile.first];
         parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
     }
 }
 
-/// What a character fills by the foreground: a tile, and whether it is the second part. None: it is no such character.
+/// The tile that a character fills with the foreground, and whether the foreground is its second part. `None` for a character
+/// without blocks.
 pub(in crate::tui) fn of_symbol(symbol: char) -> Option<(Tile, bool)> {
     // All others are letters, digits, signs.
     if symbol < '▀' {
@@ -63,8 +63,8 @@ pub(in crate::tui) fn of_symbol(symbol: char) -> Option<(Tile, bool)> {
     of_mask(*mask)
 }
 
-/// The places of a cell, of 2 columns and 12 rows from the top left one along the rows, that a character fills by the foreground; none: it
-/// is no character of blocks.
+/// The places of a cell that a character fills with the foreground: 2 columns and 12 rows, from the top left one along the rows.
+/// `None` for a character without blocks.
 pub fn filled(symbol: char) -> Option<[bool; 24]> {
     let mask = match symbol {
         ' ' => 0,
@@ -74,7 +74,7 @@ pub fn filled(symbol: char) -> Option<[bool; 24]> {
     Some(std::array::from_fn(|place| mask >> place & 1 == 1))
 }
 
-/// The tile that has these places in its first part, or, where they leave out the top left corner, in its second.
+/// The tile with these places in its first part, or in its second if they leave out the top left corner.
 fn of_mask(mask: u32) -> Option<(Tile, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
@@ -129,7 +129,7 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
 /// Every other place.
 const CHECKS: u32 = 0x99_99_99;
 
-/// By the places that they fill, of a grid of two columns and two rows, lowest bit first (Unicode, "Block Elements").
+/// Characters by the places that they fill, in a grid of two columns and two rows, lowest bit first (Unicode, "Block Elements").
 const QUADRANTS: [char; 16] =
     [' ', '▘', '▝', '▀', '▖', '▌', '▞', '▛', '▗', '▚', '▐', '▜', '▄', '▙', '▟', '█'];
 /// The first sextant (Unicode 13, "Symbols for Legacy Computing"). They follow each other by the places that they fill, but for
@@ -165,12 +165,12 @@ fn widened(mask: u32, from: u32, to: u32) -> u32 {
         .fold(0, |all, place| all | 1 << place)
 }
 
-/// The quadrants that these octants fill, where they are whole.
+/// The quadrants that these octants fill, if they fill whole ones.
 fn quadrants(mask: u32) -> Option<u32> {
     (0..16).find(|quadrants| spread(*quadrants, 2) == spread(mask, 4))
 }
 
-/// How finely a cell is divided.
+/// Grids that a cell is divided into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::tui) enum Grid {
     Halves,

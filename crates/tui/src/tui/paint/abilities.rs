@@ -1,4 +1,4 @@
-//! What is known of a terminal by its name.
+//! Abilities of a terminal, by its name.
 
 /// Whether the terminal knows REP (ECMA-48 8.3.103: the character before so many times more), by the names that it
 /// leaves in the environment. Many call themselves `xterm-256color`, and not all of those do.

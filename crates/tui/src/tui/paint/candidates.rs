@@ -1,8 +1,8 @@
 //! Colours that are worth being set at a cell.
 
+use super::cost_model::CostModel;
 use super::look::Mosaic;
 use super::shade::{Shade, digits};
-use super::taste::Taste;
 use crate::tui::color::nearest_256;
 
 /// The most of them for one half, and for both together.
@@ -23,17 +23,17 @@ pub(super) struct Candidates {
 }
 
 /// For the first of these cells. Each candidate serves as many of the cells after it as it can.
-pub(super) fn candidates(cells: &[Option<Mosaic>], taste: Taste) -> Candidates {
+pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> Candidates {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
     Candidates {
-        first: shades(&column(0), taste),
-        second: shades(&column(1), taste),
-        both: shades(&both, taste),
+        first: shades(&column(0), model),
+        second: shades(&column(1), model),
+        both: shades(&both, model),
     }
 }
 
-fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), taste: Taste) -> Vec<Shade> {
+fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), model: CostModel) -> Vec<Shade> {
     let mut shades = Vec::with_capacity(MOST);
     let Some(first) = wanted.clone().next() else { return shades };
     let mut add = |shade| {
@@ -45,7 +45,7 @@ fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), taste: Taste) -> Vec<S
         add(first);
         return shades;
     };
-    for span in taste.spans {
+    for span in model.spans {
         let box_ = common(wanted.clone(), *span);
         add(Shade::Rgb(box_.shortest()));
         let index = nearest_256(box_.mean());
@@ -116,20 +116,20 @@ mod tests {
     #[test]
     fn a_colour_serves_as_many_neighbours_as_it_can() {
         // 20 to 22 have 21 in common; 24 does not.
-        let found = candidates(&row(&[20, 21, 22, 24]), Taste::EXACT);
+        let found = candidates(&row(&[20, 21, 22, 24]), CostModel::EXACT);
         assert_eq!(found.first, [Shade::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [Shade::Rgb([0, 0, 0])], "16 may be another colour");
         assert_eq!(found.both.len(), 1, "the halves have nothing in common");
         let greys = [Some(Mosaic::plain(Shade::Rgb([8, 8, 8])))];
-        assert_eq!(candidates(&greys, Taste::EXACT).first, [Shade::Rgb([8, 8, 8]), Shade::Palette(232)]);
+        assert_eq!(candidates(&greys, CostModel::EXACT).first, [Shade::Rgb([8, 8, 8]), Shade::Palette(232)]);
     }
 
     #[test]
     fn what_is_no_colour_of_three_numbers_is_taken_as_it_is() {
         let cells = [Some(Mosaic::halves([Shade::Ground, Shade::Palette(3)])), None];
-        let found = candidates(&cells, Taste::MOVING);
+        let found = candidates(&cells, CostModel::MOVING);
         assert_eq!((found.first, found.second), (vec![Shade::Ground], vec![Shade::Palette(3)]));
-        let found = candidates(&[None], Taste::MOVING);
+        let found = candidates(&[None], CostModel::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! What a cell looks like, however it was drawn.
+//! The look of a cell, however it was drawn.
 
 use ratatui::buffer::Cell;
 use ratatui::style::Modifier;
@@ -26,7 +26,7 @@ pub(super) enum Look {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mosaic {
     pub(super) tile: Tile,
-    /// Of the first and of the second part.
+    /// Shades of the first and of the second part.
     pub(super) pair: [Shade; 2],
 }
 
@@ -45,7 +45,7 @@ impl Mosaic {
         Self::halves([shade; 2])
     }
 
-    /// What a character shows; none: it is no such character.
+    /// The mosaic of a character. `None` for a character without blocks.
     fn of(symbol: &str, fg: Shade, bg: Shade) -> Option<Self> {
         match symbol {
             " " => return Some(Self::plain(bg)),
@@ -56,7 +56,7 @@ impl Mosaic {
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
-    /// The pairs of colours that lie on each other in this cell and in that one, with the part of the cell, of 2, where they do.
+    /// Pairs of shades that meet in this cell and in the other, with the share of the cell, of 2, where they do.
     pub(super) fn against(self, other: Self) -> impl Iterator<Item = (Shade, Shade, f32)> {
         let shared = self.tile.shared(other.tile);
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
@@ -112,7 +112,7 @@ impl Glyph {
         }
     }
 
-    /// Which layer fills the first and the second part.
+    /// Layers that fill the first and the second part.
     pub(super) fn layers(self) -> [Layer; 2] {
         match self {
             Self::Blank => [Layer::Background; 2],
@@ -122,7 +122,7 @@ impl Glyph {
         }
     }
 
-    /// What it asks of the pen; nothing of a colour that it does not show.
+    /// The wish to the pen; it leaves out colours that the mosaic does not show.
     pub(super) fn wish(self, pair: [Shade; 2]) -> Wish {
         let color =
             |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
@@ -146,7 +146,7 @@ impl Look {
     /// A blank of the terminal's own background.
     pub(super) const BLANK: Self = Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [Shade::Ground; 2] });
 
-    /// What a cell is to look like on a terminal of this depth.
+    /// The look of a cell on a terminal of this depth.
     pub(super) fn of(cell: &Cell, depth: ColorDepth) -> Self {
         let shade = |color, layer| {
             let color = if depth == ColorDepth::None { ratatui::style::Color::Reset } else { color };

@@ -1,12 +1,12 @@
-//! What an edit did not change.
+//! Memory of the cells that an edit did not change.
 //!
-//! The first pictures of two requests have the same random numbers, so that they differ only where the scene does. A
-//! cell that is alike in both keeps what is on the screen, which has converged, through all the noise that
-//! comes until the new picture has converged too.
+//! The first pictures of two requests have the same random numbers, so that they differ only where the scene does. A cell that is
+//! alike in both keeps its look on the screen, which has converged, through all the noise until the new picture has converged
+//! too.
 
 use ratatui::layout::Rect;
 
-use super::Fidelity;
+use super::fidelity::Fidelity;
 use super::look::{Look, Mosaic};
 use super::moves::Place;
 use super::screen::Screen;
@@ -18,7 +18,7 @@ const ALIKE: u8 = 2;
 /// Noise that a cell is left in spite of is no larger than this.
 const MOST_NOISE: u8 = 12;
 
-/// Of each cell of the screen, the first picture of the request that it shows.
+/// The first picture of the request that the screen shows, cell by cell.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     columns: usize,
@@ -29,7 +29,7 @@ pub(super) struct Memory {
     newest: Vec<Option<Mosaic>>,
     /// Whether the cell is alike in the first pictures of the request under way and of the one that it shows.
     steady: Vec<bool>,
-    /// How far what is wanted may be off what is shown where it is steady.
+    /// Greatest difference between the requested and the shown cell that counts as noise, in steady parts.
     noise: u8,
 }
 
@@ -95,7 +95,7 @@ impl Memory {
         median.count()
     }
 
-    /// What a cell is to show: what it shows already where nothing but noise speaks against it.
+    /// The mosaic for a cell: the one already shown, if only noise separates it from the requested one.
     pub(super) fn mosaic(&self, at: Place, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
         shown
             .filter(|shown| {
@@ -142,12 +142,12 @@ impl Memory {
     }
 }
 
-/// The noise that is not worth being drawn where it is usually off by this much.
+/// The noise not worth drawing, if the median difference is this.
 fn noise(median: usize) -> u8 {
     u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MOST_NOISE)
 }
 
-/// The largest difference of a channel; 255 where there is no telling.
+/// The largest difference of a channel; 255 if the mosaics cannot be compared.
 fn apart(a: Mosaic, b: Mosaic) -> u8 {
     let one = |a: Shade, b: Shade| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,

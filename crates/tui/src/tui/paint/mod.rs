@@ -11,20 +11,21 @@
 //! [`advise`] tells which pictures are worth being aimed at on a line of some speed.
 
 mod abilities;
-mod advice;
 mod candidates;
+mod cost_model;
+mod fidelity;
+mod frame_pacing;
 mod lines;
 mod look;
 mod memory;
 mod moves;
 mod pen;
 mod picture;
+mod row_optimizer;
 mod screen;
 mod shade;
-mod taste;
 #[cfg(test)]
 mod tests;
-mod trellis;
 mod wanted;
 mod words;
 
@@ -34,26 +35,14 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 pub use self::abilities::can_repeat;
-pub use self::advice::{Advice, Moment, advise};
+pub use self::fidelity::Fidelity;
+pub use self::frame_pacing::{Advice, Moment, advise};
 pub use self::lines::in_lines;
 use self::memory::Memory;
 use self::picture::Budget;
 use self::screen::{Screen, Slice, Stroke};
 use self::wanted::Wanted;
 use super::color::ColorDepth;
-
-/// How near to the picture the cells have to come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fidelity {
-    /// The first picture of a request, to be refined soon: at most 12 bytes a cell.
-    First,
-    /// A picture of the same request that better ones will follow.
-    Moving,
-    /// The same on a terminal that can follow the render: every colour.
-    Following,
-    /// A picture that stays: every colour to 1/255.
-    Still,
-}
 
 /// Leads the screen to what is wanted.
 #[derive(Debug)]
@@ -66,12 +55,12 @@ pub struct Painter {
     memory: Memory,
     wanted: Wanted,
     budget: Budget,
-    /// What is still to be looked at, in order.
+    /// Parts still to be looked at, in order.
     parts: vec::IntoIter<Part>,
-    /// What is being drawn.
+    /// The part that is being drawn.
     part: Option<Part>,
     strokes: vec::IntoIter<Stroke>,
-    /// How far the picture is in each row.
+    /// Progress of the picture in each row.
     rows: Vec<Progress>,
     aim: u64,
 }
@@ -85,7 +74,7 @@ enum Part {
     Picture(u16),
 }
 
-/// How far the picture is in a row.
+/// Progress of the picture in a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct Progress {
     /// The number of the last aim that it was drawn for.
@@ -161,8 +150,8 @@ impl Painter {
         self.slice_until(most_bytes, || false)
     }
 
-    /// The same, and what there is once `is_late` says so, which is asked before each row: a picture takes longer to
-    /// be planned than a key may wait.
+    /// The next slice; if `is_late` says so, only the bytes so far. It is asked before each row: to plan a picture takes longer
+    /// than a key may wait.
     pub fn slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = Slice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {

@@ -69,7 +69,7 @@ fn with_return(down: &[u8], column: u16) -> Vec<u8> {
     bytes
 }
 
-/// CSI with a count, which is left out where it is 1.
+/// CSI with a count, which is left out if it is 1.
 pub(super) fn control(count: u16, end: u8) -> Vec<u8> {
     let mut bytes = b"\x1b[".to_vec();
     if count != 1 {

@@ -4,7 +4,7 @@ use ratatui::style::Modifier;
 
 use super::shade::{Layer, Shade, push_number};
 
-/// What the next character is drawn with.
+/// Colours and modifiers of the next character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pen {
     pub(super) fg: Shade,
@@ -12,14 +12,14 @@ pub(super) struct Pen {
     pub(super) modifier: Modifier,
 }
 
-/// What a pen has to be like.
+/// Requirements on a pen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wish {
     /// None: any.
     pub(super) fg: Option<Shade>,
     /// None: any.
     pub(super) bg: Option<Shade>,
-    /// Of those that matter.
+    /// Modifiers, of those that matter.
     pub(super) modifier: Modifier,
     /// The others may be on or off.
     pub(super) matters: Modifier,
@@ -47,7 +47,7 @@ impl Pen {
         Wish { fg: Some(self.fg), bg: Some(self.bg), modifier: self.modifier, matters: Modifier::all() }
     }
 
-    /// Appends the shortest SGR after which the pen is as wished, and becomes that pen. Nothing where it is already.
+    /// Appends the shortest SGR that turns the pen into one that fulfils the wish; appends nothing if the pen does already.
     pub(super) fn turn(&mut self, wish: &Wish, out: &mut Vec<u8>) {
         let mut list = Vec::new();
         let changed = self.changed(wish, &mut list);

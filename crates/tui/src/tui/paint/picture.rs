@@ -1,33 +1,33 @@
 //! The picture: as near to what is wanted as the bytes allow.
 
-use super::Fidelity;
+use super::cost_model::CostModel;
+use super::fidelity::Fidelity;
 use super::look::Look;
 use super::memory::Memory;
 use super::moves::Place;
+use super::row_optimizer::{Dab, Row, Start, Target, row};
 use super::screen::{Screen, Stroke};
-use super::taste::Taste;
-use super::trellis::{Dab, Row, Start, Target, row};
 use super::wanted::Wanted;
 
 /// Bytes that a cell of a first picture may take, in the mean over the rows so far.
 const FIRST_BYTES: u32 = 12;
 /// Bytes at the begin of a row that the search does not count: modifiers of words that are turned off.
 const ROW_BYTES: u32 = 4;
-/// How much dearer bytes become from one try to the next.
+/// Ratio of the price of a byte from one try to the next.
 const STEP: f32 = 1.6;
 /// A byte dearer than this buys nothing.
 const DEAREST: f32 = 4000.0;
 
-/// What is left for the rows of a first picture.
+/// Bytes left for the rows of a first picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Budget {
     bytes: u32,
-    taste: Taste,
+    model: CostModel,
 }
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { bytes: 0, taste: Taste::MOVING }
+        Self { bytes: 0, model: CostModel::MOVING }
     }
 }
 
@@ -37,21 +37,21 @@ impl Budget {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
         if self.bytes > 2 * share {
-            self.taste = self.taste.at(self.taste.byte / STEP);
+            self.model = self.model.at(self.model.byte / STEP);
         }
         loop {
-            let found = row(targets, start, self.taste);
+            let found = row(targets, start, self.model);
             let bytes = found.bytes + ROW_BYTES;
-            if bytes <= self.bytes || self.taste.byte > DEAREST {
+            if bytes <= self.bytes || self.model.byte > DEAREST {
                 self.bytes = self.bytes.saturating_sub(bytes);
                 return found;
             }
-            self.taste = self.taste.at(self.taste.byte * STEP);
+            self.model = self.model.at(self.model.byte * STEP);
         }
     }
 }
 
-/// What is to be drawn of the picture in a row.
+/// Plans the strokes of the picture in a row.
 pub(super) fn plan(
     screen: &Screen,
     wanted: &Wanted,
@@ -69,9 +69,9 @@ pub(super) fn plan(
         is_there: screen.cursor == Some(Place { x: columns.start, y }),
     };
     let row = match wanted.fidelity {
-        Fidelity::Still => row(&targets, start, Taste::EXACT),
-        Fidelity::Following => row(&targets, start, Taste::ALL),
-        Fidelity::Moving => row(&targets, start, Taste::MOVING),
+        Fidelity::Still => row(&targets, start, CostModel::EXACT),
+        Fidelity::Following => row(&targets, start, CostModel::ALL),
+        Fidelity::Moving => row(&targets, start, CostModel::MOVING),
         Fidelity::First => budget.spend(&targets, start),
     };
     let stroke = |dab: Dab| Stroke::Mosaic {

@@ -1,4 +1,4 @@
-//! What is on the terminal's screen, as far as it follows from the bytes that were sent.
+//! The terminal's screen, as far as it follows from the bytes that were sent.
 
 use ratatui::layout::Rect;
 
@@ -15,7 +15,7 @@ pub(super) struct Slice {
     pub(super) most: usize,
 }
 
-/// What is drawn in one go.
+/// A stroke: cells drawn in one go.
 #[derive(Clone, Debug)]
 pub(super) enum Stroke {
     /// A character.
@@ -27,15 +27,14 @@ pub(super) enum Stroke {
 }
 
 impl Stroke {
-    /// Where it begins.
+    /// Its first place.
     pub(super) fn at(&self) -> Place {
         match self {
             Self::Text { at, .. } | Self::Mosaic { at, .. } | Self::Erase { at, .. } => *at,
         }
     }
 
-    /// The same with REP in place of blanks that are alike, where that is shorter. Some terminals repeat no other
-    /// characters than those of ASCII.
+    /// The same strokes with REP in place of equal blanks, if that is shorter. Some terminals repeat ASCII characters only.
     pub(super) fn repeated(strokes: &[Self]) -> Vec<Self> {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::goes_on) {
@@ -77,7 +76,7 @@ pub(super) struct Screen {
 }
 
 impl Screen {
-    /// As it is after [`Screen::clear`].
+    /// The screen after [`Screen::clear`].
     pub(super) fn cleared(columns: u16, rows: u16) -> Self {
         Self {
             columns,
@@ -153,7 +152,7 @@ impl Screen {
         }
     }
 
-    /// What is on the screen, and where the cursor is, after a stroke.
+    /// Notes the cells and the cursor after a stroke.
     fn keep(&mut self, stroke: &Stroke) {
         match stroke {
             Stroke::Text { at, text } => {

@@ -17,7 +17,7 @@ pub(super) enum Shade {
     Rgb([u8; 3]),
 }
 
-/// Which of the two colours of a cell.
+/// The two colours of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Layer {
     Foreground,
@@ -25,7 +25,7 @@ pub(super) enum Layer {
 }
 
 impl Shade {
-    /// What a cell's colour is in this layer.
+    /// The shade of a cell's colour in this layer.
     pub(super) fn of(color: Color, layer: Layer) -> Self {
         match color {
             Color::Reset => match layer {
@@ -72,7 +72,7 @@ impl Shade {
         }
     }
 
-    /// What it looks like, where that is known.
+    /// sRGB values, if they are known.
     pub(super) fn rgb(self) -> Option<[u8; 3]> {
         match self {
             Self::Rgb(rgb) => Some(rgb),

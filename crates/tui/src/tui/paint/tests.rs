@@ -1,4 +1,4 @@
-//! A terminal that is fed with the slices shows what was aimed at.
+//! Tests: a terminal that is fed with the slices shows the picture that the painter was aimed at.
 
 use proptest::prelude::*;
 use ratatui::buffer::Buffer;
@@ -78,7 +78,7 @@ fn distance(a: Shade, b: Shade) -> Option<u32> {
     a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b))).max()
 }
 
-/// What a terminal's cell looks like. Its parser knows fewer modifiers.
+/// Look of a terminal's cell. Its parser knows fewer modifiers.
 fn shown(cell: &vt100::Cell) -> Look {
     if cell.is_wide_continuation() {
         return Look::Covered;
@@ -186,7 +186,7 @@ enum Step {
     Aim(Buffer, Fidelity),
     Slice(usize),
     Forget,
-    /// Somebody else writes on the screen; the painter is told.
+    /// Another program writes on the screen, and the painter hears of it.
     Litter,
 }
 

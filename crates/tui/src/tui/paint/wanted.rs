@@ -1,9 +1,9 @@
-//! What was aimed at.
+//! The cells that the painter is aimed at.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::Fidelity;
+use super::fidelity::Fidelity;
 use super::look::{Look, Mosaic};
 use crate::tui::color::ColorDepth;
 
@@ -86,7 +86,7 @@ impl Wanted {
     }
 }
 
-/// What the cells of a buffer look like.
+/// Looks of a buffer's cells.
 pub(super) fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<Look> {
     let columns = usize::from(buffer.area.width.max(1));
     let mut looks: Vec<Look> = buffer.content.iter().map(|cell| Look::of(cell, depth)).collect();

@@ -10,7 +10,7 @@ const ERASED: usize = 9;
 /// The same up to the end of a row.
 const ERASED_TO_END: usize = 4;
 
-/// What is to be drawn in a row of the words, or of a picture that is made of characters.
+/// Plans the strokes of the words in a row, or of a picture made of characters.
 pub(super) fn plan(screen: &Screen, wanted: &Wanted, y: u16, of_picture: bool) -> Vec<Stroke> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
@@ -38,7 +38,7 @@ fn stroke(at: Place, look: &Look) -> Option<Stroke> {
     }
 }
 
-/// Writes the cells between the last stroke and a place again where that is shorter than to jump over them.
+/// Writes the cells between the last stroke and a place again, if that is shorter than a jump over them.
 fn bridge(screen: &Screen, strokes: &mut Vec<Stroke>, to: Place) {
     let Some(Stroke::Text { at, text }) = strokes.last() else { return };
     let first = at.x + text.columns;

@@ -1,4 +1,4 @@
-//! Keys on the camera: what is asked for, how often, and what is said.
+//! Tests of keys on the camera: which pictures they request, how often, and the messages.
 
 use super::{BLUE, RED};
 use crate::pipeline::protocol::{self, Writing};
@@ -11,7 +11,7 @@ use crate::tui::{Changed, ColorDepth};
 use crossterm::event::KeyCode;
 
 fn show(desk: &mut Desk) -> Vec<crate::tui::event::Effect> {
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     desk.event(Event::Picture {
         generation,
         picture: plain_picture(50, 38, BLUE),
@@ -71,14 +71,14 @@ fn a_step_that_can_have_no_picture_holds_nothing_up() {
     desk.finish(RED);
     desk.press('l');
     desk.press('l');
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
     let effects = desk.worker(protocol::Event::Failed { generation, failure });
     assert!(request(&effects).is_none(), "the scene broke meanwhile: the last good one is rendered");
     assert!(request(&show(&mut desk)).is_some(), "which is seen");
     desk.press('l');
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
     let effects = desk.worker(protocol::Event::Failed { generation, failure });
     assert!(request(&effects).is_some(), "the work failed: the step that waited goes");
@@ -96,7 +96,7 @@ fn the_arrows_scroll_the_errors_while_they_are_open() {
     desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     let down = KeyPress::special(KeyCode::Down);
     assert!(desk.key(down).is_empty());
-    assert!(desk.state.pane.scroll > 0);
+    assert!(desk.state.overlays.diagnostics.scroll > 0);
     desk.key(KeyPress::special(KeyCode::Esc));
     assert!(request(&desk.key(down)).is_some(), "closed, they move the camera");
 }
@@ -112,7 +112,7 @@ fn before_a_scene_is_read_there_is_no_camera_to_move() {
 fn exposure_starts_from_the_scene_s_own() {
     let mut desk = Desk::new();
     desk.finish(RED);
-    desk.state.exposure = Some(1.0);
+    desk.state.request.exposure = Some(1.0);
     desk.press(']');
     show(&mut desk);
     let effects = desk.press(']');
@@ -137,12 +137,12 @@ fn keys_that_are_held_come_to_an_end_and_say_so() {
             show(&mut desk);
         }
         assert!(desk.text().contains(words), "{key}: {}", desk.text());
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         assert!(
-            desk.press(key).is_empty() && desk.state.generation == generation,
+            desk.press(key).is_empty() && desk.state.request.generation == generation,
             "{key}: nothing is rendered"
         );
-        let view = desk.state.viewpoint().expect("a camera");
+        let view = desk.state.request.viewpoint().expect("a camera");
         assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
     }
 }
@@ -176,5 +176,8 @@ fn the_call_s_own_exposure_is_no_change_either() {
     desk.press('[');
     show(&mut desk);
     desk.press(']');
-    assert_eq!((desk.state.toggles.exposure, desk.state.overrides().exposure), (None, Some(1.0)));
+    assert_eq!(
+        (desk.state.request.toggles.exposure, desk.state.request.overrides().exposure),
+        (None, Some(1.0))
+    );
 }

@@ -23,7 +23,7 @@ fn the_first_request_has_room_for_the_preview() {
 fn pictures_of_older_generations_are_dropped() {
     let mut desk = Desk::new();
     desk.finish(RED);
-    let old = desk.state.generation;
+    let old = desk.state.request.generation;
     desk.press('r');
     desk.screen();
     desk.event(Event::Picture {
@@ -36,7 +36,7 @@ fn pictures_of_older_generations_are_dropped() {
     desk.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
     desk.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
     assert!(!desk.state.dirty, "nothing is drawn for them");
-    assert!(desk.state.progress.is_none() && desk.state.problems.is_none());
+    assert!(desk.state.work.progress.is_none() && desk.state.overlays.problems.is_none());
     assert_eq!(cells_of(&mut desk, BLUE), 0);
     assert!(cells_of(&mut desk, RED) > 0, "the last picture stands until there is a newer one");
 }
@@ -50,7 +50,7 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
     let effects = desk.event(Event::Changed(Changed { noticed }));
     assert_eq!(request(&effects).map(|it| it.generation), Some(2));
     desk.event(Event::Shown { generation: 1 });
-    assert_eq!(desk.state.first_change, None, "the old picture does not count");
+    assert_eq!(desk.state.saving.first_change, None, "the old picture does not count");
     desk.event(Event::Picture {
         generation: 2,
         picture: plain_picture(50, 38, BLUE),
@@ -153,7 +153,7 @@ fn a_render_goes_on_in_another_window_held_or_not() {
         desk.event(Event::Resize(window(120, 40)));
         let effects = desk.wait(200);
         assert!(matches!(effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
-        assert_eq!((desk.state.generation, desk.state.paused), (1, is_held));
+        assert_eq!((desk.state.request.generation, desk.state.work.paused), (1, is_held));
         assert!(desk.worker(done(1, Vec::new(), false)).is_empty());
     }
 }
@@ -195,7 +195,7 @@ fn a_source_that_ends_is_dealt_with() {
 fn a_cancelled_render_says_that_it_stopped() {
     let mut desk = Desk::new();
     desk.worker(protocol::Event::Cancelled { generation: 1 });
-    assert_eq!(desk.state.activity, Activity::Cancelled);
+    assert_eq!(desk.state.work.activity, Activity::Cancelled);
     assert!(desk.text().contains("stopped"));
 }
 
@@ -209,20 +209,20 @@ fn whether_the_person_knows_what_came_of_a_write_is_known_at_the_end() {
     let ends = [written(generation), failed, refused].map(|event| (Some(event), false));
     for (outcome, is_open) in [(None, true), (Some(postponed), true)].into_iter().chain(ends) {
         let mut desk = Desk::new();
-        assert!(!desk.state.asked_to_write);
+        assert!(!desk.state.saving.is_write_requested);
         desk.press('w');
         if let Some(event) = outcome {
             desk.worker(event);
         }
         assert!(matches!(desk.press('q')[..], [Effect::Quit(ExitStatus::QUIT)]));
-        assert_eq!(desk.state.asked_to_write, is_open);
+        assert_eq!(desk.state.saving.is_write_requested, is_open);
     }
     let mut desk = Desk::new();
     desk.press('w');
     desk.press('r');
-    assert!(desk.state.asked_to_write, "the order goes over to the next request");
-    desk.worker(written(desk.state.generation));
-    assert!(!desk.state.asked_to_write);
+    assert!(desk.state.saving.is_write_requested, "the order goes over to the next request");
+    desk.worker(written(desk.state.request.generation));
+    assert!(!desk.state.saving.is_write_requested);
 }
 
 fn wrong(message: &str) -> Vec<Diagnostic> {
@@ -293,7 +293,7 @@ fn a_failure_of_the_work_does_not_wait_for_the_file() {
     let mut desk = Desk::new();
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     let failure = Failure::Work("no memory".to_owned());
-    desk.worker(protocol::Event::Failed { generation: desk.state.generation, failure });
+    desk.worker(protocol::Event::Failed { generation: desk.state.request.generation, failure });
     assert!(desk.text().contains("no memory"), "{}", desk.text());
 }
 
@@ -308,10 +308,10 @@ fn time_in_the_editor_is_not_from_the_save_to_the_screen() {
     desk.event(Event::Changed(Changed { noticed }));
     desk.now += Duration::from_millis(20);
     desk.event(Event::Shown { generation: 2 });
-    assert_eq!(desk.state.first_change, Some(Duration::from_millis(22)));
+    assert_eq!(desk.state.saving.first_change, Some(Duration::from_millis(22)));
     let noticed = desk.now;
     desk.event(Event::Changed(Changed { noticed }));
     desk.now += Duration::from_millis(30);
     desk.event(Event::Shown { generation: 3 });
-    assert_eq!(desk.state.first_change, Some(Duration::from_millis(30)));
+    assert_eq!(desk.state.saving.first_change, Some(Duration::from_millis(30)));
 }

@@ -1,4 +1,4 @@
-//! What a person sees while a picture is rendered, on a quick terminal and at the end of a thin line, in told time.
+//! Tests of the screen during a render, on a quick terminal and on a slow line, with simulated time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::super::display::{Display, Way};
 use super::super::graphics::{Images, PixelScreen, Protocol};
-use super::super::input::Answer;
+use super::super::known::Answer;
 use super::super::presenter::Presenter;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, LatestPreview, PreviewSlot};
@@ -21,7 +21,7 @@ use crate::tui::preview_kind::PreviewKind;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
-/// Of the render, and of pixels in the end.
+/// Seconds of the render.
 const SECONDS: f64 = 10.0;
 const SAMPLES: f64 = 256.0;
 /// Between two pictures of the worker, and between two of its words.
@@ -48,7 +48,7 @@ struct Terminal {
     answers: VecDeque<(Instant, Answer)>,
     cells: vt100::Parser,
     pixels: PixelScreen,
-    /// What came, and how many bytes were sent.
+    /// Bytes that came, and their number.
     bytes: Vec<u8>,
     sent: usize,
     /// Bytes in the line or unanswered, and the most of them.
@@ -152,11 +152,11 @@ impl Watch {
     fn new(line: Line, preview: PreviewKind, depth: ColorDepth) -> Self {
         let mut desk = Desk::with(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
         let begin = desk.now;
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         desk.worker(protocol::Event::Started { generation });
         let settings = Box::new(settings());
         desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0 });
-        let size = desk.state.requested.expect("previews are asked for");
+        let size = desk.state.request.preview_size.expect("previews are asked for");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {
             PreviewKind::Pixels(protocol) => Some(Images::new(protocol, false)),
@@ -185,12 +185,12 @@ impl Watch {
         self.go_on(end, true);
     }
 
-    /// A key on the camera is held for so long: the worker has a first picture of each step soon after it was asked for.
+    /// Holds a key on the camera for so long: the worker has a first picture of each step soon after its request.
     fn orbit(&mut self, time: Duration) {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
         let end = self.desk.now + time;
-        let (mut key, mut last) = (self.desk.now, self.desk.state.generation);
+        let (mut key, mut last) = (self.desk.now, self.desk.state.request.generation);
         // The last step of a key that was held before may have no picture yet.
         let mut asked = Some(self.desk.now);
         while self.desk.now < end {
@@ -205,16 +205,16 @@ impl Watch {
                 key += REPEAT;
                 self.desk.press('l');
             }
-            // A step that waited is asked for when the one before has its picture.
-            if self.desk.state.generation > last {
-                (asked, last) = (Some(self.desk.now), self.desk.state.generation);
+            // A step that waited is requested when the step before has its picture.
+            if self.desk.state.request.generation > last {
+                (asked, last) = (Some(self.desk.now), self.desk.state.request.generation);
             }
         }
     }
 
     /// The last picture, until all of it has arrived.
     fn finish(&mut self) {
-        let generation = self.desk.state.generation;
+        let generation = self.desk.state.request.generation;
         self.put_picture(SAMPLES);
         self.desk.worker(done(generation, Vec::new(), false));
         self.go_on(self.desk.now + Duration::from_secs(5), false);
@@ -244,7 +244,7 @@ impl Watch {
         }
     }
 
-    /// What has happened by now.
+    /// Events by now.
     fn events(&mut self, is_at_work: bool) {
         let now = self.desk.now;
         self.terminal.pass(now);
@@ -252,7 +252,7 @@ impl Watch {
             self.presenter.display.answered(answer, now);
         }
         let done = (now - self.begin).as_secs_f64() / SECONDS;
-        let generation = self.desk.state.generation;
+        let generation = self.desk.state.request.generation;
         if is_at_work && now >= self.next[0] {
             self.next[0] = now + PROGRESS;
             let progress = progress(done, Some((1.0 - done) * SECONDS));
@@ -271,7 +271,7 @@ impl Watch {
     }
 
     fn put_picture(&mut self, samples: f64) {
-        let generation = self.desk.state.generation;
+        let generation = self.desk.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
         *self.slot.lock().expect("whole") =
             Some(LatestPreview { generation, picture, range: None, section: None, lacks_photons: false });

@@ -1,4 +1,4 @@
-//! What each key does, and that the help says so.
+//! Tests of the effect of each key, and that the help tells it.
 
 use super::{BLUE, RED, cells_of};
 use crate::choice::Choice;
@@ -27,7 +27,7 @@ fn every_key_has_its_effect() {
     }
 }
 
-/// Where a key puts the camera.
+/// The pose that a key gives to the camera.
 fn moved(effects: &[Effect]) -> Pose {
     request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
@@ -105,7 +105,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
         Action::KeepCamera => {
             assert!(desk.key(key).is_empty(), "it has not moved");
             desk.press('l');
-            let wanted = desk.state.viewpoint().expect("a camera");
+            let wanted = desk.state.request.viewpoint().expect("a camera");
             assert!(
                 matches!(desk.key(key)[..], [Effect::Send(Command::KeepCamera(camera))] if camera == wanted)
             );
@@ -250,7 +250,7 @@ fn what_is_of_use_now_stands_beside_the_toggles() {
         let hint = format!("{} {}", binding.label, binding.hint);
         assert!(bottom(&mut desk).contains(&hint), "{hint:?} is not in {}", bottom(&mut desk));
     }
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     desk.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false));
     assert!(bottom(&mut desk).contains("e 1 warning"));
     desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
@@ -274,7 +274,7 @@ fn a_message_stands_under_the_picture_until_the_next_key_and_the_keys_stay() {
     desk.press('?');
     desk.press('?');
     assert!(!desk.text().contains("the keys have changed nothing"));
-    // Where there is no line for it, it takes the place of the keys, and of the name where there are none either.
+    // Without a line of its own it takes the place of the keys, and without those the place of the name.
     for rows in [12, 5] {
         desk.event(Event::Resize(window(60, rows)));
         desk.press('0');
@@ -336,7 +336,7 @@ fn a_new_request_lets_a_paused_worker_go_on() {
     desk.press(' ');
     let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
-    assert!(!desk.state.paused);
+    assert!(!desk.state.work.paused);
     assert!(desk.text().contains("no longer paused"), "{}", desk.text());
 }
 
@@ -346,7 +346,7 @@ fn a_key_that_ends_a_pause_says_so_beside_what_it_says_itself() {
         let mut desk = Desk::new();
         desk.press(' ');
         let effects = desk.press(key);
-        assert!(request(&effects).is_some() && !desk.state.paused);
+        assert!(request(&effects).is_some() && !desk.state.work.paused);
         let text = desk.text();
         assert!(text.contains("no longer paused") && text.contains(words), "{key}: {text}");
         desk.press(key);
@@ -395,5 +395,5 @@ fn a_render_that_is_stopped_is_no_longer_held() {
     let mut desk = Desk::new();
     desk.press(' ');
     desk.worker(protocol::Event::Cancelled { generation: 1 });
-    assert!(!desk.state.paused && !desk.text().contains("paused"), "{}", desk.text());
+    assert!(!desk.state.work.paused && !desk.text().contains("paused"), "{}", desk.text());
 }

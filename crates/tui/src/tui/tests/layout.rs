@@ -1,4 +1,4 @@
-//! What of the screen is the picture, and that nothing jumps.
+//! Tests of the layout: the picture's part of the screen, and that nothing jumps.
 
 use super::{RED, cells_of};
 use crate::pipeline::protocol::{self, Command, PreviewSize, Stage, Status};
@@ -22,9 +22,9 @@ fn previewed(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
     (side(size.0, most.width), side(size.1, most.height))
 }
 
-/// The settings of a scene of this size, and its picture as it was asked for.
+/// The settings of a scene of this size, and its picture at the requested size.
 fn rendered(desk: &mut Desk, (width, height): (u32, u32)) {
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
     let settings = Box::new(Effective { width, height, ..settings() });
     desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0 });
@@ -32,8 +32,8 @@ fn rendered(desk: &mut Desk, (width, height): (u32, u32)) {
 }
 
 fn show(desk: &mut Desk, size: (u32, u32)) {
-    let generation = desk.state.generation;
-    let (width, height) = previewed(size, desk.state.requested.expect("a preview"));
+    let generation = desk.state.request.generation;
+    let (width, height) = previewed(size, desk.state.request.preview_size.expect("a preview"));
     let picture = plain_picture(width, height, RED);
     desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
 }
@@ -74,7 +74,7 @@ fn nothing_jumps_while_a_render_runs_nor_when_it_is_done() {
             [header, preview, panel, under, keys, pane]
         };
         let before = place(&desk);
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         for step in 0..10 {
             match step {
                 0 => desk.worker(protocol::Event::Stage {
@@ -169,7 +169,7 @@ fn the_line_under_the_picture_tells_how_far_it_is_and_then_what_it_took() {
 fn times_are_told_against_those_of_the_last_render() {
     let mut desk = Desk::new();
     let render = |desk: &mut Desk, seconds| {
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         desk.worker(protocol::Event::Started { generation });
         let report = stage(Stage::Render, Status::Done, seconds, "");
         desk.worker(protocol::Event::Stage { generation, stage: report });
@@ -180,7 +180,7 @@ fn times_are_told_against_those_of_the_last_render() {
     render(&mut desk, 1.12);
     assert!(desk.text().contains("render    1.12 s −.3"), "{}", desk.text());
     desk.press('r');
-    desk.worker(protocol::Event::Started { generation: desk.state.generation });
+    desk.worker(protocol::Event::Started { generation: desk.state.request.generation });
     desk.press('r');
     render(&mut desk, 2.24);
     assert!(
@@ -198,7 +198,7 @@ fn the_screen_tells_whoever_has_not_saved_yet_to_save() {
             rendered(&mut desk, size);
             desk.worker(done(1, Vec::new(), false));
             // All stages alike leave no room for it in the narrow window.
-            desk.state.stages = Default::default();
+            desk.state.work.stages = Default::default();
             assert!(desk.text().contains("save cornell.toml"), "{}", desk.text());
             desk.event(Event::Changed(Changed { noticed: desk.now }));
             desk.worker(done(2, Vec::new(), false));
@@ -211,13 +211,13 @@ fn the_screen_tells_whoever_has_not_saved_yet_to_save() {
 fn the_folded_line_names_no_file_of_another_picture() {
     let mut desk = Desk::new();
     let finish = |desk: &mut Desk| {
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         rendered(desk, (320, 200));
         desk.worker(done(generation, Vec::new(), false));
-        let settings = desk.state.effective.as_mut().expect("settings");
+        let settings = desk.state.request.effective.as_mut().expect("settings");
         (settings.width, settings.height) = (320, 200);
         // All stages alike leave no room for a file.
-        desk.state.stages = Default::default();
+        desk.state.work.stages = Default::default();
     };
     finish(&mut desk);
     desk.worker(protocol::Event::Written { generation: 1, path: "dof.png".into(), bytes: 63_000 });
@@ -228,7 +228,7 @@ fn the_folded_line_names_no_file_of_another_picture() {
     );
     desk.press('l');
     finish(&mut desk);
-    // A key that does nothing more takes away what was said of the move.
+    // A key without another effect clears the message about the move.
     desk.press('?');
     desk.press('?');
     let text = desk.text();
@@ -249,7 +249,7 @@ fn hints_wrap_at_the_width_of_the_panel() {
         let settings = Box::new(Effective { width, height: 480, ..settings() });
         desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
         let panel = Layout::of(&desk.state).panel;
-        let hint = "save cornell.toml and it is rendered again";
+        let hint = "save cornell.toml to render again";
         assert_eq!(
             desk.text().contains(hint),
             usize::from(panel.width) >= hint.len(),
@@ -264,8 +264,8 @@ fn a_picture_in_pixels_takes_no_more_memory_in_a_huge_terminal() {
     let by = |protocol, columns, rows, cell_pixels| {
         let kind = PreviewKind::Pixels(protocol);
         let mut state = state_with(columns, rows, kind, ColorDepth::TrueColor, Overrides::default());
-        state.window.cell_pixels = cell_pixels;
-        state.pixels_across()
+        state.display.window.cell_pixels = cell_pixels;
+        state.display.pixels_across()
     };
     for (protocol, fine, most) in [(Protocol::Kitty, 10, 2_400_000), (Protocol::Sixel, 8, 1_600_000)] {
         assert_eq!(by(protocol, 80, 24, (8, 16)), 8, "pixel for pixel");

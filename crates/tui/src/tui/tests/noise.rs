@@ -1,4 +1,4 @@
-//! What is said of the noise.
+//! Tests of the words about noise.
 
 use super::RED;
 use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
@@ -29,8 +29,8 @@ fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
     desk.finish(RED);
     assert!(desk.text().contains("0.81 % in all") && !desk.text().contains("a tile"), "{}", desk.text());
     for (samples, words) in [(64, "0.5 % a tile "), (256, "0.5 % a tile ✓")] {
-        desk.state.effective.as_mut().expect("settings").error = 0.005;
-        desk.state.effective.as_mut().expect("settings").samples = samples;
+        desk.state.request.effective.as_mut().expect("settings").error = 0.005;
+        desk.state.request.effective.as_mut().expect("settings").samples = samples;
         assert!(desk.text().contains(words), "{words}: {}", desk.text());
     }
 }
@@ -39,6 +39,6 @@ fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
 fn noise_has_two_digits() {
     let mut desk = Desk::new();
     desk.finish(RED);
-    desk.state.report.as_mut().expect("a report").image.error = Some(0.4312);
+    desk.state.work.report.as_mut().expect("a report").image.error = Some(0.4312);
     assert!(desk.text().contains("43 % in all"), "{}", desk.text());
 }

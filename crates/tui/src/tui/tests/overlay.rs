@@ -1,4 +1,4 @@
-//! What lies over the picture: the help, the list of views, the errors.
+//! Tests of overlays: the help, the list of views, the errors.
 
 use crossterm::event::KeyCode;
 
@@ -10,7 +10,7 @@ use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 
-/// How many views there are.
+/// Number of views.
 const VIEWS: u16 = <View as crate::choice::Choice>::ALL.len() as u16;
 
 const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);
@@ -128,7 +128,7 @@ fn views_are_listed_and_chosen_by_digits() {
         let mut desk = Desk::with(state(columns, rows));
         desk.finish(RED);
         desk.press('5');
-        assert_eq!(desk.state.view(), View::Beauty, "no list, no digits");
+        assert_eq!(desk.state.request.view(), View::Beauty, "no list, no digits");
         desk.press('v');
         let text = desk.text();
         assert!(
@@ -145,11 +145,11 @@ fn views_are_listed_and_chosen_by_digits() {
         }
         assert!(desk.text().contains("▸  emission"), "{}", desk.text());
         desk.press('9');
-        assert_eq!(desk.state.view(), View::Specular);
+        assert_eq!(desk.state.request.view(), View::Specular);
         desk.key(ESCAPE);
         assert!(!desk.text().contains("▸"));
         desk.press('1');
-        assert_eq!(desk.state.view(), View::Specular, "the list is closed");
+        assert_eq!(desk.state.request.view(), View::Specular, "the list is closed");
     }
 }
 
@@ -173,12 +173,12 @@ fn keys_walk_the_list_of_views_while_it_is_open_and_the_camera_else() {
         assert_eq!(request(&desk.press('k')).and_then(|it| it.overrides.view), Some(View::Samples));
         for key in [KeyCode::Left, KeyCode::Right, KeyCode::Up] {
             desk.key(KeyPress::special(key));
-            assert!(!desk.state.toggles.camera.is_any(), "{key:?} belongs to the list");
+            assert!(!desk.state.request.toggles.camera.is_any(), "{key:?} belongs to the list");
         }
         desk.key(KeyPress::special(KeyCode::Enter));
         assert!(!desk.text().contains('▸'), "{}", desk.text());
         desk.press('j');
-        assert!(desk.state.toggles.camera.is_any(), "the list is closed");
+        assert!(desk.state.request.toggles.camera.is_any(), "the list is closed");
     }
 }
 
@@ -189,19 +189,19 @@ fn a_view_is_found_by_its_name() {
     desk.press('v');
     assert!(desk.press('/').is_empty());
     desk.press('d');
-    assert_eq!(desk.state.view(), View::Depth, "the first that begins so");
+    assert_eq!(desk.state.request.view(), View::Depth, "the first that begins so");
     desk.press('i');
-    assert_eq!(desk.state.view(), View::Diffuse);
+    assert_eq!(desk.state.request.view(), View::Diffuse);
     assert!(desk.text().contains("/ di"), "{}", desk.text());
     desk.key(KeyPress::special(KeyCode::Backspace));
-    assert_eq!(desk.state.view(), View::Depth);
+    assert_eq!(desk.state.request.view(), View::Depth);
     for letter in "qqq".chars() {
         assert!(desk.press(letter).is_empty(), "it quits nothing");
     }
-    assert_eq!(desk.state.view(), View::Depth, "no name has these letters");
+    assert_eq!(desk.state.request.view(), View::Depth, "no name has these letters");
     desk.key(KeyPress::special(KeyCode::Enter));
-    assert!(desk.state.views.is_none());
-    assert_eq!(desk.state.view(), View::Depth);
+    assert!(desk.state.overlays.views.is_none());
+    assert_eq!(desk.state.request.view(), View::Depth);
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn nothing_of_the_panel_is_cut_off_below_the_list_of_views() {
     let settings = Box::new(Effective { width: 480, height: 480, ..settings() });
     desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
     desk.press('v');
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
     let panel = crate::tui::view::layout::Layout::of(&desk.state).panel;
     assert!(panel.height > VIEWS, "{panel:?}");
@@ -294,9 +294,9 @@ fn keys_do_not_open_errors_again_that_were_closed() {
     desk.key(ESCAPE);
     desk.press('v');
     desk.fail(fault());
-    assert!(!desk.state.pane.open, "{}", desk.text());
+    assert!(!desk.state.overlays.diagnostics.open, "{}", desk.text());
     desk.fail(vec![diagnostic(Severity::Error, "another one")]);
-    assert!(desk.state.pane.open, "what is new is shown");
+    assert!(desk.state.overlays.diagnostics.open, "what is new is shown");
 }
 
 #[test]
@@ -308,7 +308,7 @@ fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
     assert!(request(&first).is_some());
     desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     assert!(request(&desk.press('h')).is_none(), "the first has no picture yet");
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     let picture = plain_picture(50, 38, RED);
     let effects =
         desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });

@@ -1,4 +1,4 @@
-//! The mouse, what it asks for, what is said of the answers; and the editor's places.
+//! Tests of the mouse: its requests, and the words for the answers; and the editor's places.
 
 use crossterm::event::KeyCode;
 
@@ -78,9 +78,9 @@ fn the_wheel_goes_nearer_and_scrolls_the_errors() {
     assert!(request(&effects).expect("a request").overrides.camera.pose.expect("a pose").distance() < 4.0);
     desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     assert!(mouse(&mut desk, MouseKind::WheelDown, 20, 15).is_empty());
-    assert!(desk.state.pane.scroll > 0);
+    assert!(desk.state.overlays.diagnostics.scroll > 0);
     mouse(&mut desk, MouseKind::WheelUp, 20, 15);
-    assert_eq!(desk.state.pane.scroll, 0);
+    assert_eq!(desk.state.overlays.diagnostics.scroll, 0);
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn a_click_after_f_focuses_there() {
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9, "the last click: {spot:?}");
     assert!(answer(&mut desk, None).is_empty());
     assert!(desk.text().contains("nothing to focus on"));
-    desk.state.camera.as_mut().expect("a camera").aperture = 0.0;
+    desk.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
     desk.press('f');
     assert!(answer(&mut desk, Some(thing())).is_empty());
     assert!(desk.text().contains("no `aperture`"));
@@ -199,7 +199,7 @@ fn older_pictures_wait_for_no_newer_one_and_a_render_ends_them() {
     desk.wait(61_000);
     desk.press('n');
     assert!(desk.text().contains("picture 1 of 2, 61 s ago"), "{}", desk.text());
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     desk.event(Event::Picture {
         generation,
         picture: plain_picture(50, 38, [10, 200, 10]),
@@ -210,7 +210,7 @@ fn older_pictures_wait_for_no_newer_one_and_a_render_ends_them() {
     assert!(super::cells_of(&mut desk, RED) > 0, "the older one stays");
     desk.press('N');
     assert!(
-        !desk.state.history.is_open() && desk.text().contains("this is the newest picture"),
+        !desk.state.picture.history.is_open() && desk.text().contains("this is the newest picture"),
         "{}",
         desk.text()
     );
@@ -271,11 +271,11 @@ fn a_close_up_is_drawn_pixel_by_pixel_and_clicks_know_where_they_are() {
     let mut desk = desk();
     let spot = asked(&click(&mut desk, 12, 10));
     desk.press('x');
-    let around = desk.state.requested.expect("a size").around;
+    let around = desk.state.request.preview_size.expect("a size").around;
     assert_eq!(around, Some(spot));
     // 20 × 10 pixels of the picture, fewer than there is room for.
     let section = Some(Section { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     let picture = plain_picture(20, 10, BLUE);
     desk.event(Event::Picture { generation, picture, range: None, section, lacks_photons: false });
     assert_eq!(super::cells_of(&mut desk, BLUE), 20 * 5, "{}", desk.text());
@@ -327,18 +327,22 @@ fn escape_ends_what_waits_what_was_said_and_older_pictures() {
         desk.press(key);
         assert!(desk.text().contains(waits), "{}", desk.text());
         escape(&mut desk);
-        assert!(!desk.state.is_marking && !desk.state.is_focusing);
+        assert!(!desk.state.selection.is_marking && !desk.state.selection.is_focusing);
         assert!(!desk.text().contains(waits), "{}", desk.text());
     }
-    desk.state.inspected = Some(vec!["sphere".to_owned()]);
+    desk.state.selection.facts = Some(vec!["sphere".to_owned()]);
     escape(&mut desk);
-    assert_eq!(desk.state.inspected, None);
+    assert_eq!(desk.state.selection.facts, None);
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     desk.finish(BLUE);
     desk.press('b');
-    assert!(desk.state.history.is_open());
+    assert!(desk.state.picture.history.is_open());
     escape(&mut desk);
-    assert!(!desk.state.history.is_open() && desk.text().contains("the newest picture"), "{}", desk.text());
+    assert!(
+        !desk.state.picture.history.is_open() && desk.text().contains("the newest picture"),
+        "{}",
+        desk.text()
+    );
 }
 
 #[test]
@@ -348,9 +352,9 @@ fn a_drag_of_a_rectangle_that_is_left_is_none() {
         desk.press('z');
         mouse(&mut desk, MouseKind::Press, 12, 10);
         mouse(&mut desk, MouseKind::Drag, 20, 14);
-        assert!(desk.state.first.is_some());
+        assert!(desk.state.request.first_section.is_some());
         desk.key(KeyPress::special(key));
-        assert!(desk.state.first.is_none() && !desk.state.is_marking, "{key:?}");
+        assert!(desk.state.request.first_section.is_none() && !desk.state.selection.is_marking, "{key:?}");
         assert!(mouse(&mut desk, MouseKind::Drag, 30, 16).is_empty(), "{key:?}: it turns nothing");
         assert!(mouse(&mut desk, MouseKind::Release, 30, 16).is_empty(), "{key:?}: it is no click");
     }
@@ -367,10 +371,10 @@ fn a_digit_without_the_list_says_where_the_list_is() {
 #[test]
 fn without_an_aperture_f_refuses_at_once() {
     let mut desk = desk();
-    desk.state.camera.as_mut().expect("a camera").aperture = 0.0;
+    desk.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
     assert!(desk.press('f').is_empty());
     assert!(desk.text().contains("no `aperture`"), "{}", desk.text());
-    assert!(!desk.state.is_focusing, "the next click is no focus");
+    assert!(!desk.state.selection.is_focusing, "the next click is no focus");
 }
 
 #[test]
@@ -382,7 +386,7 @@ fn an_exposure_is_no_picture_of_its_own_in_the_history() {
         desk.press(']');
         desk.finish(color);
     }
-    assert_eq!(desk.state.renders, 2, "nor is it a run");
+    assert_eq!(desk.state.work.renders, 2, "nor is it a run");
     desk.press('n');
     assert!(desk.text().contains("picture 1 of 2"), "{}", desk.text());
     desk.press('N');
@@ -400,7 +404,7 @@ fn an_older_picture_says_what_its_edit_changed() {
     desk.finish(RED);
     for (color, what) in [(BLUE, "line 3: radius 1 → 2"), (RED, "line 7: fov 40 → 30")] {
         desk.event(Event::Changed(Changed { noticed: desk.now }));
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         desk.worker(protocol::Event::Edited { generation, what: what.to_owned() });
         desk.finish(color);
     }

@@ -1,4 +1,4 @@
-//! What is on the screen.
+//! Tests of the screen.
 
 use std::time::Duration;
 
@@ -11,11 +11,11 @@ use crate::pipeline::settings::{Overrides, View};
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
 use crate::tui::color::ColorDepth;
+use crate::tui::event::FrameReport;
 use crate::tui::event::{Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::keymap::KEYMAP;
 use crate::tui::preview_kind::PreviewKind;
-use crate::tui::state::FrameReport;
 
 #[test]
 fn the_picture_is_in_half_blocks_in_the_middle_of_its_area() {
@@ -32,7 +32,7 @@ fn the_picture_is_in_half_blocks_in_the_middle_of_its_area() {
 #[test]
 fn upper_and_lower_pixels_are_foreground_and_background() {
     let mut desk = Desk::new();
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     let mut picture = (*plain_picture(56, 42, RED)).clone();
     for (i, pixel) in picture.pixels.iter_mut().enumerate() {
         if (i / 56) % 2 == 1 {
@@ -74,7 +74,7 @@ fn what_a_picture_is_stretched_to_stands_beside_its_view() {
         (Some([10.04, 1e-5]), "view depth 10 to 1.0e-5 "),
         (None, "view depth  "),
     ] {
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         desk.event(Event::Picture {
             generation,
             picture: plain_picture(51, 40, RED),
@@ -98,7 +98,7 @@ fn a_picture_that_lies_about_its_size_is_not_shown() {
         section: None,
         lacks_photons: false,
     });
-    assert!(desk.state.picture.is_none());
+    assert!(desk.state.picture.shown.is_none());
 }
 
 #[test]
@@ -307,7 +307,7 @@ fn a_conflict_opens_the_pane_once_and_stays_until_it_is_solved() {
         desk.text()
     );
     assert!(desk.text().contains("nothing is written"));
-    assert!(desk.state.is_running(), "the render goes on");
+    assert!(desk.state.work.is_running(), "the render goes on");
     desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(!desk.text().contains("cannot write a.png"));
     desk.worker(refused());
@@ -325,7 +325,7 @@ fn a_conflict_opens_the_pane_once_and_stays_until_it_is_solved() {
 fn names_with_escape_sequences_come_out_harmless() {
     let evil = "a\u{1b}]52;c;eA==\u{7}\u{9b}31m\u{202e}b\rc";
     let mut desk = Desk::new();
-    desk.state.scene = evil.into();
+    desk.state.request.scene = evil.into();
     desk.worker(protocol::Event::Asset { generation: 1, progress: asset(evil, 1, 2) });
     desk.worker(protocol::Event::Stage {
         generation: 1,
@@ -370,10 +370,10 @@ proptest! {
         ][kind];
         let depth = [ColorDepth::TrueColor, ColorDepth::Indexed256, ColorDepth::Ansi16, ColorDepth::None][depth];
         let mut desk = Desk::with(state_with(columns, rows, kind, depth, Overrides::default()));
-        desk.state.window.cell_aspect = aspect;
+        desk.state.display.window.cell_aspect = aspect;
         let mut keys = keys.iter();
         for step in script {
-            let generation = desk.state.generation;
+            let generation = desk.state.request.generation;
             match step {
                 0 => desk.fail(vec![diagnostic(Severity::Error, "a rather long message that has to be wrapped"); 3]),
                 1 => desk.finish(RED),
@@ -400,7 +400,7 @@ proptest! {
 #[test]
 fn a_picture_that_could_not_be_written_is_not_called_done() {
     let mut desk = Desk::new();
-    let generation = desk.state.generation;
+    let generation = desk.state.request.generation;
     desk.worker(protocol::Event::WriteFailed {
         generation,
         message: "cannot write a.png: disk full".to_owned(),
@@ -434,9 +434,10 @@ fn what_the_last_picture_took_is_in_words_where_there_is_room() {
     let mut desk = Desk::with(state(120, 40));
     desk.finish(RED);
     // All stages alike leave no room for it.
-    desk.state.stages = Default::default();
-    desk.state.edits = 1;
-    desk.state.frame = Some(FrameReport { bytes: 30_500, round_trip: Some(Duration::from_millis(150)) });
+    desk.state.work.stages = Default::default();
+    desk.state.saving.edits = 1;
+    desk.state.display.frame =
+        Some(FrameReport { bytes: 30_500, round_trip: Some(Duration::from_millis(150)) });
     assert!(desk.text().contains("31 kB sent, answered in 150 ms"), "{}", desk.text());
     desk.event(Event::Resize(window(30, 20)));
     assert!(desk.text().contains("31 kB 150 ms"), "{}", desk.text());
@@ -455,9 +456,9 @@ fn the_folder_stands_before_the_name() {
 fn a_change_of_time_that_has_no_room_is_left_out() {
     let mut desk = Desk::with(state(100, 24));
     desk.finish(RED);
-    desk.state.before[Stage::Render as usize] = Some(4.0);
+    desk.state.work.last_seconds[Stage::Render as usize] = Some(4.0);
     desk.press('r');
-    desk.state.stages[Stage::Render as usize] = Some(stage(Stage::Render, Status::Done, 0.35, ""));
+    desk.state.work.stages[Stage::Render as usize] = Some(stage(Stage::Render, Status::Done, 0.35, ""));
     assert!(desk.text().contains("render    350 ms −3.65 s"), "{}", desk.text());
     desk.event(Event::Resize(window(80, 24)));
     let text = desk.text();

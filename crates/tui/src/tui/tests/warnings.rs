@@ -1,4 +1,4 @@
-//! What is probably not meant, counted and shown.
+//! Tests of warnings: likely mistakes are counted and shown.
 
 use crate::pipeline::protocol;
 use crate::scene::diagnostic::Severity;

@@ -1,28 +1,28 @@
-//! What the terminal says of itself.
+//! Answers of the terminal about itself.
 
-use super::resized_preview;
+use super::request::resized_preview;
 use crate::tui::color::{ColorDepth, Shades};
 use crate::tui::event::Effect;
-use crate::tui::input::Answer;
+use crate::tui::known::Answer;
 use crate::tui::known::Blocks;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::State;
 use crate::tui::view::ramp;
 
-/// Shows things as the terminal can from now on, where it was asked.
+/// Shows everything as well as the terminal can from now on, if the answer belongs to a question.
 pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
     match answer {
-        Answer::Blocks(blocks) if state.ask.blocks => return draw_in(state, blocks),
-        Answer::TrueColor if state.ask.true_color => show(state, ColorDepth::TrueColor),
-        Answer::Ink { index, rgb } if state.ask.palette => {
-            if let Some(ink) = state.ansi.get_mut(usize::from(index)).filter(|ink| **ink != rgb) {
+        Answer::Blocks(blocks) if state.display.ask.blocks => return draw_in(state, blocks),
+        Answer::TrueColor if state.display.ask.true_color => show(state, ColorDepth::TrueColor),
+        Answer::Ink { index, rgb } if state.display.ask.palette => {
+            if let Some(ink) = state.display.ansi.get_mut(usize::from(index)).filter(|ink| **ink != rgb) {
                 *ink = rgb;
-                show(state, state.depth);
+                show(state, state.display.depth);
             }
         }
-        Answer::Background(rgb) if state.ask.background => {
+        Answer::Background(rgb) if state.display.ask.background => {
             let is_light = ramp::is_light(rgb);
-            state.dirty |= std::mem::replace(&mut state.is_light, is_light) != is_light;
+            state.dirty |= std::mem::replace(&mut state.display.is_light, is_light) != is_light;
         }
         Answer::Blocks(_)
         | Answer::TrueColor
@@ -37,8 +37,8 @@ pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
 }
 
 fn show(state: &mut State, depth: ColorDepth) {
-    state.depth = depth;
-    state.shades = Shades::new(depth, &state.ansi);
+    state.display.depth = depth;
+    state.display.shades = Shades::new(depth, &state.display.ansi);
     state.dirty = true;
 }
 
@@ -48,8 +48,8 @@ fn draw_in(state: &mut State, blocks: Blocks) -> Vec<Effect> {
         Blocks::Sextants => PreviewKind::Sextant,
         Blocks::Octants => PreviewKind::Octant,
     };
-    if state.preview == PreviewKind::HalfBlock {
-        state.preview = kind;
+    if state.display.kind == PreviewKind::HalfBlock {
+        state.display.kind = kind;
         state.dirty = true;
     }
     resized_preview(state)
@@ -68,13 +68,13 @@ mod tests {
     fn a_terminal_that_draws_octants_gets_a_finer_picture() {
         let mut state = state(80, 24);
         start(&mut state);
-        let before = state.requested.expect("a size");
+        let before = state.request.preview_size.expect("a size");
         assert!(learn(&mut state, Answer::Blocks(Blocks::Octants)).is_empty(), "nobody asked");
-        state.ask = Ask { blocks: true, ..Ask::default() };
+        state.display.ask = Ask { blocks: true, ..Ask::default() };
         let effects = learn(&mut state, Answer::Blocks(Blocks::Octants));
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
         assert_eq!((size.width, size.height), (2 * before.width, 2 * before.height));
-        assert_eq!(state.preview, PreviewKind::Octant);
+        assert_eq!(state.display.kind, PreviewKind::Octant);
     }
 
     #[test]
@@ -89,12 +89,15 @@ mod tests {
         for answer in answers {
             learn(&mut state, answer);
         }
-        assert_eq!((state.ansi, state.is_light, state.depth), (XTERM, false, ColorDepth::Ansi16));
-        state.ask = Ask { true_color: true, background: true, palette: true, ..Ask::default() };
+        assert_eq!(
+            (state.display.ansi, state.display.is_light, state.display.depth),
+            (XTERM, false, ColorDepth::Ansi16)
+        );
+        state.display.ask = Ask { true_color: true, background: true, palette: true, ..Ask::default() };
         for answer in answers {
             learn(&mut state, answer);
         }
-        assert_eq!(state.ansi[1], [180, 30, 30]);
-        assert_eq!((state.is_light, state.depth), (true, ColorDepth::TrueColor));
+        assert_eq!(state.display.ansi[1], [180, 30, 30]);
+        assert_eq!((state.display.is_light, state.display.depth), (true, ColorDepth::TrueColor));
     }
 }

@@ -1,8 +1,8 @@
-//! Keys and the mouse on the camera. Steps come faster than pictures: a step waits until the one before has its first picture, and
-//! only the newest of those that wait is rendered.
+//! Keys and the mouse on the camera. Steps come faster than pictures: a step waits until the one before has its first picture,
+//! and glimt renders only the newest step that waits.
 
-use super::keys::told;
-use super::{render, say};
+use super::request::render;
+use super::say::{notify, say};
 use crate::pipeline::protocol::{Command, Kept};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
@@ -13,72 +13,74 @@ use crate::tui::state::State;
 
 /// Degrees of a step around.
 const TURN: f64 = 3.0;
-/// What a step brings the eye nearer by.
+/// Factor of the eye's distance for a step nearer.
 const NEARER: f64 = 0.95;
-/// What a step widens the field of view by.
+/// Factor of the field of view for a step wider.
 const WIDER: f64 = 1.05;
-/// How far from where it began a field of view may be for all that it is back, as each step is rounded; no step is as small.
+/// Greatest difference from the first field of view that counts as none, since each step is rounded; every step is larger.
 const ROUNDING: f64 = 0.015;
 /// Stops of a step of exposure.
 const STOPS: f32 = 0.25;
 /// The most that keys expose, and darken.
 const MOST_STOPS: f32 = 20.0;
 
-/// So many steps to the right and up.
+/// Turns by so many steps to the right and up.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     turn(state, right * TURN, up * TURN)
 }
 
-/// So many degrees to the right and up.
+/// Turns by so many degrees to the right and up.
 pub(super) fn turn(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     moved(state, |pose| orbited(pose, right, up))
 }
 
-/// So many steps nearer.
+/// Moves so many steps nearer.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some((view, own)) = state.viewpoint().zip(state.camera) else { return unknown(state) };
+    let Some((view, own)) = state.request.viewpoint().zip(state.request.camera) else {
+        return unknown(state);
+    };
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
     if pose == view.pose {
         let (end, part) = if steps > 0.0 { ("near", "a thousandth of") } else { ("far", "1000 times") };
-        return told(state, &format!("this is as {end} as keys go: {part} the scene's own distance"));
+        return notify(state, &format!("this is as {end} as keys go: {part} the scene's own distance"));
     }
     moved(state, |_| pose)
 }
 
-/// So many steps wider.
+/// Widens the field of view by so many steps.
 pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some(view) = state.viewpoint() else { return unknown(state) };
+    let Some(view) = state.request.viewpoint() else { return unknown(state) };
     let fov = zoomed(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
-        return told(state, &format!("field of view {fov}°: keys go from 1° to 160°"));
+        return notify(state, &format!("field of view {fov}°: keys go from 1° to 160°"));
     }
-    state.toggles.camera.fov = Some(fov);
+    state.request.toggles.camera.fov = Some(fov);
     step_of_camera(state)
 }
 
-/// So many steps brighter.
+/// Brightens by so many steps.
 pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
-    let Some(scene) = state.exposure else { return unknown(state) };
-    let own = state.base.exposure.unwrap_or(scene);
-    let before = state.toggles.exposure.unwrap_or(own);
+    let Some(scene) = state.request.exposure else { return unknown(state) };
+    let own = state.request.command_line.exposure.unwrap_or(scene);
+    let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
     if stops == before {
-        return told(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
+        return notify(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
     }
-    state.toggles.exposure = (stops != own).then_some(stops);
+    state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = step(state);
     say(state, format!("exposure {stops:+}"));
     effects
 }
 
 fn moved(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
-    let Some(view) = state.viewpoint() else { return unknown(state) };
-    state.toggles.camera.pose = Some(how(&view.pose));
+    let Some(view) = state.request.viewpoint() else { return unknown(state) };
+    state.request.toggles.camera.pose = Some(how(&view.pose));
     step_of_camera(state)
 }
 
 fn unknown(state: &mut State) -> Vec<Effect> {
-    told(state, "the scene has not been read yet")
+    notify(state, "the scene has not been read yet")
 }
 
 pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
@@ -86,7 +88,7 @@ pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
     let effects = step(state);
     say(
         state,
-        if state.toggles.camera.is_any() {
+        if state.request.toggles.camera.is_any() {
             "camera moved: shown, not written; w writes it, c keeps it, 0 goes back"
         } else {
             "the camera is where the scene has it"
@@ -95,10 +97,10 @@ pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
     effects
 }
 
-/// What is as the scene has it is no change.
+/// Drops changes back to the scene's own values.
 fn forget_own(state: &mut State) {
-    let Some(own) = state.camera else { return };
-    let camera = &mut state.toggles.camera;
+    let Some(own) = state.request.camera else { return };
+    let camera = &mut state.request.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
     camera.fov = camera.fov.filter(|fov| (fov - own.fov).abs() > ROUNDING);
     let pose = CameraChange { focus: None, ..*camera };
@@ -107,21 +109,21 @@ fn forget_own(state: &mut State) {
 
 /// The camera as it is now is to be put into the scene file.
 pub(super) fn keep(state: &mut State) -> Vec<Effect> {
-    let Some(view) = state.viewpoint() else { return unknown(state) };
-    let is_set = state.base.sets.iter().any(|set| set.trim_start().starts_with("camera"));
-    if !state.toggles.camera.is_any() && !is_set {
-        return told(state, "the camera is where the scene has it: there is nothing to write");
+    let Some(view) = state.request.viewpoint() else { return unknown(state) };
+    let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
+    if !state.request.toggles.camera.is_any() && !is_set {
+        return notify(state, "the camera is where the scene has it: there is nothing to write");
     }
     vec![Effect::Send(Command::KeepCamera(view))]
 }
 
-/// What came of that. A camera that the file gives now is no longer one of the keys.
+/// Tells the outcome of keeping the camera. A camera that the file has now does not count as moved by keys.
 pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
     let Kept { path, is_new, is_own } = match outcome {
         Ok(kept) => kept,
         Err(why) => {
-            state.not_kept = Some(state.now);
-            return told(state, &format!("error: {}", visible(&why)));
+            state.saving.camera_refused = Some(state.now);
+            return notify(state, &format!("error: {}", visible(&why)));
         }
     };
     let name = visible(&path.to_string_lossy()).into_owned();
@@ -131,14 +133,14 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         (false, _) => format!("{name} has this camera already"),
     };
     let mut effects = Vec::new();
-    if let Some(since) = state.moved_since.filter(|_| is_new) {
-        state.history.kept_camera(since);
+    if let Some(since) = state.request.moved_since.filter(|_| is_new) {
+        state.picture.history.kept_camera(since);
     }
-    if is_own && state.toggles.camera.is_any() {
-        state.toggles.camera = CameraChange::default();
+    if is_own && state.request.toggles.camera.is_any() {
+        state.request.toggles.camera = CameraChange::default();
         effects = render(state, false);
     }
-    state.kept = is_new.then_some(state.now);
+    state.saving.camera_kept = is_new.then_some(state.now);
     say(state, words);
     effects
 }
@@ -147,15 +149,15 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
 fn step(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.awaits_step() {
-        state.nudge.is_waiting = true;
+        state.request.camera_step.is_waiting = true;
         return Vec::new();
     }
     let effects = render(state, false);
-    state.nudge.request = Some(state.generation);
+    state.request.camera_step.generation = Some(state.request.generation);
     effects
 }
 
 /// The step that waits, if its turn has come.
 pub(super) fn keep_up(state: &mut State) -> Vec<Effect> {
-    if state.nudge.is_waiting && !state.awaits_step() { step(state) } else { Vec::new() }
+    if state.request.camera_step.is_waiting && !state.awaits_step() { step(state) } else { Vec::new() }
 }

@@ -1,8 +1,11 @@
-//! What a key does to the state.
+//! Effects of keys on the state.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::{camera, history, overlay, places, pointer, rectangle, render, resized_preview, say};
+use super::request::{render, resized_preview};
+use super::say::{notify, say};
+use super::views::choose_view;
+use super::{camera, history, overlay, places, pointer, rectangle};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
@@ -22,13 +25,13 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
         return if is_digit {
-            told(state, "v lists the views; a digit chooses one of the list")
+            notify(state, "v lists the views; a digit chooses one of the list")
         } else {
             Vec::new()
         };
     };
-    state.dirty |= state.message.take().is_some() | state.inspected.take().is_some();
-    state.is_focusing &= action == Action::Focus;
+    state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
+    state.selection.is_focusing &= action == Action::Focus;
     if action != Action::RectangleFirst {
         rectangle::leave(state);
     }
@@ -68,9 +71,9 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::NewerPicture => history::browse(state, -1),
         Action::SceneSettings => scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
-        Action::ToggleHelp => {
-            change(state, |state| state.help = Pane { open: !state.help.open, ..Pane::default() })
-        }
+        Action::ToggleHelp => change(state, |state| {
+            state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
+        }),
         Action::PictureAlone => picture_alone(state),
         Action::Redraw => vec![Effect::Redraw],
         Action::Suspend => vec![Effect::StopJob],
@@ -85,13 +88,8 @@ fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     Vec::new()
 }
 
-pub(super) fn told(state: &mut State, message: &str) -> Vec<Effect> {
-    say(state, message);
-    Vec::new()
-}
-
 fn cycle_integrator(state: &mut State) -> Vec<Effect> {
-    state.toggles.integrator = Some(match state.integrator() {
+    state.request.toggles.integrator = Some(match state.request.integrator() {
         Integrator::Whitted => Integrator::Path,
         Integrator::Path => Integrator::Whitted,
     });
@@ -99,65 +97,54 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    match state.integrator() {
+    match state.request.integrator() {
         Integrator::Path => {
-            return told(state, "path ignores `shadows`: its light is what it is; i is whitted");
+            return notify(state, "path ignores `shadows`; press i for whitted");
         }
         Integrator::Whitted => {}
     }
-    let next = match state.shadows() {
+    let next = match state.request.shadows() {
         Shadows::Soft => Shadows::Hard,
         Shadows::Hard => Shadows::Off,
         Shadows::Off => Shadows::Soft,
     };
-    state.toggles.shadows = Some(next);
+    state.request.toggles.shadows = Some(next);
     render(state, false)
 }
 
 /// A scene whose depth of field is off although nothing switched it off has a pinhole for a lens.
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
-    let switched_off = state.overrides().dof == Some(false);
-    match &state.effective {
-        None => return told(state, "the scene has not been read yet"),
+    let switched_off = state.request.overrides().dof == Some(false);
+    match &state.request.effective {
+        None => return notify(state, "the scene has not been read yet"),
         Some(effective) if !effective.dof && !switched_off => {
-            return told(state, "no depth of field: the scene's camera has no `aperture`");
+            return notify(state, "no depth of field: the scene's camera has no `aperture`");
         }
         Some(_) => {}
     }
-    state.toggles.dof = Some(switched_off);
+    state.request.toggles.dof = Some(switched_off);
     render(state, false)
 }
 
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
-    match state.integrator() {
+    match state.request.integrator() {
         Integrator::Path => {
-            return told(state, "path gathers no photons; press i for whitted");
+            return notify(state, "path gathers no photons; press i for whitted");
         }
         Integrator::Whitted => {}
     }
-    state.toggles.photons = Some(!state.photons());
+    state.request.toggles.photons = Some(!state.request.photons());
     render(state, false)
 }
 
 fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
-    let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
+    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
     choose_view(state, View::ALL[(current + steps) % View::ALL.len()])
 }
 
-/// This view, in the list of them.
-pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
-    state.list_views();
-    state.toggles.view = (view != state.base_view()).then_some(view);
-    let effects = render(state, false);
-    if state.toggles.view.is_some() {
-        say(state, format!("view {}: shown, not written; w writes it", view.name()));
-    }
-    effects
-}
-
 fn picture_alone(state: &mut State) -> Vec<Effect> {
-    match state.preview {
-        PreviewKind::None => return told(state, "no picture is shown: see --preview"),
+    match state.display.kind {
+        PreviewKind::None => return notify(state, "no picture is shown: see --preview"),
         PreviewKind::HalfBlock
         | PreviewKind::Quadrant
         | PreviewKind::Sextant
@@ -165,61 +152,62 @@ fn picture_alone(state: &mut State) -> Vec<Effect> {
         | PreviewKind::Ascii
         | PreviewKind::Pixels(_) => {}
     }
-    state.is_alone = !state.is_alone;
+    state.picture.is_alone = !state.picture.is_alone;
     state.dirty = true;
     resized_preview(state)
 }
 
 /// The picture's own pixels around the crosshair, or all of it again.
 fn close_up(state: &mut State) -> Vec<Effect> {
-    if state.requested.is_none() {
-        return told(state, "no picture is shown: see --preview");
+    if state.request.preview_size.is_none() {
+        return notify(state, "no picture is shown: see --preview");
     }
     history::close(state, "");
-    state.close_up = if state.close_up.is_some() { None } else { Some(state.crosshair) };
-    match state.close_up {
-        Some(_) => say(state, "1:1: the picture's own pixels around the crosshair; x is back"),
-        None => state.message = None,
+    state.picture.close_up =
+        if state.picture.close_up.is_some() { None } else { Some(state.selection.crosshair) };
+    match state.picture.close_up {
+        Some(_) => say(state, "1:1: the picture's own pixels around the crosshair; x goes back"),
+        None => state.overlays.message = None,
     }
     state.dirty = true;
     resized_preview(state)
 }
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
-    if !state.is_running() && !state.paused {
-        return told(state, "nothing is rendering");
+    if !state.work.is_running() && !state.work.paused {
+        return notify(state, "nothing is rendering");
     }
-    state.set_paused(!state.paused);
+    state.set_paused(!state.work.paused);
     state.dirty = true;
-    vec![Effect::Send(Command::Pause(state.paused))]
+    vec![Effect::Send(Command::Pause(state.work.paused))]
 }
 
 fn write_now(state: &mut State) -> Vec<Effect> {
     say(state, "writing the image as it is now");
-    state.asked_to_write = true;
+    state.saving.is_write_requested = true;
     vec![Effect::Send(Command::Write)]
 }
 
 fn scene_settings(state: &mut State) -> Vec<Effect> {
-    if state.toggles == Toggles::default() {
-        return told(state, "the keys have changed nothing");
+    if state.request.toggles == Toggles::default() {
+        return notify(state, "the keys have changed nothing");
     }
-    state.toggles = Toggles::default();
+    state.request.toggles = Toggles::default();
     let effects = render(state, false);
     say(state, "back to the scene's own settings");
     effects
 }
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
-    if state.problems.is_none() && state.warnings.is_empty() {
-        let is_read = state.are_warnings_known || !state.is_running();
-        return told(
+    if state.overlays.problems.is_none() && state.overlays.warnings.is_empty() {
+        let is_read = state.overlays.are_warnings_known || !state.work.is_running();
+        return notify(
             state,
             if is_read { "no errors and no warnings" } else { "the files are still being read" },
         );
     }
     change(state, |state| {
-        state.pane.open = !state.pane.open;
-        state.pane.scroll = 0;
+        state.overlays.diagnostics.open = !state.overlays.diagnostics.open;
+        state.overlays.diagnostics.scroll = 0;
     })
 }

@@ -8,21 +8,26 @@ mod overlay;
 mod places;
 mod pointer;
 mod rectangle;
+mod request;
+mod say;
 mod views;
 mod worker;
 
 use std::time::{Duration, Instant};
 
+use self::request::{render, resized_preview};
+use self::say::say;
 use super::ExitStatus;
 use super::event::{Effect, Event, Signal, Source, Window};
+use super::history::Shown;
 use super::options::Changed;
 use super::preview_kind::PreviewKind;
-use super::state::{Activity, Nudge, PendingChange, Shown, State, Toggles};
+use super::state::{PendingChange, State};
 use super::view::layout::Layout;
 use crate::film::Picture;
-use crate::pipeline::protocol::{Command, Request, Writing};
+use crate::pipeline::protocol::Command;
 
-/// The window must keep its size for this long before another preview is asked for.
+/// Time that the window must keep its size before glimt requests another preview.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
 /// The first request.
@@ -33,12 +38,12 @@ pub(super) fn start(state: &mut State) -> Vec<Effect> {
 /// One event.
 pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
     state.now = now;
-    let was_paused = state.paused;
+    let was_paused = state.work.paused;
     let mut effects = happened(state, event);
     effects.extend(camera::keep_up(state));
     let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
     if was_paused && effects.iter().any(is_request) {
-        let rest = state.message.take().map_or(String::new(), |message| format!(" · {message}"));
+        let rest = state.overlays.message.take().map_or(String::new(), |message| format!(" · {message}"));
         say(state, format!("no longer paused{rest}"));
     }
     effects
@@ -52,8 +57,8 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
         Event::Answer(answer) => answers::learn(state, answer),
         Event::Frame(report) => {
-            state.dirty |= state.frame != Some(report);
-            state.frame = Some(report);
+            state.dirty |= state.display.frame != Some(report);
+            state.display.frame = Some(report);
             Vec::new()
         }
         Event::Resize(window) => resize(state, window),
@@ -62,25 +67,25 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             show(state, Shown { generation, picture, range, section, lacks_photons })
         }
         Event::Changed(Changed { noticed }) => {
-            // It may be glimt's own save, or the one that kept it from its own: what was said of that stays.
+            // It may be glimt's own save, or one that kept glimt from its own: the message about that stays.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
-            let (is_own, is_known) = (is_of(state.kept), is_of(state.not_kept));
-            (state.kept, state.not_kept) = (None, None);
-            state.is_settled = false;
+            let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));
+            (state.saving.camera_kept, state.saving.camera_refused) = (None, None);
+            state.saving.is_settled = false;
             history::record(state);
             if !is_own && !is_known {
-                (state.message, state.inspected) = (None, None);
+                (state.overlays.message, state.selection.facts) = (None, None);
             }
             if !is_own {
-                state.history.edited();
+                state.picture.history.edited();
             }
-            state.edits += 1;
+            state.saving.edits += 1;
             let effects = render(state, false);
-            state.edit = (!is_own).then_some(state.generation);
+            state.saving.last_edit = (!is_own).then_some(state.request.generation);
             // A save out of the editor is seen when that has ended at the earliest.
-            let noticed = state.back.map_or(noticed, |back| noticed.max(back));
-            state.change = Some(PendingChange { generation: state.generation, noticed });
+            let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
+            state.saving.change = Some(PendingChange { generation: state.request.generation, noticed });
             effects
         }
         Event::Settled => {
@@ -92,7 +97,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Tick => tick(state),
         Event::Lost(source) => lost(state, source),
         Event::Back => {
-            state.back = Some(state.now);
+            state.saving.editor_closed = Some(state.now);
             Vec::new()
         }
         Event::NoEditor(why) => {
@@ -106,58 +111,18 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
     }
 }
 
-/// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
-fn render(state: &mut State, force: bool) -> Vec<Effect> {
-    // A camera on its way has too many pictures.
-    if state.nudge.request != Some(state.generation) {
-        history::record(state);
-    }
-    state.picture = state.history.close().or_else(|| state.picture.take());
-    let before = std::mem::replace(&mut state.requested_toggles, state.toggles);
-    let now = Toggles { exposure: before.exposure, ..state.toggles };
-    state.is_exposed = before == now && before != state.toggles;
-    if state.is_exposed {
-        // The same light, shown brighter or darker.
-        state.history.go_on(state.generation);
-    }
-    state.generation += 1;
-    let is_moved = state.toggles.camera.is_any();
-    state.moved_since = is_moved.then_some(state.moved_since.unwrap_or(state.generation));
-    state.requested = Layout::preview_size(state);
-    state.resize_due = None;
-    state.nudge = Nudge::default();
-    state.held = None;
-    state.are_warnings_known = false;
-    state.dirty = true;
-    let request = Request {
-        generation: state.generation,
-        scene: state.scene.clone(),
-        overrides: state.overrides(),
-        preview: state.requested,
-        write: if state.is_written() { Writing::Try } else { Writing::No },
-        force,
-        first: state.first,
-    };
-    let mut effects = Vec::new();
-    if state.paused {
-        state.set_paused(false);
-        effects.push(Effect::Send(Command::Pause(false)));
-    }
-    state.activity = Activity::Running { since: state.now };
-    effects.push(Effect::Send(Command::Render(Box::new(request))));
-    effects
-}
-
 fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
-    if shown.generation == state.generation && is_whole(&shown.picture) && state.preview != PreviewKind::None
+    if shown.generation == state.request.generation
+        && is_whole(&shown.picture)
+        && state.display.kind != PreviewKind::None
     {
-        if state.history.holds_back(&shown) {
+        if state.picture.history.holds_back(&shown) {
             return Vec::new();
         }
-        state.urgent |= state.picture.as_ref().is_none_or(|last| last.generation != shown.generation);
-        let last = state.picture.take().filter(|last| last.generation == shown.generation);
-        state.picture = Some(match last {
-            Some(last) if state.mixes_colors() => steadied(shown, &last),
+        state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
+        let last = state.picture.shown.take().filter(|last| last.generation == shown.generation);
+        state.picture.shown = Some(match last {
+            Some(last) if state.display.mixes_colors() => steadied(shown, &last),
             Some(_) | None => shown,
         });
         state.dirty = true;
@@ -190,41 +155,32 @@ fn is_whole(picture: &Picture) -> bool {
 }
 
 fn shown(state: &mut State, generation: u64) -> Vec<Effect> {
-    if let Some(change) = state.change.take_if(|change| change.generation == generation) {
-        state.first_change = Some(state.now.saturating_duration_since(change.noticed));
+    if let Some(change) = state.saving.change.take_if(|change| change.generation == generation) {
+        state.saving.first_change = Some(state.now.saturating_duration_since(change.noticed));
         state.dirty = true;
     }
     Vec::new()
 }
 
 fn resize(state: &mut State, window: Window) -> Vec<Effect> {
-    state.window = window;
+    state.display.window = window;
     state.dirty = true;
-    state.resize_due = (Layout::preview_size(state) != state.requested).then(|| state.now + RESIZE_QUIET);
+    state.request.resize_due =
+        (Layout::preview_size(state) != state.request.preview_size).then(|| state.now + RESIZE_QUIET);
     Vec::new()
 }
 
 fn tick(state: &mut State) -> Vec<Effect> {
-    state.dirty |= state.is_running() && !state.paused;
-    let (now, bars) = (state.now, state.assets.len());
-    state.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
-    state.dirty |= state.assets.len() != bars;
-    state.dirty |= state.views.take_if(|views| now >= views.until).is_some();
-    if state.resize_due.is_none_or(|due| state.now < due) {
+    state.dirty |= state.work.is_running() && !state.work.paused;
+    let (now, bars) = (state.now, state.work.assets.len());
+    state.work.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
+    state.dirty |= state.work.assets.len() != bars;
+    state.dirty |= state.overlays.views.take_if(|views| now >= views.until).is_some();
+    if state.request.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
     }
-    state.resize_due = None;
+    state.request.resize_due = None;
     resized_preview(state)
-}
-
-/// The same picture at another size where the window has another one than was asked for; what is rendered goes on.
-fn resized_preview(state: &mut State) -> Vec<Effect> {
-    let size = Layout::preview_size(state);
-    if size == state.requested || size.is_none() {
-        return Vec::new();
-    }
-    state.requested = size;
-    vec![Effect::Send(Command::Preview(size))]
 }
 
 fn signalled(signal: Signal) -> Effect {
@@ -250,9 +206,4 @@ fn lost(state: &mut State, source: Source) -> Vec<Effect> {
         }
         Source::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],
     }
-}
-
-fn say(state: &mut State, message: impl Into<String>) {
-    (state.message, state.inspected) = (Some(message.into()), None);
-    state.dirty = true;
 }

@@ -1,9 +1,8 @@
-//! What a key does to what lies over the picture: the help, the list of views, the errors.
+//! Effects of keys on overlays: the help, the list of views, the errors.
 
 use crossterm::event::KeyCode;
 
-use super::keys::choose_view;
-use super::views;
+use super::views::{self, choose_view};
 use super::{history, rectangle};
 use crate::choice::Choice;
 use crate::pipeline::settings::View;
@@ -18,7 +17,7 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
         return Some(effects);
     }
     if let Some(view) = chosen(state, key) {
-        state.message = None;
+        state.overlays.message = None;
         return Some(choose_view(state, view));
     }
     let action = keymap::overlay(key)?;
@@ -44,27 +43,28 @@ pub(super) fn act(state: &mut State, action: Overlay) -> bool {
 /// The view of a digit, while the list of them is open.
 fn chosen(state: &State, key: KeyPress) -> Option<View> {
     let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
-    state.views.as_ref().filter(|_| key.modifiers.is_empty())?;
+    state.overlays.views.as_ref().filter(|_| key.modifiers.is_empty())?;
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
-/// What was opened last: over all else, then what waits for a click or a drag, then what was said of a place, then an older picture.
+/// Closes the topmost overlay: first those over all else, then waiting for a click or a drag, then facts about a place, then an
+/// older picture.
 fn close(state: &mut State) -> bool {
-    let is_open = if state.help.open {
-        state.help.open = false;
+    let is_open = if state.overlays.help.open {
+        state.overlays.help.open = false;
         true
-    } else if state.views.take().is_some() {
+    } else if state.overlays.views.take().is_some() {
         true
-    } else if state.pane.open {
-        state.pane.open = false;
+    } else if state.overlays.diagnostics.open {
+        state.overlays.diagnostics.open = false;
         true
-    } else if state.is_focusing || state.is_marking {
-        (state.is_focusing, state.message) = (false, None);
+    } else if state.selection.is_focusing || state.selection.is_marking {
+        (state.selection.is_focusing, state.overlays.message) = (false, None);
         rectangle::leave(state);
         true
-    } else if state.inspected.take().is_some() {
+    } else if state.selection.facts.take().is_some() {
         true
-    } else if state.history.is_open() {
+    } else if state.picture.history.is_open() {
         history::close(state, "the newest picture");
         true
     } else {
@@ -77,11 +77,11 @@ fn close(state: &mut State) -> bool {
 /// The help, or errors that are longer than their pane; in a shorter one the keys mean what they mean else.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
-        () if state.help.open => (true, help::extent(state)),
-        () if state.pane.open => (false, diagnostics::extent(state)),
+        () if state.overlays.help.open => (true, help::extent(state)),
+        () if state.overlays.diagnostics.open => (false, diagnostics::extent(state)),
         () => return false,
     };
-    let pane = if is_help { &mut state.help } else { &mut state.pane };
+    let pane = if is_help { &mut state.overlays.help } else { &mut state.overlays.diagnostics };
     let line = step(pane.scroll.min(last), page).min(last);
     state.dirty |= line != pane.scroll;
     pane.scroll = line;

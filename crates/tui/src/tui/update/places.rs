@@ -1,18 +1,18 @@
-//! Where the editor is led to.
+//! The place that the editor opens.
 
 use crate::scene::diagnostic::{Diagnostic, Place};
-use crate::tui::editor::FilePlace;
+use crate::tui::event::FilePlace;
 use crate::tui::state::State;
 
 /// The first error, else what was clicked, else the first warning, else the scene.
 pub(super) fn to_edit(state: &State) -> FilePlace {
-    let errors = state.problems.iter().flat_map(|problems| &problems.diagnostics).find_map(in_file);
-    let warnings = || state.warnings.iter().find_map(in_file);
-    let scene = || FilePlace { path: state.scene.clone(), line: 1, column: 1 };
-    errors.or_else(|| state.picked.clone()).or_else(warnings).unwrap_or_else(scene)
+    let errors = state.overlays.problems.iter().flat_map(|problems| &problems.diagnostics).find_map(in_file);
+    let warnings = || state.overlays.warnings.iter().find_map(in_file);
+    let scene = || FilePlace { path: state.request.scene.clone(), line: 1, column: 1 };
+    errors.or_else(|| state.selection.picked.clone()).or_else(warnings).unwrap_or_else(scene)
 }
 
-/// The place of a diagnostic, where that is in a file.
+/// The place of a diagnostic, if it is in a file.
 fn in_file(diagnostic: &Diagnostic) -> Option<FilePlace> {
     let Place { source, span, .. } = diagnostic.place.as_ref()?;
     let before = source.get(..span.start)?;

@@ -1,14 +1,14 @@
-//! The mouse on the picture, and what is asked of a place there.
+//! The mouse on the picture, and questions about a place there.
 
-use super::keys::told;
-use super::{camera, overlay, rectangle, say};
+use super::say::{notify, say};
+use super::{camera, overlay, rectangle};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
 use crate::scene::sanitize::visible;
-use crate::tui::editor::FilePlace;
+use crate::tui::event::FilePlace;
 use crate::tui::event::{Effect, Mouse, MouseKind};
 use crate::tui::keymap::Overlay;
-use crate::tui::state::{Press, Purpose, State};
+use crate::tui::state::{PickPurpose, Press, State};
 use crate::tui::view::layout::Layout;
 use crate::tui::view::preview::spot_at;
 
@@ -17,22 +17,22 @@ const TURN_ACROSS: f64 = 180.0;
 
 const IN_FOCUS: &str = "everything is in focus: the scene's camera has no `aperture`";
 
-/// What the mouse did.
+/// Reacts to the mouse.
 pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     match mouse.kind {
         MouseKind::Press => {
             let is_on_picture = Layout::of(state).preview.contains((mouse.column, mouse.row).into());
             let Mouse { column, row, .. } = mouse;
             let from = spot_at(state, column, row);
-            state.press = is_on_picture.then_some(Press { column, row, has_moved: false, from });
+            state.selection.press = is_on_picture.then_some(Press { column, row, has_moved: false, from });
             Vec::new()
         }
         MouseKind::Drag => drag(state, mouse),
-        MouseKind::Release if state.is_marking && state.press.take().is_some() => {
+        MouseKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
             let spot = spot_at(state, mouse.column, mouse.row);
             rectangle::release(state, spot)
         }
-        MouseKind::Release => match state.press.take() {
+        MouseKind::Release => match state.selection.press.take() {
             Some(press) if !press.has_moved => click(state, mouse),
             Some(_) | None => Vec::new(),
         },
@@ -48,13 +48,13 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
 
 fn is_on_pane(state: &State, mouse: Mouse) -> bool {
     let is_on_errors = || Layout::of(state).pane.contains((mouse.column, mouse.row).into());
-    state.help.open || state.pane.open && is_on_errors()
+    state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
 }
 
 /// The scene turns with the hand.
 fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
-    let Some(press) = state.press else { return Vec::new() };
-    if state.is_marking {
+    let Some(press) = state.selection.press else { return Vec::new() };
+    if state.selection.is_marking {
         if let Some((from, to)) = press.from.zip(spot_at(state, mouse.column, mouse.row)) {
             rectangle::drag(state, from, to);
         }
@@ -65,91 +65,95 @@ fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     if right == 0.0 && down == 0.0 {
         return Vec::new();
     }
-    state.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true, ..press });
+    state.selection.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true, ..press });
     let degrees = TURN_ACROSS / f64::from(Layout::of(state).preview.width.max(1));
-    camera::turn(state, -right * degrees, down * f64::from(state.window.cell_aspect) * degrees)
+    camera::turn(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
 }
 
 fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     let Some(spot) = spot_at(state, mouse.column, mouse.row) else { return Vec::new() };
-    state.crosshair = spot;
-    let purpose = if std::mem::take(&mut state.is_focusing) { Purpose::Focus } else { Purpose::Inspect };
+    state.selection.crosshair = spot;
+    let purpose = if std::mem::take(&mut state.selection.is_focusing) {
+        PickPurpose::Focus
+    } else {
+        PickPurpose::Inspect
+    };
     ask(state, purpose)
 }
 
-/// What is at the crosshair?
+/// Asks for the object at the crosshair.
 pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
-    ask(state, Purpose::Inspect)
+    ask(state, PickPurpose::Inspect)
 }
 
 /// First it waits for a click; asked again it takes the crosshair.
 pub(super) fn focus(state: &mut State) -> Vec<Effect> {
-    if state.viewpoint().is_some_and(|view| view.aperture == 0.0) {
-        state.is_focusing = false;
-        return told(state, IN_FOCUS);
+    if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
+        state.selection.is_focusing = false;
+        return notify(state, IN_FOCUS);
     }
-    if state.is_mouse_on && !state.is_focusing {
-        state.is_focusing = true;
-        return told(
+    if state.selection.is_mouse_on && !state.selection.is_focusing {
+        state.selection.is_focusing = true;
+        return notify(
             state,
             "click where to focus; f again focuses at the crosshair: the last click, else the middle",
         );
     }
-    state.is_focusing = false;
-    ask(state, Purpose::Focus)
+    state.selection.is_focusing = false;
+    ask(state, PickPurpose::Focus)
 }
 
-fn ask(state: &mut State, purpose: Purpose) -> Vec<Effect> {
-    if state.camera.is_none() {
-        return told(state, "the scene has not been read yet");
+fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
+    if state.request.camera.is_none() {
+        return notify(state, "the scene has not been read yet");
     }
-    state.asked = purpose;
-    vec![Effect::Send(Command::Pick(state.crosshair))]
+    state.selection.purpose = purpose;
+    vec![Effect::Send(Command::Pick(state.selection.crosshair))]
 }
 
 pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
-    state.is_mouse_on = !state.is_mouse_on;
-    (state.press, state.is_focusing, state.is_marking) = (None, false, false);
-    let words = if state.is_mouse_on {
+    state.selection.is_mouse_on = !state.selection.is_mouse_on;
+    (state.selection.press, state.selection.is_focusing, state.selection.is_marking) = (None, false, false);
+    let words = if state.selection.is_mouse_on {
         "mouse on: drag turns, the wheel goes nearer, a click says what is there"
     } else {
         "mouse off: it selects text"
     };
     say(state, words);
-    vec![Effect::Mouse(state.is_mouse_on)]
+    vec![Effect::Mouse(state.selection.is_mouse_on)]
 }
 
 /// The answer.
 pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
-    state.picked = picked.thing.as_ref().map(|thing| FilePlace {
+    state.selection.picked = picked.thing.as_ref().map(|thing| FilePlace {
         path: thing.path.clone(),
         line: thing.line,
         column: 1,
     });
-    match (state.asked, &picked.thing) {
-        (Purpose::Inspect, _) => {
-            state.message = None;
-            state.inspected = Some(facts(picked));
+    match (state.selection.purpose, &picked.thing) {
+        (PickPurpose::Inspect, _) => {
+            state.overlays.message = None;
+            state.selection.facts = Some(facts(picked));
             state.dirty = true;
             Vec::new()
         }
-        (Purpose::Focus, None) => told(state, "there is nothing to focus on"),
-        (Purpose::Focus, Some(thing)) => focus_at(state, thing.depth),
+        (PickPurpose::Focus, None) => notify(state, "there is nothing to focus on"),
+        (PickPurpose::Focus, Some(thing)) => focus_at(state, thing.depth),
     }
 }
 
 fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     let distance = rounded(depth, step_at(depth));
     if !(distance > 0.0) {
-        return told(state, "there is nothing to focus on");
+        return notify(state, "there is nothing to focus on");
     }
     // The scene may have been edited since.
-    if state.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return told(state, IN_FOCUS);
+    if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
+        return notify(state, IN_FOCUS);
     }
-    state.toggles.camera.focus = Some(distance);
+    state.request.toggles.camera.focus = Some(distance);
     let effects = camera::step_of_camera(state);
-    if state.toggles.camera.focus.is_some() {
+    if state.request.toggles.camera.focus.is_some() {
         say(
             state,
             format!("focus {distance} away: shown, not written; w writes it, c keeps it, 0 goes back"),

@@ -1,7 +1,7 @@
 //! A rectangle of the picture that is rendered before the rest.
 
-use super::keys::told;
-use super::{render, say};
+use super::request::render;
+use super::say::{notify, say};
 use crate::pipeline::protocol::{Section, Spot};
 use crate::tui::event::Effect;
 use crate::tui::state::State;
@@ -11,38 +11,38 @@ const SIDE: f64 = 1.0 / 3.0;
 
 /// The key: first it waits for a drag; asked again it takes what is around the crosshair; then there is none any more.
 pub(super) fn press(state: &mut State) -> Vec<Effect> {
-    if state.first.take().is_some() {
-        (state.is_marking, state.press) = (false, None);
+    if state.request.first_section.take().is_some() {
+        (state.selection.is_marking, state.selection.press) = (false, None);
         let effects = again(state);
-        say(state, "no part of the picture comes first any more");
+        say(state, "no rectangle is rendered first any more");
         return effects;
     }
-    if state.is_mouse_on && !state.is_marking {
-        state.is_marking = true;
-        return told(
+    if state.selection.is_mouse_on && !state.selection.is_marking {
+        state.selection.is_marking = true;
+        return notify(
             state,
             "drag a rectangle: it is rendered first; z again takes what is around the crosshair",
         );
     }
-    take(state, around(state.crosshair))
+    take(state, around(state.selection.crosshair))
 }
 
 /// No drag is waited for any more; one under way is none.
 pub(super) fn leave(state: &mut State) {
-    if std::mem::take(&mut state.is_marking) {
-        (state.first, state.press) = (None, None);
+    if std::mem::take(&mut state.selection.is_marking) {
+        (state.request.first_section, state.selection.press) = (None, None);
     }
 }
 
 /// The hand has come from one place to another.
 pub(super) fn drag(state: &mut State, from: Spot, to: Spot) {
-    state.first = Some(Section::between(from, to));
+    state.request.first_section = Some(Section::between(from, to));
     state.dirty = true;
 }
 
-/// The hand let go: what it marked, else what is around the place.
+/// Ends a drag: takes the marked rectangle, else one around the place.
 pub(super) fn release(state: &mut State, spot: Option<Spot>) -> Vec<Effect> {
-    match (state.first, spot) {
+    match (state.request.first_section, spot) {
         (Some(marked), _) => take(state, marked),
         (None, Some(spot)) => take(state, around(spot)),
         (None, None) => Vec::new(),
@@ -55,9 +55,9 @@ fn around(spot: Spot) -> Section {
 }
 
 fn take(state: &mut State, section: Section) -> Vec<Effect> {
-    state.is_marking = false;
-    state.first = Some(section);
-    let words = if state.is_running() {
+    state.selection.is_marking = false;
+    state.request.first_section = Some(section);
+    let words = if state.work.is_running() {
         "the rectangle is rendered first; z ends that"
     } else {
         "the rectangle is rendered first from the next render on; z ends that"
@@ -70,5 +70,5 @@ fn take(state: &mut State, section: Section) -> Vec<Effect> {
 /// The render under way, in another order: it keeps what it has.
 fn again(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
-    if state.is_running() && !state.paused { render(state, false) } else { Vec::new() }
+    if state.work.is_running() && !state.work.paused { render(state, false) } else { Vec::new() }
 }

@@ -2,7 +2,8 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::keys::choose_view;
+use super::request::render;
+use super::say::say;
 use crate::choice::Choice;
 use crate::pipeline::settings::View;
 use crate::tui::event::{Effect, KeyPress};
@@ -10,12 +11,12 @@ use crate::tui::keymap::Overlay;
 use crate::tui::state::State;
 use crate::tui::view::views::rows;
 
-/// What a key of the tables does to the list; `None` if it is closed, or covered by the help.
+/// Effect of a bound key on the list. `None` if the list is closed, or covered by the help.
 pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> {
-    if state.views.is_none() || state.help.open {
+    if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
     }
-    let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
+    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
     let last = View::ALL.len() - 1;
     let column = rows(state);
     let chosen = match action {
@@ -39,9 +40,9 @@ pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> 
     Some(choose(state, View::ALL[chosen]))
 }
 
-/// What a key types while a name is looked for; `None` if none is.
+/// Effect of a key while a name is typed. `None` if none is.
 pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
-    let mut name = state.views.as_ref().filter(|_| !state.help.open)?.name.clone()?;
+    let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT);
     match key.code {
         KeyCode::Char(letter) if !is_held => name.extend(letter.to_lowercase()),
@@ -57,6 +58,17 @@ pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     Some(found.map_or_else(Vec::new, |view| choose(state, view)))
 }
 
+/// This view, in the list of them.
+pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
+    state.list_views();
+    state.request.toggles.view = (view != state.request.base_view()).then_some(view);
+    let effects = render(state, false);
+    if state.request.toggles.view.is_some() {
+        say(state, format!("view {}: shown, not written; w writes it", view.name()));
+    }
+    effects
+}
+
 /// The first view whose name begins with this, else the first that has it anywhere.
 fn found(name: &str) -> Option<View> {
     let begins = |view: &&View| view.name().starts_with(name);
@@ -67,22 +79,22 @@ fn found(name: &str) -> Option<View> {
 
 fn look_for(state: &mut State, name: String) {
     state.list_views();
-    if let Some(views) = &mut state.views {
+    if let Some(views) = &mut state.overlays.views {
         views.name = Some(name);
     }
 }
 
 fn close(state: &mut State) {
-    state.views = None;
+    state.overlays.views = None;
     state.dirty = true;
 }
 
 /// The view that stands already is not rendered again.
 fn choose(state: &mut State, view: View) -> Vec<Effect> {
     state.list_views();
-    if view == state.view() {
+    if view == state.request.view() {
         return Vec::new();
     }
-    state.message = None;
+    state.overlays.message = None;
     choose_view(state, view)
 }

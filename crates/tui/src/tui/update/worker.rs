@@ -1,13 +1,15 @@
-//! What the worker's events do to the state. Those of older generations do nothing, but for what they say of files.
+//! Effects of the worker's events on the state. Events of older generations do nothing, except for those about files.
 
 use std::path::PathBuf;
 
-use super::{camera, history, pointer, resized_preview, say};
+use super::request::resized_preview;
+use super::say::say;
+use super::{camera, history, pointer};
 use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, Stage, StageReport, Status};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Unwritten, Written};
-use crate::tui::parting;
+use crate::tui::exit_summary;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
@@ -16,17 +18,17 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
         // Files of pictures of before are there all the same.
-        Event::Written { path, bytes, generation } if generation != state.generation => {
+        Event::Written { path, bytes, generation } if generation != state.request.generation => {
             note(state, path, bytes, generation);
             return Vec::new();
         }
-        Event::Done { generation, report, .. } if generation != state.generation => {
+        Event::Done { generation, report, .. } if generation != state.request.generation => {
             describe(state, generation, &report);
             return Vec::new();
         }
         event => event,
     };
-    if generation(&event) != state.generation {
+    if generation(&event) != state.request.generation {
         return Vec::new();
     }
     // The picture itself is taken from its slot; what is watched is the wiring's.
@@ -37,9 +39,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Stage { stage, .. } => record(state, stage),
         Event::Asset { progress, .. } => asset(state, progress),
         Event::Settings { settings, camera, exposure, .. } => {
-            (state.camera, state.exposure) = (Some(camera), Some(exposure));
-            let pinhole = state.overrides().dof == Some(true) && !settings.dof;
-            state.effective = Some(*settings);
+            (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
+            let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
+            state.request.effective = Some(*settings);
             mended(state);
             if pinhole {
                 say(state, "no depth of field: the scene's camera has no `aperture`");
@@ -48,29 +50,30 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             return resized_preview(state);
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
-        Event::Progress { progress, .. } => state.progress = Some(progress),
+        Event::Progress { progress, .. } => state.work.progress = Some(progress),
         Event::Preview { .. } | Event::Files { .. } | Event::CameraKept { .. } | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation } => wrote(state, path, bytes, generation),
         Event::WriteFailed { message, .. } => {
-            let is_by_hand = std::mem::take(&mut state.asked_to_write);
+            let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
             if !is_by_hand {
-                state.unwritten = Some("not written".to_owned());
+                state.saving.unwritten = Some("not written".to_owned());
             }
             say(state, format!("error: {}", visible(&message)));
-            state.write_failed = Some(Unwritten { why: message, generation: state.generation });
+            state.saving.write_failed =
+                Some(Unwritten { why: message, generation: state.request.generation });
         }
         Event::NotKept { message, .. } => say(state, format!("warning: {}", visible(&message))),
         Event::Refused { conflicts, .. } => refused(state, conflicts),
-        Event::Edited { what, .. } => state.history.describe_edit(what),
+        Event::Edited { what, .. } => state.picture.history.describe_edit(what),
         Event::WritePostponed { .. } => {
             say(state, "the image is written as soon as every pixel has a sample");
         }
         Event::Done { report, warnings, unchanged, .. } => done(state, report, warnings, unchanged),
         Event::Failed { failure, .. } => failed(state, failure),
         Event::Cancelled { .. } => {
-            state.activity = Activity::Cancelled;
+            state.work.activity = Activity::Cancelled;
             state.set_paused(false);
-            state.assets.clear();
+            state.work.assets.clear();
         }
     }
     Vec::new()
@@ -101,20 +104,20 @@ fn generation(event: &Event) -> u64 {
 }
 
 fn started(state: &mut State) {
-    for (before, stage) in state.before.iter_mut().zip(&state.stages) {
+    for (before, stage) in state.work.last_seconds.iter_mut().zip(&state.work.stages) {
         let done = stage.as_ref().filter(|stage| stage.status == Status::Done);
         *before = done.map(|stage| stage.seconds).or(*before);
     }
-    state.stages = Default::default();
-    state.assets.clear();
-    state.progress = None;
-    state.report = None;
-    state.unwritten = None;
-    state.unchanged = false;
+    state.work.stages = Default::default();
+    state.work.assets.clear();
+    state.work.progress = None;
+    state.work.report = None;
+    state.saving.unwritten = None;
+    state.work.unchanged = false;
 }
 
 fn record(state: &mut State, stage: StageReport) {
-    if let Some(slot) = state.stages.get_mut(stage.name as usize) {
+    if let Some(slot) = state.work.stages.get_mut(stage.name as usize) {
         *slot = Some(stage);
     }
 }
@@ -123,63 +126,63 @@ fn record(state: &mut State, stage: StageReport) {
 fn asset(state: &mut State, progress: AssetProgress) {
     let finished = (progress.done >= progress.total).then_some(state.now);
     let bar = AssetBar { progress, finished };
-    match state.assets.iter_mut().find(|asset| asset.progress.name == bar.progress.name) {
+    match state.work.assets.iter_mut().find(|asset| asset.progress.name == bar.progress.name) {
         Some(asset) => *asset = bar,
-        None => state.assets.push(bar),
+        None => state.work.assets.push(bar),
     }
 }
 
 fn wrote(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     // What is written of itself stands beside the picture and does not cover the keys.
-    if std::mem::take(&mut state.asked_to_write) {
+    if std::mem::take(&mut state.saving.is_write_requested) {
         say(state, format!("wrote {}", visible(&path.to_string_lossy())));
     }
     // Of several outputs, another one may have failed.
-    let is_by_hand = state.activity == Activity::Done;
+    let is_by_hand = state.work.activity == Activity::Done;
     if is_by_hand {
-        (state.unwritten, state.write_failed) = (None, None);
+        (state.saving.unwritten, state.saving.write_failed) = (None, None);
     }
     note(state, path, bytes, generation);
 }
 
 /// A picture is in a file. Its render may go on; a report that is there already is of this picture.
 fn note(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
-    let made = match &state.report {
-        Some(report) => parting::made(report),
-        None if generation == state.generation => parting::view(state.view()),
+    let made = match &state.work.report {
+        Some(report) => exit_summary::made(report),
+        None if generation == state.request.generation => exit_summary::view(state.request.view()),
         None => String::new(),
     };
-    state.written.retain(|other| other.path != path);
-    state.written.push(Written { path, bytes, generation, made });
+    state.saving.written.retain(|other| other.path != path);
+    state.saving.written.push(Written { path, bytes, generation, made });
 }
 
-/// What the files of a request hold that has ended, if it wrote its picture at the end.
+/// Describes the files of a finished request, if it wrote its picture at the end.
 fn describe(state: &mut State, generation: u64, report: &Report) {
     if report.image.path.is_some() {
-        for written in state.written.iter_mut().filter(|written| written.generation == generation) {
-            written.made = parting::made(report);
+        for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
+            written.made = exit_summary::made(report);
         }
     }
 }
 
-/// What is new is shown at once; what a person has seen and closed stays closed.
+/// Shows new conflicts at once; a pane that a person has closed stays closed.
 fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
-    state.asked_to_write = false;
-    state.unwritten = Some("not written: e says why".to_owned());
+    state.saving.is_write_requested = false;
+    state.saving.unwritten = Some("not written: e says why".to_owned());
     say(state, "nothing is written (e shows why)");
     let why = conflicts.first().map_or(String::new(), |conflict| conflict.message.clone());
-    state.write_failed = Some(Unwritten { why, generation: state.generation });
-    if !conflicts.iter().all(|conflict| state.warnings.contains(conflict)) {
-        state.pane = Pane { open: true, scroll: 0 };
+    state.saving.write_failed = Some(Unwritten { why, generation: state.request.generation });
+    if !conflicts.iter().all(|conflict| state.overlays.warnings.contains(conflict)) {
+        state.overlays.diagnostics = Pane { open: true, scroll: 0 };
     }
-    state.warnings.retain(|one| one.severity == Severity::Warning);
-    state.warnings.splice(0..0, conflicts);
+    state.overlays.warnings.retain(|one| one.severity == Severity::Warning);
+    state.overlays.warnings.splice(0..0, conflicts);
 }
 
 /// The file is whole again.
 fn mended(state: &mut State) {
-    if state.problems.take().is_some() {
-        state.pane = Pane::default();
+    if state.overlays.problems.take().is_some() {
+        state.overlays.diagnostics = Pane::default();
     }
 }
 
@@ -188,68 +191,68 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     for stage in &report.stages {
         record(state, stage.clone());
     }
-    state.effective = Some(report.settings.clone());
-    state.activity = Activity::Done;
+    state.request.effective = Some(report.settings.clone());
+    state.work.activity = Activity::Done;
     state.set_paused(false);
-    state.assets.retain(|asset| asset.finished.is_some());
+    state.work.assets.retain(|asset| asset.finished.is_some());
     // The picture of this request is on disk: none is missing any more.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
-    if state.is_written() && is_on_disk && state.unwritten.is_none() {
-        state.write_failed = None;
+    if state.request.is_written() && is_on_disk && state.saving.unwritten.is_none() {
+        state.saving.write_failed = None;
     }
-    describe(state, state.generation, &report);
-    state.report = Some(report);
-    state.unchanged = unchanged;
-    state.renders += u64::from(!unchanged && !state.is_exposed);
+    describe(state, state.request.generation, &report);
+    state.work.report = Some(report);
+    state.work.unchanged = unchanged;
+    state.work.renders += u64::from(!unchanged && !state.request.is_exposure_only);
     warn(state, warnings);
     history::record(state);
     if !unchanged {
-        state.saved = state.edit.or(state.saved);
+        state.saving.last_visible_edit = state.saving.last_edit.or(state.saving.last_visible_edit);
     }
-    if unchanged && state.edit.take_if(|edit| *edit == state.generation).is_some() {
-        state.history.edited_nothing();
+    if unchanged && state.saving.last_edit.take_if(|edit| *edit == state.request.generation).is_some() {
+        state.picture.history.edited_nothing();
     }
-    if unchanged && state.change.is_some_and(|change| change.generation == state.generation) {
-        state.change = None;
-        state.first_change = None;
+    if unchanged && state.saving.change.is_some_and(|change| change.generation == state.request.generation) {
+        state.saving.change = None;
+        state.saving.first_change = None;
     }
 }
 
 fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
-    state.pane.open &= !warnings.is_empty();
-    state.warnings = warnings;
-    state.are_warnings_known = true;
+    state.overlays.diagnostics.open &= !warnings.is_empty();
+    state.overlays.warnings = warnings;
+    state.overlays.are_warnings_known = true;
 }
 
-/// What is wrong with a file that may be half written is not said until that stays so.
+/// Holds back errors in a file that may be half written until they persist.
 fn failed(state: &mut State, failure: Failure) {
     state.set_paused(false);
-    state.assets.clear();
-    state.change = None;
+    state.work.assets.clear();
+    state.saving.change = None;
     match failure {
-        Failure::Scene(diagnostics) if !state.is_settled => {
-            state.activity = Activity::Waiting;
-            state.held = Some(diagnostics);
+        Failure::Scene(diagnostics) if !state.saving.is_settled => {
+            state.work.activity = Activity::Waiting;
+            state.overlays.unconfirmed = Some(diagnostics);
         }
         Failure::Scene(diagnostics) => broken(state, Problems { diagnostics, work: None }),
         Failure::Work(message) => broken(state, Problems { diagnostics: Vec::new(), work: Some(message) }),
     }
 }
 
-/// What a person has seen and closed stays closed.
+/// Shows new problems; a pane that a person has closed stays closed.
 fn broken(state: &mut State, problems: Problems) {
-    state.activity = Activity::Broken;
-    if state.problems.as_ref() != Some(&problems) {
-        state.problems = Some(problems);
-        state.pane = Pane { open: true, scroll: 0 };
+    state.work.activity = Activity::Broken;
+    if state.overlays.problems.as_ref() != Some(&problems) {
+        state.overlays.problems = Some(problems);
+        state.overlays.diagnostics = Pane { open: true, scroll: 0 };
     }
     state.dirty = true;
 }
 
 /// Nobody is writing the files any more: what was found wrong with them is so.
 pub(super) fn settled(state: &mut State) {
-    state.is_settled = true;
-    if let Some(diagnostics) = state.held.take() {
+    state.saving.is_settled = true;
+    if let Some(diagnostics) = state.overlays.unconfirmed.take() {
         broken(state, Problems { diagnostics, work: None });
     }
 }

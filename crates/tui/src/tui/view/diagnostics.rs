@@ -23,12 +23,12 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let text = text(state, area);
     let area = fitting(area, text.len(), area == Layout::of(state).panel);
     let (page, last) = span(&text, area);
-    let first = state.pane.scroll.min(last);
+    let first = state.overlays.diagnostics.scroll.min(last);
     Clear.render(area, buffer);
     title(state, row(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
     for (index, line) in (1..area.height).zip(text.iter().skip(first)) {
         let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
-        put(buffer, row(area, index), &pieces, state.depth);
+        put(buffer, row(area, index), &pieces, state.display.depth);
     }
 }
 
@@ -43,21 +43,21 @@ fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
 
 /// A rule with the number of errors, and which lines are in sight where these are not all.
 fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
-    let has_error = state.warnings.iter().any(|one| one.severity == Severity::Error);
-    let tone = if state.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
+    let has_error = state.overlays.warnings.iter().any(|one| one.severity == Severity::Error);
+    let tone = if state.overlays.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
     let rule = "─".repeat(usize::from(area.width));
-    put(buffer, area, &[(&rule, tone)], state.depth);
-    let words = match &state.problems {
+    put(buffer, area, &[(&rule, tone)], state.display.depth);
+    let words = match &state.overlays.problems {
         Some(_) => super::header::errors(state),
-        None => report::summary(&state.warnings),
+        None => report::summary(&state.overlays.warnings),
     };
     let mut room = area;
     if let Some((first, page, all)) = shown {
         let lines = format!(" lines {}-{} of {all} ", first + 1, first + page);
-        room.width -= put_right(buffer, area, &lines, tone, state.depth);
+        room.width -= put_right(buffer, area, &lines, tone, state.display.depth);
     }
     let room = super::text::rest(room, 1);
-    put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.depth);
+    put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
 }
 
 /// Lines on a page of the pane, and the furthest line that it can be scrolled to.
@@ -74,7 +74,7 @@ fn span(text: &[Line], area: Rect) -> (usize, usize) {
 
 fn text(state: &State, area: Rect) -> Vec<Line> {
     let width = usize::from(area.width);
-    let Some(problems) = &state.problems else { return reported(&state.warnings, width) };
+    let Some(problems) = &state.overlays.problems else { return reported(&state.overlays.warnings, width) };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
         text.extend(toned(&format!("error: {}", visible(work)), width, Tone::Error));
@@ -83,7 +83,7 @@ fn text(state: &State, area: Rect) -> Vec<Line> {
     text
 }
 
-/// Errors first; a fault that is in several places is told once, with all of them.
+/// Lines of the diagnostics, errors first; a fault in several places appears once, with all of them.
 fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
     let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::layout::Layout;
+use super::layout::{BLOCK, Layout};
 use super::message;
 use super::text::{Tone, columns, counted, number, percent, put, put_right, rest, running, seconds};
 use crate::choice::Choice;
@@ -18,8 +18,6 @@ use crate::tui::history::ago;
 use crate::tui::keymap;
 use crate::tui::state::{Activity, State};
 
-/// The block of the state has this many columns, so that the name beside it stands still.
-pub(super) const BLOCK: usize = 13;
 /// From this width on there is room for that.
 const WIDE: u16 = 60;
 /// A name of fewer columns says nothing.
@@ -33,13 +31,13 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if layout.keys.is_empty() && message::is_said(state, layout) {
         return;
     }
-    if state.is_alone {
+    if state.picture.is_alone {
         let back =
             keymap::of(Action::PictureAlone).map_or(String::new(), |it| format!("  {} back", it.label));
-        room.width -= put_right(buffer, room, &back, Tone::Faint, state.depth);
+        room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
     let fitting = figures(state).into_iter().find(|words| columns(words) <= room.width);
-    room.width -= put_right(buffer, room, &fitting.unwrap_or_default(), Tone::Strong, state.depth);
+    room.width -= put_right(buffer, room, &fitting.unwrap_or_default(), Tone::Strong, state.display.depth);
     room.width = room.width.saturating_sub(1);
     if room.width >= LEAST_NAME {
         name(state, room, buffer);
@@ -58,17 +56,17 @@ fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
         return 0;
     }
     let width = usize::from(area.width);
-    let end = buffer.set_stringn(area.x, area.y, text, width, tone.block(state.depth)).0;
+    let end = buffer.set_stringn(area.x, area.y, text, width, tone.block(state.display.depth)).0;
     end - area.x
 }
 
 /// A sign, a word and a colour, each of which tells it.
 pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
-    match state.activity {
-        _ if state.history.is_open() => ("◂", "older", Tone::Warning),
-        _ if state.paused => ("‖", "paused", Tone::Warning),
+    match state.work.activity {
+        _ if state.picture.history.is_open() => ("◂", "older", Tone::Warning),
+        _ if state.work.paused => ("‖", "paused", Tone::Warning),
         Activity::Running { .. } => ("●", "rendering", Tone::Working),
-        Activity::Done if state.unwritten.is_some() => ("!", "unwritten", Tone::Error),
+        Activity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
         Activity::Done => ("✓", "done", Tone::Good),
         Activity::Waiting => ("…", "waiting", Tone::Warning),
         Activity::Broken => ("✗", "broken", Tone::Error),
@@ -78,10 +76,11 @@ pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
 
 /// The file with its folder, the view, the picture's size.
 fn name(state: &State, area: Rect, buffer: &mut Buffer) {
-    let path = state.scene.to_string_lossy();
+    let path = state.request.scene.to_string_lossy();
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (visible(folder), visible(file));
-    let size = state.effective.as_ref().map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
+    let size =
+        state.request.effective.as_ref().map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = close_up(state) + &view(state);
     let view = (&*view, Tone::Strong);
@@ -94,58 +93,62 @@ fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     while pieces.len() > 1 && width(&pieces) > area.width {
         pieces.pop();
     }
-    put(buffer, area, &pieces, state.depth);
+    put(buffer, area, &pieces, state.display.depth);
 }
 
-/// What is seen, where it is not the picture itself, and what it is stretched to.
+/// The view, unless it is beauty, and its range.
 fn view(state: &State) -> String {
-    if state.view() == View::Beauty {
+    if state.request.view() == View::Beauty {
         return String::new();
     }
-    let shown = state.picture.as_ref().filter(|shown| shown.generation == state.generation);
+    let shown = state.picture.shown.as_ref().filter(|shown| shown.generation == state.request.generation);
     let range = shown.and_then(|shown| shown.range);
     let range =
         range.map_or(String::new(), |[least, most]| format!(" {} to {}", number(least), number(most)));
-    format!("  view {}{range}", state.view().name())
+    format!("  view {}{range}", state.request.view().name())
 }
 
 /// Whether the picture at hand lacks the light that photons bring.
 fn lacks_photons(state: &State) -> bool {
-    state.picture.as_ref().is_some_and(|shown| shown.lacks_photons && shown.generation == state.generation)
+    state
+        .picture
+        .shown
+        .as_ref()
+        .is_some_and(|shown| shown.lacks_photons && shown.generation == state.request.generation)
 }
 
 /// Whether the picture is shown pixel by pixel.
 fn close_up(state: &State) -> String {
-    let is_close = state.picture.as_ref().is_some_and(|shown| shown.section.is_some());
+    let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
-/// How far it is, or what came of it; in full and in short.
+/// Progress or result, in full and in short.
 fn figures(state: &State) -> Vec<String> {
-    if let Some((number, count, time)) = state.history.place() {
+    if let Some((number, count, time)) = state.picture.history.place() {
         let place = format!("{number} of {count}");
         let age = ago(state.now.saturating_duration_since(time));
         return vec![format!("picture {place}, {age}"), place];
     }
-    if state.is_running() && lacks_photons(state) {
+    if state.work.is_running() && lacks_photons(state) {
         return ["shown without photons yet", "no photons yet"].map(str::to_owned).to_vec();
     }
-    match (state.activity, &state.report, &state.progress) {
+    match (state.work.activity, &state.work.report, &state.work.progress) {
         (Activity::Running { .. }, _, Some(progress)) => {
             let done = format!("{} %", percent(progress.fraction));
             let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
             let eta = eta.map_or("…".to_owned(), running);
-            if state.paused { vec![done] } else { vec![format!("{done}  ETA {eta}"), done] }
+            if state.work.paused { vec![done] } else { vec![format!("{done}  ETA {eta}"), done] }
         }
         (Activity::Running { .. }, _, None) => {
             at_work(state).map(|name| format!("{name}…")).into_iter().collect()
         }
-        (Activity::Done, _, _) if state.unchanged => {
-            vec![format!("unchanged · run {}", state.renders), "unchanged".to_owned()]
+        (Activity::Done, _, _) if state.work.unchanged => {
+            vec![format!("unchanged · run {}", state.work.renders), "unchanged".to_owned()]
         }
         (Activity::Done, Some(report), _) => {
             let time = seconds(report.seconds);
-            vec![format!("{time} · run {}", state.renders), time]
+            vec![format!("{time} · run {}", state.work.renders), time]
         }
         (Activity::Waiting, _, _) => vec!["for the file to be whole".to_owned()],
         (Activity::Broken, _, _) => vec![errors(state)],
@@ -155,13 +158,13 @@ fn figures(state: &State) -> Vec<String> {
 
 /// The stage that is at work.
 pub(super) fn at_work(state: &State) -> Option<&'static str> {
-    let mut stages = state.stages.iter().flatten();
+    let mut stages = state.work.stages.iter().flatten();
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }
 
-/// How many errors there are, and warnings where there are some.
+/// Number of errors, and of warnings if there are any.
 pub(super) fn errors(state: &State) -> String {
-    let Some(problems) = &state.problems else { return String::new() };
+    let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();
     let errors = counted(count(Severity::Error) + usize::from(problems.work.is_some()), "error");
     match count(Severity::Warning) {

@@ -9,7 +9,7 @@ use super::text::{Tone, columns, put, row, wrapped};
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 use crate::tui::state::State;
 
-/// What else is on the screen.
+/// Notes about the rest of the screen.
 const NOTES: &[(&str, &str)] = &[
     ("saved → seen", "from a save to the first changed cell"),
     ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
@@ -23,7 +23,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let area = area(state);
     let inner = inner(area);
     let (page, last) = extent(state);
-    let first = state.help.scroll.min(last);
+    let first = state.overlays.help.scroll.min(last);
     let lines = lines(inner.width);
     let mut title = " keys ".to_owned();
     if last > 0 {
@@ -36,8 +36,8 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         Clear.render(line.intersection(buffer.area), buffer);
     }
     if inner != area {
-        let border = Tone::Faint.style(state.depth);
-        let title_style = Tone::Strong.style(state.depth);
+        let border = Tone::Faint.style(state.display.depth);
+        let title_style = Tone::Strong.style(state.display.depth);
         let block = Block::bordered().border_type(BorderType::Rounded).border_style(border);
         block.title_style(title_style).title(title).render(area, buffer);
     }
@@ -45,15 +45,15 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     for (index, (label, help)) in (0..inner.height).zip(lines.iter().skip(first)) {
         let line = row(inner, index);
         let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
-        put(buffer, place, &[(label, Tone::Strong)], state.depth);
-        put(buffer, super::text::rest(line, labels + BESIDE), &[(help, Tone::Plain)], state.depth);
+        put(buffer, place, &[(label, Tone::Strong)], state.display.depth);
+        put(buffer, super::text::rest(line, labels + BESIDE), &[(help, Tone::Plain)], state.display.depth);
     }
 }
 
-/// Columns beside the labels and what is said of them.
+/// Columns beside the labels and their texts.
 const BESIDE: u16 = 3;
 
-/// Columns of the labels where there are so many in all.
+/// Columns of the labels, if the help has `width`.
 fn labels(width: u16) -> u16 {
     const LEAST: u16 = 9;
     widest(|(label, _)| label).min(LEAST.max(width / 3))
@@ -90,7 +90,7 @@ fn widest(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
 }
 
 fn area(state: &State) -> Rect {
-    let window = Rect::new(0, 0, state.window.columns, state.window.rows);
+    let window = Rect::new(0, 0, state.display.window.columns, state.display.window.rows);
     // The line of keys tells how to scroll and to close.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
     let width = widest(|(label, _)| label) + widest(|(_, help)| help) + BESIDE + 3;

@@ -14,7 +14,7 @@ use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
 use crate::tui::state::{Activity, State, Toggles, ViewList};
 
-/// A key, and what is said of it in full and in short.
+/// A key with its description, in full and in short.
 struct Hint {
     key: &'static str,
     words: String,
@@ -43,7 +43,7 @@ impl Hint {
 
 /// Between two of them.
 const GAP: u16 = 2;
-/// Columns that are kept for what is of use now, before the toggles are said in full.
+/// Columns kept for the hints of use now, before the toggles appear in full.
 const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -57,7 +57,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     // The help is never left out.
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
-    let toggles = if state.help.open { Vec::new() } else { toggles(state) };
+    let toggles = if state.overlays.help.open { Vec::new() } else { toggles(state) };
     let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
@@ -94,25 +94,30 @@ fn fitting(
 
 fn show(hint: &Hint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
     let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.said(is_long), hint.tone)];
-    put(buffer, area, &pieces, state.depth);
+    put(buffer, area, &pieces, state.display.depth);
     hint.width(is_long)
 }
 
 /// Each toggle with its value, in bold where the keys have changed it.
 fn toggles(state: &State) -> Vec<Hint> {
-    let shadows = match state.integrator() {
-        Integrator::Whitted => state.shadows().name(),
+    let shadows = match state.request.integrator() {
+        Integrator::Whitted => state.request.shadows().name(),
         Integrator::Path => "–",
     };
     let on_off = |on| if on { "on" } else { "off" };
-    let photons = on_off(state.effective.as_ref().is_some_and(|it| it.photons));
-    let keys = &state.toggles;
+    let photons = on_off(state.request.effective.as_ref().is_some_and(|it| it.photons));
+    let keys = &state.request.toggles;
     let all = [
         (Action::CycleShadows, "shadows", shadows.to_owned(), keys.shadows.is_some()),
         (Action::TogglePhotons, "photons", photons.to_owned(), keys.photons.is_some()),
         (Action::ToggleDepthOfField, "dof", on_off(depth_of_field(state)).to_owned(), keys.dof.is_some()),
-        (Action::NextView, "view", state.view().name().to_owned(), keys.view.is_some()),
-        (Action::CycleIntegrator, "", state.integrator().name().to_owned(), keys.integrator.is_some()),
+        (Action::NextView, "view", state.request.view().name().to_owned(), keys.view.is_some()),
+        (
+            Action::CycleIntegrator,
+            "",
+            state.request.integrator().name().to_owned(),
+            keys.integrator.is_some(),
+        ),
     ];
     let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
         let key = keymap::of(action)?.label.split(' ').next()?;
@@ -122,7 +127,7 @@ fn toggles(state: &State) -> Vec<Hint> {
     all.into_iter().filter_map(hint).collect()
 }
 
-/// What is of use now: what is urgent, and what else is.
+/// Hints of use now: the urgent ones, and the others.
 fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     let overlay = |wanted: &[Overlay]| -> Vec<Hint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
@@ -131,60 +136,60 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     let closing = || overlay(&[Overlay::Close]);
     // The keys that scroll, where something is out of sight.
     let scrolling = |last: usize, keys: &[Overlay]| if last > 0 { overlay(keys) } else { Vec::new() };
-    if state.help.open {
+    if state.overlays.help.open {
         let (_, last) = super::help::extent(state);
         let lines = scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing());
         return (lines.chain(scrolling(last, &[Overlay::PageDown])).collect(), Vec::new());
     }
     let mut urgent = Vec::new();
-    if let Some(views) = &state.views {
+    if let Some(views) = &state.overlays.views {
         urgent.extend(of_views(views).into_iter().chain(closing()));
-    } else if state.pane.open {
+    } else if state.overlays.diagnostics.open {
         let (_, last) = super::diagnostics::extent(state);
         urgent.extend(scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(unseen(state));
     let named = |action, words| keymap::of(action).map(|it| Hint::new(it.label, words));
-    if state.problems.is_some() || state.picked.is_some() {
+    if state.overlays.problems.is_some() || state.selection.picked.is_some() {
         urgent.extend(named(Action::Edit, "edit"));
     }
-    if state.history.is_open() {
+    if state.picture.history.is_open() {
         urgent.extend(named(Action::BeforeAfter, "newest"));
         urgent.extend(named(Action::OlderPicture, "older, newer"));
     }
-    if state.toggles.camera.is_any() {
+    if state.request.toggles.camera.is_any() {
         urgent.extend(named(Action::KeepCamera, "keep"));
     }
-    if state.close_up.is_some() {
+    if state.picture.close_up.is_some() {
         urgent.extend(named(Action::CloseUp, "back"));
     }
-    if state.first.is_some() {
+    if state.request.first_section.is_some() {
         let first = named(Action::RectangleFirst, "rectangle first");
         urgent.extend(first.map(|hint| Hint { tone: Tone::Strong, ..hint }));
     }
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
     let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
-    urgent.extend(state.changes().into_iter().map(changed));
-    let now: &[Action] = match state.activity {
-        _ if state.paused => &[Action::TogglePause, Action::WriteNow],
+    urgent.extend(state.request.changes().into_iter().map(changed));
+    let now: &[Action] = match state.work.activity {
+        _ if state.work.paused => &[Action::TogglePause, Action::WriteNow],
         Activity::Running { .. } => &[Action::TogglePause],
         Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
     };
     let first = now.iter().filter_map(|action| Hint::of(*action)).map(|hint| going_on(hint, state));
-    let (held, first): (Vec<Hint>, Vec<Hint>) = first.partition(|_| state.paused);
+    let (held, first): (Vec<Hint>, Vec<Hint>) = first.partition(|_| state.work.paused);
     urgent.extend(held);
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
-    let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.is_running();
-    // It is told above with what it takes back.
-    let is_of_use = state.toggles != Toggles::default() && state.changes().is_empty();
+    let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
+    // Another hint has it above, with what it takes back.
+    let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
     let others =
         KEYMAP.iter().filter(is_other).filter(is_idle).filter(is_back).map(|it| Hint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
 }
 
-/// How a view is chosen from the list, or what was typed of its name.
+/// Keys of the list of views, or the letters typed of a name.
 fn of_views(views: &ViewList) -> Vec<Hint> {
     match &views.name {
         Some(name) => vec![Hint { tone: Tone::Strong, ..Hint::new("/", format!("{name}▏")) }],
@@ -208,21 +213,21 @@ const ELSEWHERE: [Action; 8] = [
 
 fn going_on(hint: Hint, state: &State) -> Hint {
     let is_pause = keymap::of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
-    if is_pause && state.paused { Hint::new(hint.key, "go on") } else { hint }
+    if is_pause && state.work.paused { Hint::new(hint.key, "go on") } else { hint }
 }
 
 /// Errors and warnings that are not in sight.
 fn unseen(state: &State) -> Option<Hint> {
     let key = keymap::of(Action::ToggleDiagnostics)?.label;
-    let (words, tone) = match &state.problems {
-        _ if state.pane.open => return None,
+    let (words, tone) = match &state.overlays.problems {
+        _ if state.overlays.diagnostics.open => return None,
         Some(_) => (super::header::errors(state), activity(state).2),
-        None if state.warnings.is_empty() => return None,
-        None => (summary(&state.warnings), Tone::Warning),
+        None if state.overlays.warnings.is_empty() => return None,
+        None => (summary(&state.overlays.warnings), Tone::Warning),
     };
     Some(Hint { tone, ..Hint::new(key, words) })
 }
 
 fn depth_of_field(state: &State) -> bool {
-    state.effective.as_ref().is_some_and(|it| it.dof) && state.overrides().dof != Some(false)
+    state.request.effective.as_ref().is_some_and(|it| it.dof) && state.request.overrides().dof != Some(false)
 }

@@ -1,4 +1,4 @@
-//! Where things are on the screen: the picture first.
+//! The layout of the screen: the picture first.
 //!
 //! The places follow from the window, the shape of the picture and `tab` alone, never from what is going on: nothing
 //! jumps while a render runs.
@@ -21,10 +21,12 @@ pub(in crate::tui) struct Layout {
     pub under: Rect,
     /// The line of keys.
     pub keys: Rect,
-    /// Where errors lie: beside the picture, else over its lower part.
+    /// Area of the errors: beside the picture, else over its lower part.
     pub pane: Rect,
 }
 
+/// The block of the state has this many columns, so that the name beside it stands still.
+pub(super) const BLOCK: usize = 13;
 /// Fewer rows than this hold one line of words beside the picture.
 const TWO_LINES: u16 = 6;
 /// Fewer rows than this hold two.
@@ -35,7 +37,7 @@ const SIDE_WIDTH: u16 = 23;
 pub(super) const ENTRY_WIDTH: u16 = 26;
 /// A panel at the side has room for half of the stages at least.
 const SIDE_HEIGHT: u16 = 4;
-/// The part of its cells that the picture keeps beside a panel; where it is less there is none.
+/// Least share of its cells that the picture keeps beside a panel; with less there is no panel.
 const KEPT: f32 = 0.9;
 /// A panel from one of these sizes on holds errors as well: what is narrow has to be high.
 const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
@@ -45,24 +47,25 @@ const PANE_HEIGHT: u16 = 12;
 impl Layout {
     /// For the state's window and picture.
     pub(in crate::tui) fn of(state: &State) -> Self {
-        let shape = state.aspect() * state.window.cell_aspect;
-        let shape = (state.preview != PreviewKind::None).then_some(shape);
-        Self::new(state.window.columns, state.window.rows, shape, state.is_alone)
+        let shape = state.request.aspect() * state.display.window.cell_aspect;
+        let shape = (state.display.kind != PreviewKind::None).then_some(shape);
+        Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
     }
 
     /// The preview that the window has room for: a box of square pixels, as many in the width of a cell as are drawn.
     pub(in crate::tui) fn preview_size(state: &State) -> Option<PreviewSize> {
         let area = Self::of(state).preview;
-        let across = state.pixels_across();
-        let height = (f32::from(area.height) * state.window.cell_aspect * across as f32).round() as u32;
+        let across = state.display.pixels_across();
+        let height =
+            (f32::from(area.height) * state.display.window.cell_aspect * across as f32).round() as u32;
         (area.width > 0 && height > 0).then_some(PreviewSize {
             width: u32::from(area.width) * across,
             height,
-            around: state.close_up,
+            around: state.picture.close_up,
         })
     }
 
-    /// `shape`: columns of the picture over its rows; none: no picture is shown.
+    /// `shape`: columns of the picture over its rows. `None` if no picture is shown.
     fn new(columns: u16, rows: u16, shape: Option<f32>, is_alone: bool) -> Self {
         let mut layout = Self::default();
         let mut rest = Rect::new(0, 0, columns, rows);

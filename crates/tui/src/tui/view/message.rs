@@ -1,5 +1,5 @@
-//! What was said last, until the next key: in the line under the picture, or where there is none in the last line, or in the first;
-//! what is longer goes on over the picture.
+//! The last message, until the next key: in the line under the picture, without one in the last line, or in the first. Longer
+//! messages go on over the picture.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -18,7 +18,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let line = line(layout);
     if columns(&words) <= line.width && !line.is_empty() {
         Clear.render(line.intersection(buffer.area), buffer);
-        put(buffer, line, &[(&words, tone)], state.depth);
+        put(buffer, line, &[(&words, tone)], state.display.depth);
         return;
     }
     let room = over_picture(layout, line);
@@ -30,7 +30,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         // What there is no row for is cut with a mark.
         let is_cut = index + 1 == height && lines.len() > usize::from(height);
         let rest = if is_cut { lines[usize::from(index)..].join(" ") } else { line.clone() };
-        put(buffer, row(area, index), &[(&rest, tone)], state.depth);
+        put(buffer, row(area, index), &[(&rest, tone)], state.display.depth);
     }
 }
 
@@ -51,10 +51,10 @@ pub(super) fn is_in_panel(layout: &Layout) -> bool {
 }
 
 fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
-    if let Some(facts) = state.inspected.as_ref().filter(|_| !is_in_panel(layout)) {
+    if let Some(facts) = state.selection.facts.as_ref().filter(|_| !is_in_panel(layout)) {
         return Some((facts.join(" · "), Tone::Strong));
     }
-    let message = state.message.as_ref().filter(|message| !message.is_empty())?;
+    let message = state.overlays.message.as_ref().filter(|message| !message.is_empty())?;
     let tone = if message.starts_with("error") { Tone::Error } else { Tone::Strong };
     Some((visible(message).into_owned(), tone))
 }
@@ -63,7 +63,7 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
 fn line(layout: &Layout) -> Rect {
     let lines = [layout.under, layout.keys];
     // The block of the state stays in sight.
-    let beside = super::text::rest(layout.header, super::header::BLOCK as u16 + 1);
+    let beside = super::text::rest(layout.header, super::layout::BLOCK as u16 + 1);
     lines.into_iter().find(|line| !line.is_empty()).unwrap_or(beside)
 }
 

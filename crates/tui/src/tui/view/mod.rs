@@ -28,15 +28,15 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     panel::draw(state, layout.panel, buffer);
     under::draw(state, &layout, buffer);
     keys::draw(state, &layout, buffer);
-    if state.pane.open {
+    if state.overlays.diagnostics.open {
         diagnostics::draw(state, layout.pane, buffer);
     }
     // A long one goes on over whatever lies there.
     message::draw(state, &layout, buffer);
-    if state.views.is_some() {
+    if state.overlays.views.is_some() {
         views::draw(state, &layout, buffer);
     }
-    if state.help.open {
+    if state.overlays.help.open {
         help::draw(state, buffer);
     }
 }

@@ -43,16 +43,16 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         let gap = u16::from(column + 1 < number);
         let place = Rect { x: area.x + column * width, width: width - gap, ..area };
         let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
-        put(buffer, row(place, line_of), &pieces, state.depth);
+        put(buffer, row(place, line_of), &pieces, state.display.depth);
     }
 }
 
 /// The lines of a panel of this width, the hint wrapped to a column. With the reasons of stages in full, or with what fits of them beside the stages.
 fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Line> {
-    let is_done = matches!(state.activity, Activity::Done);
+    let is_done = matches!(state.work.activity, Activity::Done);
     let mut lines = inspected(state, width);
     // The stages and results are not those of an older picture.
-    if state.history.is_open() {
+    if state.picture.history.is_open() {
         return lines;
     }
     // The stages of a broken scene are of nothing that is to be seen.
@@ -60,7 +60,7 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
         let of = |stage| if is_in_full { stages::lines } else { stages::short }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
-    lines.extend(state.assets.iter().map(|asset| asset_line(state, asset, width)));
+    lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
     if is_done {
         lines.extend(results(state));
     }
@@ -68,9 +68,9 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
     lines
 }
 
-/// What was found at a place.
+/// Facts about a place.
 fn inspected(state: &State, width: u16) -> Vec<Line> {
-    let facts = state.inspected.iter().filter(|_| message::is_in_panel(&Layout::of(state))).flatten();
+    let facts = state.selection.facts.iter().filter(|_| message::is_in_panel(&Layout::of(state))).flatten();
     let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
     let mut lines: Vec<Line> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
     if !lines.is_empty() {
@@ -81,16 +81,16 @@ fn inspected(state: &State, width: u16) -> Vec<Line> {
 
 /// Whether the scene as it is now cannot be read.
 fn is_broken(state: &State) -> bool {
-    let is_at_rest = match state.activity {
+    let is_at_rest = match state.work.activity {
         Activity::Waiting | Activity::Broken => true,
         Activity::Running { .. } | Activity::Done | Activity::Cancelled => false,
     };
-    is_at_rest && state.problems.as_ref().is_none_or(|problems| problems.work.is_none())
+    is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
 
 fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
     let fraction = stages::fraction(asset);
-    let (filled, empty) = gauge(fraction, BAR, state.preview == PreviewKind::Ascii);
+    let (filled, empty) = gauge(fraction, BAR, state.display.kind == PreviewKind::Ascii);
     let percent = format!(" {:3} %", percent(fraction));
     let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + columns(&percent) + 1);
     let name = shortened(&visible(&asset.progress.name), room);
@@ -99,22 +99,22 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
     vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// What came out: a label and a value in each line.
+/// Results: a label and a value in each line.
 fn results(state: &State) -> Vec<Line> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
-    lines.extend(state.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
+    lines.extend(state.saving.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
     if under::is_in_no_file(state) {
         lines.push(vec![("unwritten: w writes it".to_owned(), Tone::Faint)]);
     }
     for written in under::files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::Plain)]);
-        let size = state.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
+        let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
         lines.push(vec![(format!("  {}{}", bytes(written.bytes), size.unwrap_or_default()), Tone::Faint)]);
     }
-    if let Some(report) = &state.report {
+    if let Some(report) = &state.work.report {
         let samples = report.image.samples;
         lines.push(fact(
             "samples",
@@ -125,7 +125,7 @@ fn results(state: &State) -> Vec<Line> {
             },
         ));
         lines.extend(report.image.error.map(|error| fact("noise", format!("{} in all", share(error)))));
-        lines.extend(state.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
+        lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
             // Tiles with as many samples as there may be are perhaps not there yet.
             let is_reached = samples.max < it.samples;
             let sign = if is_reached { " ✓" } else { "" };
@@ -133,9 +133,9 @@ fn results(state: &State) -> Vec<Line> {
         }));
     }
     lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
-    if !state.warnings.is_empty() {
-        let them = if state.warnings.len() == 1 { "it" } else { "them" };
-        let words = format!("{}: e shows {them}", summary(&state.warnings));
+    if !state.overlays.warnings.is_empty() {
+        let them = if state.overlays.warnings.len() == 1 { "it" } else { "them" };
+        let words = format!("{}: e shows {them}", summary(&state.overlays.warnings));
         lines.push(vec![(words, Tone::Warning)]);
     }
     lines

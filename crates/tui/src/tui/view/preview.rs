@@ -1,7 +1,5 @@
 //! The picture in blocks or characters: the one place where pixels become cells.
 
-use std::borrow::Cow;
-
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
@@ -12,33 +10,33 @@ use super::message;
 use super::ramp::Ramp;
 use super::text::{Tone, put};
 use crate::film::Picture;
-use crate::math::Vec3;
-use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 use crate::pipeline::protocol::Spot;
 use crate::tui::color::{ColorDepth, Shades, XTERM};
 use crate::tui::graphics::Placement;
+use crate::tui::history::Shown;
 use crate::tui::mosaic::{Grid, fit};
 use crate::tui::options::PreviewChoice;
 use crate::tui::preview_kind::PreviewKind;
-use crate::tui::state::{Shown, State};
+use crate::tui::rescale::rescaled;
+use crate::tui::state::State;
 
 /// The picture of the state, or a word in its place.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
-    match &state.picture {
+    match &state.picture.shown {
         Some(_) if is_in_pixels(state) => {}
         Some(shown) => {
-            let kind = in_cells(state.preview, state.depth);
+            let kind = in_cells(state.display.kind, state.display.depth);
             let placed = Placed::of(state, shown, area, kind);
             placed.draw(&shown.picture, kind, Inks::of(state), buffer);
             marks::draw(state, placed.cells, buffer);
         }
-        None if state.problems.is_none() && area.height > 0 => {
+        None if state.overlays.problems.is_none() && area.height > 0 => {
             let text = "no picture yet";
             let middle = Rect { y: area.y + area.height / 2, height: 1, ..area };
             let indent = area.width.saturating_sub(super::text::columns(text)) / 2;
             let line = Rect { x: middle.x + indent, width: middle.width - indent, ..middle };
-            put(buffer, line, &[(text, Tone::Faint)], state.depth);
+            put(buffer, line, &[(text, Tone::Faint)], state.display.depth);
         }
         None => {}
     }
@@ -46,9 +44,9 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The place of the picture that a cell shows.
 pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
-    let shown = state.picture.as_ref()?;
+    let shown = state.picture.shown.as_ref()?;
     let area = Layout::of(state).preview;
-    let cells = Placed::of(state, shown, area, in_cells(state.preview, state.depth)).cells;
+    let cells = Placed::of(state, shown, area, in_cells(state.display.kind, state.display.depth)).cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || {
         let spot = Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
@@ -57,7 +55,7 @@ pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Sp
     cells.contains((column, row).into()).then(spot)
 }
 
-/// What is drawn where the picture has to be in cells.
+/// Kind of preview when the picture has to be in cells.
 fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
         PreviewKind::Pixels(_) => PreviewKind::of(PreviewChoice::Auto, depth),
@@ -67,22 +65,22 @@ fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
 
 /// Whether the picture is drawn in pixels: where nothing may lie over it.
 fn is_in_pixels(state: &State) -> bool {
-    matches!(state.preview, PreviewKind::Pixels(_))
-        && !state.help.open
-        && !state.pane.open
-        && state.views.is_none()
+    matches!(state.display.kind, PreviewKind::Pixels(_))
+        && !state.overlays.help.open
+        && !state.overlays.diagnostics.open
+        && state.overlays.views.is_none()
         && !message::is_over_picture(state)
 }
 
-/// Where the picture is drawn in pixels; none: it is drawn in cells.
+/// Placement of the picture in pixels. `None` if it is drawn in cells.
 pub(in crate::tui) fn placement(state: &State, area: Rect) -> Option<Placement> {
-    let shown = state.picture.as_ref().filter(|_| is_in_pixels(state))?;
-    let placed = Placed::of(state, shown, area, state.preview);
+    let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
+    let placed = Placed::of(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
-    (!cells.is_empty()).then_some(Placement { picture, cells, cell: state.window.cell_pixels })
+    (!cells.is_empty()).then_some(Placement { picture, cells, cell: state.display.window.cell_pixels })
 }
 
-/// What colours are shown by.
+/// Colours that show a picture.
 #[derive(Clone, Copy)]
 pub(in crate::tui) struct Inks<'a> {
     pub(in crate::tui) depth: ColorDepth,
@@ -93,7 +91,7 @@ pub(in crate::tui) struct Inks<'a> {
 
 impl<'a> Inks<'a> {
     fn of(state: &'a State) -> Self {
-        Self { depth: state.depth, shades: &state.shades, is_light: state.is_light }
+        Self { depth: state.display.depth, shades: &state.display.shades, is_light: state.display.is_light }
     }
 }
 
@@ -117,7 +115,7 @@ pub(in crate::tui) fn shown_by(
     buffer
 }
 
-/// The columns and rows that a picture takes in half blocks or in characters, of those that there are.
+/// Columns and rows of a picture in half blocks or in characters, within those available.
 pub(in crate::tui) fn size_in_cells(
     picture: &Picture,
     depth: ColorDepth,
@@ -130,12 +128,7 @@ pub(in crate::tui) fn size_in_cells(
     (cells.width, cells.height)
 }
 
-/// The picture at another size.
-pub(in crate::tui) fn resized(picture: &Picture, width: u32, height: u32) -> Picture {
-    Picture { width, height, pixels: rescaled(picture, width, height).into_owned() }
-}
-
-/// Where a picture lies: its cells, and how many pixels it has there.
+/// Placement of a picture: its cells, and its pixels there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Placed {
     cells: Rect,
@@ -144,12 +137,12 @@ struct Placed {
 }
 
 impl Placed {
-    /// Where the state's picture is drawn: as large as there is room for, or pixel by pixel.
+    /// Placement of the state's picture: as large as there is room for, or pixel by pixel.
     fn of(state: &State, shown: &Shown, area: Rect, kind: PreviewKind) -> Self {
         let across = kind.grid().map_or(1, Grid::columns);
-        let one_to_one = across as f32 / state.pixels_across() as f32;
+        let one_to_one = across as f32 / state.display.pixels_across() as f32;
         let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
-        Self::fit(&shown.picture, area, kind, state.window.cell_aspect, most)
+        Self::fit(&shown.picture, area, kind, state.display.window.cell_aspect, most)
     }
 
     /// The largest place in the middle of the area with the picture's aspect ratio. `cell_aspect` is the height
@@ -239,58 +232,6 @@ fn character(scaled: &Scaled<'_>, ramp: Ramp, inks: Inks<'_>, (x, y): (usize, us
     }
 }
 
-/// The picture at another size: means over the pixels covered, in linear light, weighted by how much of each is
-/// covered; where it grows, the pixel at the middle.
-fn rescaled(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
-    if (picture.width, picture.height) == (width, height) {
-        return Cow::Borrowed(&picture.pixels);
-    }
-    let columns: Vec<_> = (0..width).map(|i| covered(i, width, picture.width)).collect();
-    let rows: Vec<_> = (0..height).map(|i| covered(i, height, picture.height)).collect();
-    let mut pixels = Vec::with_capacity(width as usize * height as usize);
-    for row in &rows {
-        for column in &columns {
-            pixels.push(mean(picture, column, row));
-        }
-    }
-    Cow::Owned(pixels)
-}
-
-/// The source pixels under one target pixel along one axis, with the length of each that is covered.
-fn covered(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
-    if targets >= sources {
-        let middle = (u64::from(target) * 2 + 1) * u64::from(sources) / (2 * u64::from(targets.max(1)));
-        return vec![(u32::try_from(middle).unwrap_or(0), 1.0)];
-    }
-    let ratio = f64::from(sources) / f64::from(targets);
-    let (start, end) = (f64::from(target) * ratio, f64::from(target + 1) * ratio);
-    let last = (end.ceil() as u32).min(sources);
-    (start.floor() as u32..last)
-        .map(|source| {
-            let length = (f64::from(source + 1)).min(end) - f64::from(source).max(start);
-            (source, length as f32)
-        })
-        .filter(|(_, length)| *length > 0.0)
-        .collect()
-}
-
-fn mean(picture: &Picture, columns: &[(u32, f32)], rows: &[(u32, f32)]) -> [u8; 3] {
-    let at = |x: u32, y: u32| {
-        picture.pixels.get(y as usize * picture.width as usize + x as usize).copied().unwrap_or_default()
-    };
-    if let ([(x, _)], [(y, _)]) = (columns, rows) {
-        return at(*x, *y);
-    }
-    let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-    for (y, height) in rows {
-        for (x, width) in columns {
-            sum += srgb8_to_linear(at(*x, *y)) * (width * height);
-            weights += width * height;
-        }
-    }
-    (sum / weights).to_array().map(linear_to_srgb8)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -353,22 +294,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn shrinking_takes_the_mean_in_linear_light() {
-        let checks = picture(8, 8, |x, y| if (x + y) % 2 == 0 { [255; 3] } else { [0; 3] });
-        let half = linear_to_srgb8(0.5);
-        assert_eq!(rescaled(&checks, 4, 4).as_ref(), [[half; 3]; 16]);
-        let thirds = picture(3, 1, |x, _| if x == 0 { [255; 3] } else { [0; 3] });
-        // The first of two covers one white pixel and half a black one.
-        assert_eq!(rescaled(&thirds, 2, 1).as_ref(), [[linear_to_srgb8(2.0 / 3.0); 3], [0; 3]]);
-    }
-
-    #[test]
-    fn growing_repeats_pixels() {
-        let two = picture(2, 1, |x, _| if x == 0 { [1, 2, 3] } else { [4, 5, 6] });
-        assert_eq!(rescaled(&two, 4, 1).as_ref(), [[1, 2, 3], [1, 2, 3], [4, 5, 6], [4, 5, 6]]);
     }
 
     #[test]

@@ -25,10 +25,10 @@ const RAMP: [(char, f32); 15] = [
 ];
 const MOST_INK: f32 = RAMP[RAMP.len() - 1].1;
 
-/// How brightness becomes ink.
+/// Mapping of brightness to ink.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ramp {
-    /// What is shown as black and as white, in sRGB.
+    /// The values shown as black and as white, in sRGB.
     low: f32,
     high: f32,
     /// Whether the terminal's background is lighter than its foreground.
@@ -59,7 +59,7 @@ impl Ramp {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
 
-    /// The character for a colour, where there is only one ink.
+    /// The character for a colour, if there is only one ink.
     pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
         self.nearest(self.stretched(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
     }

@@ -13,7 +13,7 @@ const SMALL: f64 = 0.02;
 /// Fewer columns of a reason say nothing.
 const LEAST_WHY: u16 = 12;
 
-/// Sign, name, time, how much that changed, and why: where there is no room beside them, in lines of its own.
+/// Sign, name, time, its change, and the reason; in lines of its own if there is no room beside them.
 pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<Line> {
     let mut line = figures(state, stage, room);
     let why = why(state, stage);
@@ -49,14 +49,14 @@ fn width(line: &Line) -> u16 {
 }
 
 fn why(state: &State, stage: Stage) -> String {
-    let report = state.stages.get(stage as usize).and_then(Option::as_ref);
+    let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     visible(report.map_or("", |report| report.why.as_str())).into_owned()
 }
 
-/// Sign, name, time, and how much that changed where there is room.
+/// Sign, name, time, and its change if there is room.
 fn figures(state: &State, stage: Stage, room: u16) -> Line {
-    let report = state.stages.get(stage as usize).and_then(Option::as_ref);
-    let has_ended = !state.is_running();
+    let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
+    let has_ended = !state.work.is_running();
     let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
         None => ("·", Tone::Faint, String::new()),
         Some((Status::Running, _)) if has_ended => ("✗", Tone::Error, "stopped".to_owned()),
@@ -77,14 +77,16 @@ fn figures(state: &State, stage: Stage, room: u16) -> Line {
 
 /// Bold for what an edit made again.
 fn weight(state: &State, report: Option<&StageReport>) -> Tone {
-    let is_again = report.is_some_and(|it| it.status == Status::Done && state.renders > 0);
-    if is_again && state.edits > 0 { Tone::Strong } else { Tone::Plain }
+    let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
+    if is_again && state.saving.edits > 0 { Tone::Strong } else { Tone::Plain }
 }
 
 /// Against the last time that the stage was at work.
 fn change(state: &State, report: &StageReport) -> String {
     match report.status {
-        Status::Done => delta(report.seconds, state.before.get(report.name as usize).copied().flatten()),
+        Status::Done => {
+            delta(report.seconds, state.work.last_seconds.get(report.name as usize).copied().flatten())
+        }
         Status::Running | Status::Reused | Status::Skipped => String::new(),
     }
 }
@@ -92,10 +94,10 @@ fn change(state: &State, report: &StageReport) -> String {
 /// The stages that count, and how many were reused.
 pub(super) fn in_one_line(state: &State) -> Line {
     let total: f64 =
-        state.stages.iter().flatten().filter(|it| it.status == Status::Done).map(|it| it.seconds).sum();
+        state.work.stages.iter().flatten().filter(|it| it.status == Status::Done).map(|it| it.seconds).sum();
     let mut line = Line::new();
     let mut reused = 0;
-    for report in state.stages.iter().flatten() {
+    for report in state.work.stages.iter().flatten() {
         reused += usize::from(report.status == Status::Reused);
         if report.status == Status::Done && report.seconds >= SMALL * total {
             let comma = if line.is_empty() { "" } else { ", " };
@@ -116,7 +118,7 @@ pub(super) fn in_one_line(state: &State) -> Line {
     line
 }
 
-/// How much of an asset is loaded.
+/// Loaded fraction of an asset.
 pub(super) fn fraction(asset: &AssetBar) -> f64 {
     let progress = &asset.progress;
     if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }

@@ -10,7 +10,7 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 pub(super) use crate::pipeline::words::seconds;
 use crate::tui::color::ColorDepth;
 
-/// What a piece of text is. The colours are those of the terminal's own palette of 16, which follow its theme.
+/// Role of a piece of text. The colours are those of the terminal's own palette of 16, which follow its theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
@@ -102,13 +102,13 @@ pub(super) fn row(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
 
-/// What is left of a row to the right of the columns used.
+/// The rest of a row to the right of the columns used.
 pub(super) fn rest(area: Rect, used: u16) -> Rect {
     let used = used.min(area.width);
     Rect { x: area.x + used, width: area.width - used, ..area }
 }
 
-/// What fits of a text, with an ellipsis where it is cut.
+/// The text as far as it fits, with an ellipsis if it is cut.
 pub(in crate::tui) fn shortened(text: &str, room: u16) -> String {
     if columns(text) <= room {
         return text.to_owned();
@@ -125,7 +125,7 @@ pub(in crate::tui) fn shortened(text: &str, room: u16) -> String {
     if room == 0 { short } else { format!("{}…", short.trim_end()) }
 }
 
-/// Broken between words where that is possible.
+/// Breaks a text into lines, between words if possible.
 pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
@@ -169,8 +169,8 @@ pub(super) fn bytes(bytes: u64) -> String {
     }
 }
 
-/// How much longer or shorter a stage took than before: a number in the unit of its time, or with a unit of its own where it is far more
-/// than that; empty where that says nothing.
+/// Change of a stage's time: a number in the unit of its time, or with a unit of its own if the change is far greater; empty if
+/// it means nothing.
 pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     /// Times of the same work differ by so much.
     const NOISE: f64 = 0.05;

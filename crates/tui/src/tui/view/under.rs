@@ -24,41 +24,41 @@ const LEAST_BAR: u16 = 6;
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
     // What the newest picture took says nothing of an older one.
-    if message::is_said(state, layout) || state.history.is_open() {
+    if message::is_said(state, layout) || state.picture.history.is_open() {
         return;
     }
-    match state.activity {
+    match state.work.activity {
         Activity::Running { .. } => bar(state, layout, buffer),
         Activity::Done => summary(state, layout, buffer),
         Activity::Waiting | Activity::Cancelled => {}
         Activity::Broken if let Some(progress) = goes_on(state) => {
-            let words = format!("the last good scene is rendered on: {} %", percent(progress.fraction));
-            put(buffer, area, &[(&words, Tone::Faint)], state.depth);
+            let words = format!("the last good scene goes on: {} %", percent(progress.fraction));
+            put(buffer, area, &[(&words, Tone::Faint)], state.display.depth);
         }
-        Activity::Broken if state.picture.is_some() => {
+        Activity::Broken if state.picture.shown.is_some() => {
             put(
                 buffer,
                 area,
                 &[("the last good picture stays until the file is whole", Tone::Faint)],
-                state.depth,
+                state.display.depth,
             );
         }
         Activity::Broken => {}
     }
 }
 
-/// How far the last good scene is, which is rendered on while the file is broken.
+/// Progress of the last good scene, whose render goes on while the file is broken.
 pub(in crate::tui) fn goes_on(state: &State) -> Option<&RenderProgress> {
-    let is_broken = matches!(state.activity, Activity::Broken | Activity::Waiting);
-    state.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
+    let is_broken = matches!(state.work.activity, Activity::Broken | Activity::Waiting);
+    state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
-/// Of the loading asset or of the render.
+/// Draws the bar of the loading asset or of the render.
 fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
-    let time = state.running_for().map_or(String::new(), running);
+    let time = state.work.running_for(state.now).map_or(String::new(), running);
     let name = at_work(state).unwrap_or_default();
-    let (fraction, words) = match (&state.progress, state.assets.last()) {
+    let (fraction, words) = match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
             let samples = format!("{}/{} samples", progress.samples, progress.total_samples);
             (progress.fraction, format!("{samples} · {time}"))
@@ -69,20 +69,20 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
         (None, asset) => (asset.map_or(0.0, stages::fraction), time),
     };
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
-    let noise = state.progress.and_then(|progress| progress.noise);
+    let noise = state.work.progress.and_then(|progress| progress.noise);
     let fits = |noise: &String| room >= columns(noise) + 3 + LEAST_BAR;
     let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     if room < LEAST_BAR {
-        put(buffer, area, &[(&words, Tone::Plain)], state.depth);
+        put(buffer, area, &[(&words, Tone::Plain)], state.display.depth);
         return;
     }
-    let (filled, empty) = gauge(fraction, room, state.preview == PreviewKind::Ascii);
-    let (tone, gap) = (if state.paused { Tone::Warning } else { Tone::Working }, (" ", Tone::Plain));
+    let (filled, empty) = gauge(fraction, room, state.display.kind == PreviewKind::Ascii);
+    let (tone, gap) = (if state.work.paused { Tone::Warning } else { Tone::Working }, (" ", Tone::Plain));
     let pieces =
         [(name, Tone::Faint), gap, (&*filled, tone), (&*empty, Tone::Faint), gap, (&*words, Tone::Plain)];
-    put(buffer, area, &pieces, state.depth);
+    put(buffer, area, &pieces, state.display.depth);
 }
 
 /// `noise 2.1 %, 1 % in 14 s`, or shorter: called noise, as what is free of it may still be far from right.
@@ -94,7 +94,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
     [next.unwrap_or_else(|| now.clone()), now]
 }
 
-/// The stages in one line, and what else is to be told where it is not in the panel.
+/// Draws the stages in one line, and the other facts that the panel does not show.
 fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
     let mut pieces = stages::in_one_line(state);
@@ -114,48 +114,53 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
         }
     }
     let pieces: Vec<(&str, Tone)> = pieces.iter().map(|(text, tone)| (&**text, *tone)).collect();
-    let used = put(buffer, area, &pieces, state.depth);
+    let used = put(buffer, area, &pieces, state.display.depth);
     let free = rest(area, used + 2);
     let words = [hint(state), SHORT_HINT.to_owned()];
-    if layout.panel.is_empty() && state.edits == 0 {
+    if layout.panel.is_empty() && state.saving.edits == 0 {
         let fitting = words.into_iter().find(|words| columns(words) <= free.width);
-        put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.depth);
+        put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
         return;
     }
     let fitting = frame(state).into_iter().find(|words| columns(words) <= free.width);
-    let used = put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.depth);
+    let used = put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
     let seen = seen(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
-    put_right(buffer, free, &seen, Tone::Faint, state.depth);
+    put_right(buffer, free, &seen, Tone::Faint, state.display.depth);
 }
 
 /// The files that hold the picture at hand.
 pub(super) fn files(state: &State) -> impl Iterator<Item = &Written> {
-    state.written.iter().filter(|written| state.is_written() || written.generation == state.generation)
+    state
+        .saving
+        .written
+        .iter()
+        .filter(|written| state.request.is_written() || written.generation == state.request.generation)
 }
 
-/// Whether the picture at hand is one that is written when it is asked for, and was not.
+/// Whether the current picture is one that only a key writes, and that no key has written.
 pub(super) fn is_in_no_file(state: &State) -> bool {
-    !state.is_written() && files(state).next().is_none()
+    !state.request.is_written() && files(state).next().is_none()
 }
 
 /// From the save to the first changed cell.
 pub(super) fn seen(state: &State) -> Option<String> {
-    state.first_change.map(|time| format!("saved → seen {}", duration(time)))
+    state.saving.first_change.map(|time| format!("saved → seen {}", duration(time)))
 }
 
-/// What somebody who has not saved yet may not know.
+/// A hint for a person who has not saved yet.
 pub(super) fn hint(state: &State) -> String {
-    if state.edits > 0 {
+    if state.saving.edits > 0 {
         return String::new();
     }
-    let name = state.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    format!("save {} and it is rendered again", visible(&name))
+    let name =
+        state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    format!("save {} to render again", visible(&name))
 }
 
-/// What the last picture took on its way: its size, and how long the terminal takes to answer; in full and in short.
+/// Cost of the last picture on its way: its size, and the terminal's time to answer; in full and in short.
 fn frame(state: &State) -> Vec<String> {
-    let Some(frame) = state.frame else { return Vec::new() };
+    let Some(frame) = state.display.frame else { return Vec::new() };
     let size = format!("{} kB", frame.bytes.div_ceil(1000));
     match frame.round_trip.map(|time| time.as_millis().max(1)) {
         Some(time) => vec![format!("{size} sent, answered in {time} ms"), format!("{size} {time} ms"), size],

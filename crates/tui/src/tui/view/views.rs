@@ -1,4 +1,4 @@
-//! The list of views, for a moment after one was chosen: in the panel where that has room, else over the picture.
+//! The list of views, for a moment after one was chosen: in the panel if that has room, else over the picture.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -16,7 +16,7 @@ const WIDTH: u16 = 16;
 pub(in crate::tui) const DIGITS: usize = 9;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
-    let current = View::ALL.iter().position(|view| *view == state.view()).unwrap_or(0);
+    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
     let area = area(layout).intersection(buffer.area);
     if area.is_empty() {
         return;
@@ -48,7 +48,7 @@ fn line(state: &State, number: usize, current: usize, place: Rect, buffer: &mut 
     let name = format!(" {:<11}", View::ALL[number].name());
     let tone = if is_current { Tone::Chosen } else { Tone::Plain };
     let pieces = [(sign, Tone::Strong), (&*digit, Tone::Strong), (&*name, tone)];
-    put(buffer, place, &pieces, state.depth);
+    put(buffer, place, &pieces, state.display.depth);
 }
 
 /// One column in a panel that is high enough, else two or what there is room for.

@@ -69,12 +69,12 @@ impl Key<'_> {
     }
 }
 
-/// What follows the last dot of a path, in small letters; may be empty.
+/// Ending of a path after its last dot, in small letters; may be empty.
 fn ending(text: &str) -> String {
     Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-/// What is wrong with a file, and whether it is that there is none of this name.
+/// The reason why a file cannot be used, and whether the reason is that it does not exist.
 fn regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
     match file::kind(path) {

@@ -21,7 +21,7 @@ use super::table::Table;
 use crate::math::DVec3;
 use mesh::MeshFiles;
 
-/// What reads the table of a shape; only meshes touch the list of files.
+/// Reader of a shape's table; only meshes touch the list of files.
 type Reader = fn(&Table<'_>, &mut MeshFiles) -> Option<Shape>;
 
 /// The kinds; the description has the shapes in the order of the file.

@@ -8,7 +8,7 @@ use super::super::table::Table;
 use super::span_area;
 use crate::math::DVec3;
 
-/// Of a triangle that does not say.
+/// Corners of a triangle that has none.
 const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
 
 pub(super) fn read(table: &Table<'_>) -> Option<Shape> {

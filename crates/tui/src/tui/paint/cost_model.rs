@@ -1,11 +1,10 @@
-//! What a byte is worth in error.
+//! The price of a byte in error.
 
 use super::shade::Shade;
 
-/// How bytes are weighed against error. The error of a half of a cell is the sum of the squared differences of its
-/// channels.
+/// Weights of bytes against error. The error of a half of a cell is the sum of the squared differences of its channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Taste {
+pub(super) struct CostModel {
     /// Error that a byte may save.
     pub(super) byte: f32,
     /// No channel may be farther off than this.
@@ -14,7 +13,7 @@ pub(super) struct Taste {
     pub(super) spans: &'static [u8],
 }
 
-impl Taste {
+impl CostModel {
     /// Every colour to 1/255.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
@@ -57,11 +56,11 @@ mod tests {
     #[test]
     fn errors_are_sums_of_squares_up_to_a_limit() {
         let (a, b) = (Shade::Rgb([10, 20, 30]), Shade::Rgb([11, 20, 32]));
-        assert_eq!(Taste::MOVING.error(a, b), 5.0);
-        assert_eq!(Taste::EXACT.error(a, b), f32::INFINITY);
-        assert_eq!(Taste::EXACT.error(a, Shade::Rgb([9, 21, 30])), 2.0);
-        assert_eq!(Taste::MOVING.error(Shade::Palette(16), Shade::Rgb([1, 1, 0])), 2.0);
-        assert_eq!(Taste::MOVING.error(Shade::Ground, Shade::Palette(0)), f32::INFINITY);
-        assert_eq!(Taste::MOVING.error(Shade::Ground, Shade::Ground), 0.0);
+        assert_eq!(CostModel::MOVING.error(a, b), 5.0);
+        assert_eq!(CostModel::EXACT.error(a, b), f32::INFINITY);
+        assert_eq!(CostModel::EXACT.error(a, Shade::Rgb([9, 21, 30])), 2.0);
+        assert_eq!(CostModel::MOVING.error(Shade::Palette(16), Shade::Rgb([1, 1, 0])), 2.0);
+        assert_eq!(CostModel::MOVING.error(Shade::Ground, Shade::Palette(0)), f32::INFINITY);
+        assert_eq!(CostModel::MOVING.error(Shade::Ground, Shade::Ground), 0.0);
     }
 }

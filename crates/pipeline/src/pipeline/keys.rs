@@ -1,5 +1,5 @@
-//! What the later stages read of a scene. Places in the file and names are not among it, so that comments, order of
-//! keys and unused tables change nothing.
+//! Keys of the values that later stages read of a scene. They leave out places in the file and names, so that comments, the order
+//! of keys and unused tables change nothing.
 
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
@@ -7,7 +7,7 @@ use crate::math::DVec3;
 use crate::scene::description::{Accel, Camera, Render, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
-/// What the descriptions of a scene refer to by index.
+/// Textures, meshes and orbiter that descriptions refer to by index.
 pub(in crate::pipeline) fn referents<'a>(
     scene: &'a Scene,
     meshes: &'a [Key],
@@ -16,12 +16,12 @@ pub(in crate::pipeline) fn referents<'a>(
     Referents { textures: &scene.textures, meshes, orbiter }
 }
 
-/// What a mesh's tree is built of.
+/// Key of a mesh's tree.
 pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
     Fingerprint::new("tree").key(mesh).choice(accel).finish()
 }
 
-/// What trees are built over, and which.
+/// Key of all geometry in trees.
 pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
     in_trees(&from(&shapes(scene, of), origin), scene.render.accel)
 }
@@ -31,7 +31,7 @@ fn from(of: &Key, origin: DVec3) -> Key {
     Fingerprint::new("from").key(of).dvec3(origin).finish()
 }
 
-/// What is made of these things with trees of a kind.
+/// Key of geometry in trees of a kind.
 pub(in crate::pipeline) fn in_trees(of: &Key, accel: Accel) -> Key {
     Fingerprint::new("in trees").key(of).choice(accel).finish()
 }

@@ -2,12 +2,12 @@
 //!
 //! A cell can be left as it is or be drawn: by one of four glyphs, with the pen as it is or with one or both of its
 //! colours changed. What that costs depends on the pen and on where the cursor was left, so that the best way
-//! to a cell is kept for each of a few pens (a beam search of Viterbi's trellis), and the cheapest end is traced back.
+//! to a cell is kept for each of a few pens (a beam search of Viterbi's row_optimizer), and the cheapest end is traced back.
 
 use super::candidates::{Candidates, candidates};
+use super::cost_model::CostModel;
 use super::look::{Glyph, Mosaic};
 use super::shade::{Layer, Shade, digits};
-use super::taste::Taste;
 use crate::tui::mosaic::{PLACES, Tile};
 
 /// Ways that are kept from cell to cell.
@@ -24,7 +24,7 @@ pub(super) struct Target {
     pub(super) shown: Option<Mosaic>,
 }
 
-/// Where a row begins.
+/// Pen and cursor at the beginning of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     pub(super) fg: Shade,
@@ -53,7 +53,7 @@ struct Way {
     bytes: u32,
     /// Bytes and errors.
     cost: f32,
-    /// Of the ways to the cell before.
+    /// Index among the ways to the cell before.
     parent: usize,
     /// None: the cell was left.
     glyph: Option<Glyph>,
@@ -90,15 +90,15 @@ impl Gap {
     }
 }
 
-/// What is drawn in a row.
+/// Strokes of a row.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub(super) dabs: Vec<Dab>,
     pub(super) bytes: u32,
 }
 
-/// What leads through the row at the least cost.
-pub(super) fn row(targets: &[Target], start: Start, taste: Taste) -> Row {
+/// The way through the row at the least cost.
+pub(super) fn row(targets: &[Target], start: Start, model: CostModel) -> Row {
     let gap = if start.is_there { Gap::Cells(0) } else { Gap::Far };
     let Start { fg, bg, .. } = start;
     let first = Way { fg, bg, pen: pen(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
@@ -106,18 +106,18 @@ pub(super) fn row(targets: &[Target], start: Start, taste: Taste) -> Row {
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
         let last = &ways[column];
-        ways.push(step(last, *target, &wanted[column..], taste));
+        ways.push(step(last, *target, &wanted[column..], model));
     }
     trace(&ways, &wanted)
 }
 
 /// The ways on to the next cell.
-fn step(last: &[Way], target: Target, wanted: &[Option<Mosaic>], taste: Taste) -> Vec<Way> {
-    let mut beam = Beam { ways: Vec::with_capacity(BEAM), limit: MOST_BYTES * taste.byte };
+fn step(last: &[Way], target: Target, wanted: &[Option<Mosaic>], model: CostModel) -> Vec<Way> {
+    let mut beam = Beam { ways: Vec::with_capacity(BEAM), limit: MOST_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => {
-            shown.against(wanted).map(|(shown, wanted, part)| part * taste.error(shown, wanted)).sum()
+            shown.against(wanted).map(|(shown, wanted, part)| part * model.error(shown, wanted)).sum()
         }
         (Some(_), None) => f32::INFINITY,
     };
@@ -128,13 +128,13 @@ fn step(last: &[Way], target: Target, wanted: &[Option<Mosaic>], taste: Taste) -
     }
     let Some(mosaic) = target.wanted else { return beam.ways };
     // What is near enough is not worth a new colour, but may be drawn again instead of jumped over.
-    let changes = if leave <= taste.byte { Candidates::default() } else { candidates(wanted, taste) };
-    let changes = Changes::new(&changes, mosaic, taste);
+    let changes = if leave <= model.byte { Candidates::default() } else { candidates(wanted, model) };
+    let changes = Changes::new(&changes, mosaic, model);
     for (parent, way) in last.iter().enumerate() {
         changes.turn_one(parent, way, &mut beam);
     }
     // Where both colours are set, nothing is left of the pen: the cheapest way goes on.
-    let base = |way: &Way| way.cost + way.gap.bytes() as f32 * taste.byte;
+    let base = |way: &Way| way.cost + way.gap.bytes() as f32 * model.byte;
     if let Some((parent, way)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
     {
         changes.turn_both(parent, way, &mut beam);
@@ -179,27 +179,27 @@ impl Beam {
 #[derive(Clone, Copy)]
 struct Change {
     shade: Shade,
-    /// Of the parameters of SGR.
+    /// Bytes of the SGR parameters.
     bytes: u32,
     /// In the first and the second part.
     errors: [f32; 2],
 }
 
-/// What may be drawn at a cell.
+/// Changes that may be drawn at a cell.
 struct Changes {
     mosaic: Mosaic,
-    taste: Taste,
+    model: CostModel,
     all: Vec<Change>,
-    /// So many of them are for the first part, and up to here for the second one.
+    /// Number of changes of the first part; those of the second part follow.
     first: usize,
     second: usize,
 }
 
 impl Changes {
-    fn new(candidates: &Candidates, mosaic: Mosaic, taste: Taste) -> Self {
+    fn new(candidates: &Candidates, mosaic: Mosaic, model: CostModel) -> Self {
         let Candidates { first, second, both } = candidates;
         let mut changes =
-            Self { mosaic, taste, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
+            Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
         let change =
             |shade: &Shade| Change { shade: *shade, bytes: shade.length(), errors: changes.errors(*shade) };
         changes.all = first.iter().chain(second).chain(both).map(change).collect();
@@ -211,7 +211,7 @@ impl Changes {
         let sizes = self.mosaic.tile.sizes();
         std::array::from_fn(|part| {
             let share = 2.0 * sizes[part] as f32 / PLACES as f32;
-            share * self.taste.error(shade, self.mosaic.pair[part])
+            share * self.model.error(shade, self.mosaic.pair[part])
         })
     }
 
@@ -264,19 +264,19 @@ struct End<'a> {
     parent: usize,
     /// With those that lead to the cell.
     bytes: u32,
-    /// Of the cells before.
+    /// Error of the cells before.
     error: f32,
     /// The price of a byte.
     byte: f32,
     tile: Tile,
     beam: &'a mut Beam,
-    /// Of the beam.
+    /// Bound of the beam.
     bound: f32,
 }
 
 impl<'a> End<'a> {
     fn new(changes: &Changes, parent: usize, way: &Way, beam: &'a mut Beam) -> Self {
-        let byte = changes.taste.byte;
+        let byte = changes.model.byte;
         let error = way.cost - way.bytes as f32 * byte;
         let bound = beam.bound();
         let tile = changes.mosaic.tile;
@@ -383,8 +383,11 @@ mod tests {
 
     #[test]
     fn the_pen_is_turned_once_and_blanks_are_preferred() {
-        let found =
-            row(&wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]), start(BLACK, Shade::Ground), Taste::EXACT);
+        let found = row(
+            &wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]),
+            start(BLACK, Shade::Ground),
+            CostModel::EXACT,
+        );
         let glyphs: Vec<Glyph> = found.dabs.iter().map(|dab| dab.glyph).collect();
         assert_eq!(glyphs, [Glyph::Blank, Glyph::Blank, Glyph::First]);
         // ESC [ 48;2;200;0;0 m and the glyphs.
@@ -397,11 +400,11 @@ mod tests {
         for target in &mut targets[1..8] {
             target.shown = Some(Mosaic::halves([RED, Shade::Rgb([1, 1, 1])]));
         }
-        let found = row(&targets, start(RED, BLACK), Taste::EXACT);
+        let found = row(&targets, start(RED, BLACK), CostModel::EXACT);
         let columns: Vec<usize> = found.dabs.iter().map(|dab| dab.column).collect();
         assert_eq!((columns, found.bytes), (vec![0, 8], 3 + 4 + 3));
         // A gap of one cell is drawn again, which is no longer than a jump and leaves it nearer to what is wanted.
-        let found = row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), Taste::EXACT);
+        let found = row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), CostModel::EXACT);
         assert_eq!((found.dabs.len(), found.bytes), (3, 9));
     }
 
@@ -411,7 +414,7 @@ mod tests {
             [[RED, Shade::Ground], [Shade::Ground, RED], [Shade::Ink, Shade::Ground], [Shade::Ink; 2]]
         {
             let targets = [Target { wanted: Some(Mosaic::halves(halves)), shown: None }];
-            let found = row(&targets, start(BLACK, BLACK), Taste::MOVING);
+            let found = row(&targets, start(BLACK, BLACK), CostModel::MOVING);
             assert_eq!(found.dabs.first().map(|dab| dab.mosaic.pair), Some(halves));
         }
     }
@@ -448,8 +451,8 @@ mod tests {
             is_exact in any::<bool>(),
         ) {
             let targets: Vec<Target> = cells.iter().map(|(wanted, shown)| Target { wanted: *wanted, shown: *shown }).collect();
-            let taste = if is_exact { Taste::EXACT } else { Taste::MOVING };
-            let found = row(&targets, start(Shade::Ink, Shade::Ground), taste);
+            let model = if is_exact { CostModel::EXACT } else { CostModel::MOVING };
+            let found = row(&targets, start(Shade::Ink, Shade::Ground), model);
             let mut screen: Vec<Option<Mosaic>> = targets.iter().map(|target| target.shown).collect();
             for dab in &found.dabs {
                 prop_assert!(targets[dab.column].wanted.is_some(), "a cell of another's");
@@ -461,8 +464,8 @@ mod tests {
                 let shown = shown.expect("a cell that was unknown is drawn");
                 for (shown, wanted, part) in shown.against(wanted) {
                     // More than that in one channel is worth any bytes.
-                    let most = if is_exact { 3.0 } else { Taste::MOVING.byte * 120.0 };
-                    prop_assert!(part * taste.error(shown, wanted) <= most);
+                    let most = if is_exact { 3.0 } else { CostModel::MOVING.byte * 120.0 };
+                    prop_assert!(part * model.error(shown, wanted) <= most);
                 }
             }
         }

@@ -8,21 +8,21 @@ use crate::pipeline::settings::View;
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
-/// What was written, its samples and its seconds, what came after it, and what is not kept of it.
+/// The files written, with their samples and seconds; events after them; and changes that are discarded.
 pub(super) fn words(state: &State) -> String {
-    let files = match &state.write_failed {
+    let files = match &state.saving.write_failed {
         Some(failed) => unwritten(state, failed),
-        None => files(&state.written) + &since(state),
+        None => files(&state.saving.written) + &since(state),
     };
-    let not_kept = if state.toggles.camera.is_any() { "; the camera was moved and is not kept" } else { "" };
+    let not_kept = if state.request.toggles.camera.is_any() { "; camera changes discarded" } else { "" };
     files + not_kept
 }
 
-/// What came after the files that were written.
+/// Events after the files were written.
 fn since(state: &State) -> String {
-    let is_after = state.written.iter().any(|written| written.generation != state.generation);
+    let is_after = state.saving.written.iter().any(|written| written.generation != state.request.generation);
     let next = if is_after { "the render after it" } else { "the render" };
-    match (state.activity, &state.progress) {
+    match (state.work.activity, &state.work.progress) {
         // Views and moved cameras are shown, not written.
         (Activity::Done, _) if is_saved_since(state) => "; that was before the last save".to_owned(),
         (Activity::Done, _) => String::new(),
@@ -31,19 +31,20 @@ fn since(state: &State) -> String {
         }
         (Activity::Running { .. } | Activity::Cancelled, None) => format!("; {next} was stopped"),
         (Activity::Waiting | Activity::Broken, _) => {
-            let name = state.scene.file_name().unwrap_or_default().to_string_lossy();
+            let name = state.request.scene.file_name().unwrap_or_default().to_string_lossy();
             format!("; {} has errors since", visible(&name))
         }
     }
 }
 
-/// Whether the files that were written are of a scene that has changed since.
+/// Whether the scene has changed since the files were written.
 fn is_saved_since(state: &State) -> bool {
-    let newest = state.written.iter().map(|written| written.generation).max();
-    !state.is_written() && newest.zip(state.saved).is_some_and(|(newest, saved)| newest < saved)
+    let newest = state.saving.written.iter().map(|written| written.generation).max();
+    !state.request.is_written()
+        && newest.zip(state.saving.last_visible_edit).is_some_and(|(newest, saved)| newest < saved)
 }
 
-/// What was written, and what it is; files that hold the same together.
+/// The files written and their descriptions; files of the same picture stand together.
 fn files(written: &[Written]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made);
     let said: Vec<String> = alike
@@ -58,10 +59,10 @@ fn files(written: &[Written]) -> String {
     if said.is_empty() { "nothing is written".to_owned() } else { said.join("; ") }
 }
 
-/// What is not on disk, and why; what else was written, of the same picture and of earlier ones.
+/// The picture that is not on disk, and why; and the other files written, of the same picture and of earlier ones.
 fn unwritten(state: &State, failed: &Unwritten) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
-    for written in &state.written {
+    for written in &state.saving.written {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         let is_new = written.generation >= failed.generation;
         words += if is_new { "; wrote " } else { "; wrote an earlier one to " };
@@ -70,7 +71,7 @@ fn unwritten(state: &State, failed: &Unwritten) -> String {
     words
 }
 
-/// What a picture is and what it took. One whose samples were there already took its time before.
+/// A picture and its cost, in words. A picture whose samples were there already had its cost before.
 pub(super) fn made(report: &Report) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
@@ -84,7 +85,7 @@ pub(super) fn made(report: &Report) -> String {
     format!("{view}{comma}{}×{}, {samples} samples, {time}", image.width, image.height)
 }
 
-/// What is shown, where it is not the picture itself.
+/// The view, unless it is beauty.
 pub(super) fn view(view: View) -> String {
     if view == View::Beauty { String::new() } else { format!("view {}", view.name()) }
 }
@@ -111,7 +112,7 @@ mod tests {
         let mut desk = Desk::new();
         desk.finish([200, 30, 30]);
         desk.press('r');
-        let begun = desk.state.generation;
+        let begun = desk.state.request.generation;
         desk.worker(Event::Started { generation: begun });
         desk.press('l');
         desk.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1 });
@@ -123,7 +124,7 @@ mod tests {
         desk.worker(done(begun, Vec::new(), false));
         desk.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&desk.state), format!("{made}; the camera was moved and is not kept"));
+        assert_eq!(words(&desk.state), format!("{made}; camera changes discarded"));
         assert!(desk.text().contains("unwritten: w writes it"), "of the one at hand: {}", desk.text());
     }
 
@@ -131,7 +132,7 @@ mod tests {
     fn the_seconds_are_those_of_the_picture_in_the_file() {
         let mut desk = Desk::new();
         let write = |desk: &mut Desk, seconds: f64, rendered: f64| {
-            let generation = desk.state.generation;
+            let generation = desk.state.request.generation;
             desk.worker(Event::Started { generation });
             desk.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1 });
             desk.worker(done_as(generation, |report| {
@@ -153,7 +154,7 @@ mod tests {
         desk.finish([200, 30, 30]);
         let own = words(&desk.state);
         desk.press('v');
-        let generation = desk.state.generation;
+        let generation = desk.state.request.generation;
         desk.worker(Event::Started { generation });
         desk.worker(done_as(generation, |report| {
             (report.settings.view, report.seconds, report.image.render_seconds) = (View::Normal, 0.5, 0.4);
@@ -180,10 +181,10 @@ mod tests {
             desk.finish([30, 30, 200]);
             let after = words(&desk.state);
             assert!(after.starts_with(&format!("{made}; that was before the last save")), "{key}: {after}");
-            assert_eq!(after.contains("the camera was moved and is not kept"), key == 'l', "{after}");
+            assert_eq!(after.contains("camera changes discarded"), key == 'l', "{after}");
             // A save that changes nothing does not make it newer.
             desk.event(crate::tui::event::Event::Changed(Changed { noticed: desk.now }));
-            let generation = desk.state.generation;
+            let generation = desk.state.request.generation;
             desk.worker(Event::Started { generation });
             desk.worker(done(generation, Vec::new(), true));
             assert_eq!(words(&desk.state), after);
@@ -194,7 +195,7 @@ mod tests {
     fn what_could_not_be_written_is_told_whatever_is_shown_since() {
         let mut desk = Desk::new();
         let fail = |desk: &mut Desk| {
-            let generation = desk.state.generation;
+            let generation = desk.state.request.generation;
             desk.worker(Event::Started { generation });
             desk.worker(Event::WriteFailed {
                 generation,
@@ -206,7 +207,7 @@ mod tests {
         let failed = "not written: cannot write a.png: no space";
         for key in ['l', 'v', '?'] {
             desk.press(key);
-            let generation = desk.state.generation;
+            let generation = desk.state.request.generation;
             desk.worker(Event::Started { generation });
             assert!(words(&desk.state).starts_with(failed), "{key}");
             desk.worker(finished(generation, Status::Skipped));
@@ -218,10 +219,10 @@ mod tests {
             fail(&mut desk);
             assert_eq!(words(&desk.state), failed);
             desk.press('r');
-            let generation = desk.state.generation;
+            let generation = desk.state.request.generation;
             desk.worker(Event::Started { generation });
             desk.worker(finished(generation, status));
-            assert!(desk.state.write_failed.is_none(), "{status:?}");
+            assert!(desk.state.saving.write_failed.is_none(), "{status:?}");
         }
     }
 

@@ -1,6 +1,6 @@
 //! The films of the last settings: a toggle that is switched back finds its film again.
 
-use super::canvas::Canvas;
+use super::film_state::FilmState;
 use crate::scene::fingerprint::Key;
 
 /// Memory for films that are not the current one.
@@ -8,25 +8,25 @@ const MOST_KEPT_BYTES: u64 = 256 << 20;
 
 /// The current film and those before it.
 #[derive(Debug)]
-pub(in crate::pipeline) struct Films {
-    current: Option<Canvas>,
+pub(in crate::pipeline) struct FilmCache {
+    current: Option<FilmState>,
     /// The least recently used first.
-    kept: Vec<Canvas>,
+    kept: Vec<FilmState>,
     most_kept_bytes: u64,
 }
 
-impl Default for Films {
+impl Default for FilmCache {
     fn default() -> Self {
         Self { current: None, kept: Vec::new(), most_kept_bytes: MOST_KEPT_BYTES }
     }
 }
 
-impl Films {
-    pub(in crate::pipeline) fn current(&self) -> Option<&Canvas> {
+impl FilmCache {
+    pub(in crate::pipeline) fn current(&self) -> Option<&FilmState> {
         self.current.as_ref()
     }
 
-    pub(in crate::pipeline) fn current_mut(&mut self) -> Option<&mut Canvas> {
+    pub(in crate::pipeline) fn current_mut(&mut self) -> Option<&mut FilmState> {
         self.current.as_mut()
     }
 
@@ -35,9 +35,9 @@ impl Films {
         self.kept.iter().chain(&self.current).any(|canvas| canvas.key == key)
     }
 
-    /// The film of this key becomes the current one if it is kept and of use; else there is none. The one before is
-    /// kept where there is room for it.
-    pub(super) fn select(&mut self, key: Key, is_usable: impl FnOnce(&Canvas) -> bool) {
+    /// Makes the film of this key the current one, if it is kept and of use; else there is no current film. Keeps the film
+    /// before, if there is room.
+    pub(in crate::pipeline) fn select(&mut self, key: Key, is_usable: impl FnOnce(&FilmState) -> bool) {
         if self.current.as_ref().is_none_or(|current| current.key != key) {
             let kept = self.kept.iter().position(|canvas| canvas.key == key);
             let found = kept.map(|index| self.kept.remove(index));
@@ -52,7 +52,10 @@ impl Films {
     ///
     /// # Errors
     /// Those of `make`.
-    pub(super) fn put<E>(&mut self, make: impl Fn() -> Result<Canvas, E>) -> Result<&mut Canvas, E> {
+    pub(in crate::pipeline) fn put<E>(
+        &mut self,
+        make: impl Fn() -> Result<FilmState, E>,
+    ) -> Result<&mut FilmState, E> {
         self.current = None;
         let canvas = match make() {
             Err(_) if !self.kept.is_empty() => {
@@ -64,25 +67,25 @@ impl Films {
         Ok(self.current.insert(canvas))
     }
 
-    /// How many there are.
+    /// Number of films.
     pub(in crate::pipeline) fn count(&self) -> usize {
         self.kept.len() + usize::from(self.current.is_some())
     }
 
     /// Bytes that all of them take.
     pub(in crate::pipeline) fn memory_bytes(&self) -> u64 {
-        self.kept.iter().chain(&self.current).map(Canvas::memory_bytes).sum()
+        self.kept.iter().chain(&self.current).map(FilmState::memory_bytes).sum()
     }
 
     /// One too large for the budget is dropped alone; the others make room for one that is not.
-    fn keep(&mut self, canvas: Canvas) {
+    fn keep(&mut self, canvas: FilmState) {
         let size = canvas.memory_bytes();
         // A camera on its way would fill the memory with what nobody comes back to.
         let is_left_behind = canvas.is_passing && !canvas.is_covered();
         if size > self.most_kept_bytes || is_left_behind || !canvas.is_begun() {
             return;
         }
-        while self.kept.iter().map(Canvas::memory_bytes).sum::<u64>() + size > self.most_kept_bytes {
+        while self.kept.iter().map(FilmState::memory_bytes).sum::<u64>() + size > self.most_kept_bytes {
             self.kept.remove(0);
         }
         self.kept.push(canvas);
@@ -103,17 +106,17 @@ mod tests {
         Fingerprint::new(name).finish()
     }
 
-    /// Of 64×32 pixels, with samples.
-    fn canvas(name: &str) -> Canvas {
+    /// A film of 64×32 pixels, with samples.
+    fn canvas(name: &str) -> FilmState {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
-        let mut canvas = Canvas::new(key(name), &plan, u64::MAX, Convergence::Stratified).expect("a film");
+        let mut canvas = FilmState::new(key(name), &plan, u64::MAX, Convergence::Stratified).expect("a film");
         canvas.done.fill([1; 2]);
         canvas
     }
 
-    fn films(names: &[&str], most_kept_bytes: u64) -> Films {
-        let mut films = Films { most_kept_bytes, ..Films::default() };
+    fn films(names: &[&str], most_kept_bytes: u64) -> FilmCache {
+        let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
         for name in names {
             films.select(key(name), |_| true);
             films.put(|| Ok::<_, ()>(canvas(name))).expect("a film");
@@ -121,7 +124,7 @@ mod tests {
         films
     }
 
-    fn finds(films: &mut Films, name: &str) -> bool {
+    fn finds(films: &mut FilmCache, name: &str) -> bool {
         films.select(key(name), |_| true);
         films.current().is_some_and(|current| current.key == key(name))
     }

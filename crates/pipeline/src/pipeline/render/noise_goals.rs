@@ -1,76 +1,68 @@
-//! Which parts of a picture have enough samples.
+//! Goals by noise: which parts of a picture have enough samples.
 //!
-//! To stop by the same samples that the picture is the mean of would make it too dark: what is rare and bright ends no sampling
-//! where it was not met yet, and goes on where it was. So one half of a tile, which has every other pixel, stops by the noise of the
-//! other half, whose samples are others; the noise of both is much the same. A little of the bias is left, as a half
-//! that has stopped tells the other no more: a tenth of it, which is a thirtieth of the noise where that is worst.
+//! A picture whose samples decide by themselves when they stop is too dark: rare bright samples end no sampling before they are
+//! met, and prolong it once they are. So each half of a tile, every other pixel, stops by the noise of the other half, whose
+//! samples are independent and about as noisy. A tenth of the bias is left, as a half that has stopped tells the other no more;
+//! at worst that is a thirtieth of the noise.
 
 use crate::film::{CELLS, Convergence, Film, HalfNoise, samples_by};
 
 /// Samples before which noise is not asked for.
-pub(super) const LEAST: u32 = 16;
+pub(in crate::pipeline) const LEAST: u32 = 16;
 
 /// The part of the noise asked for that is aimed at: what is measured low by chance stops early.
-const AIM: f64 = 0.85;
+pub(in crate::pipeline) const AIM: f64 = 0.85;
 
-/// The part of the noise asked for from which it is told to be missed: beyond what chance does to what is measured.
+/// Ratio to the requested error from which a tile counts as missed: above the chance errors of the measurement.
 const TOO_MUCH: f64 = 1.5;
 
-/// How many times smaller the variance gets from two to four samples and from four to eight, where nothing tells it: of half of the tiles
-/// of the bundled scenes more, of the others less.
-const EARLY_FALL: f64 = 4.0;
-/// Between which it is believed.
-const FALLS: [f64; 2] = [2.0, 8.0];
-
-/// As many samples as are ever expected; above it stands what nobody knows.
-const MOST: u32 = u32::MAX - 1;
+/// Most samples ever expected; [`u32::MAX`] means unknown.
+pub(in crate::pipeline) const MOST: u32 = u32::MAX - 1;
 
 /// The least brightness that noise is held against, as a part of the picture's.
 const LEAST_BRIGHTNESS: f64 = 0.01;
 
 /// Samples that the halves of each cell are to have.
 #[derive(Debug)]
-pub(super) struct Goals {
-    /// What is decided; [`u32::MAX`] before.
+pub(in crate::pipeline) struct Goals {
+    /// Decided goals; [`u32::MAX`] while undecided.
     decided: Vec<[u32; 2]>,
-    /// What is expected to be.
-    expected: Vec<[u32; 2]>,
     /// Mean luminance of the picture, when noise was first asked for.
     brightness: Option<f64>,
 }
 
 impl Goals {
     /// For so many cells, of which nothing is known.
-    pub(super) fn none(cells: usize) -> Self {
-        let open = vec![[u32::MAX; 2]; cells];
-        Self { decided: open.clone(), expected: open, brightness: None }
+    pub(in crate::pipeline) fn none(cells: usize) -> Self {
+        Self { decided: vec![[u32::MAX; 2]; cells], brightness: None }
     }
 
     /// Samples that a half of a cell is to have at most.
-    pub(super) fn of(&self, cell: usize, half: usize) -> u32 {
+    pub(in crate::pipeline) fn of(&self, cell: usize, half: usize) -> u32 {
         self.decided[cell][half]
     }
 
-    /// Samples that it is expected to get; [`u32::MAX`] where nothing is known.
-    pub(super) fn expected(&self, cell: usize, half: usize) -> u32 {
-        self.expected[cell][half]
-    }
-
     /// Bytes that they take.
-    pub(super) fn memory_bytes(&self) -> usize {
-        size_of_val(self.decided.as_slice()) + size_of_val(self.expected.as_slice())
+    pub(in crate::pipeline) fn memory_bytes(&self) -> usize {
+        size_of_val(self.decided.as_slice())
     }
 
     /// Whether any half gets fewer samples than these.
-    pub(super) fn are_below(&self, samples: u32) -> bool {
+    pub(in crate::pipeline) fn are_below(&self, samples: u32) -> bool {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
     /// Decide for every half that has no goal yet and has now `samples`, a power of two, by the noise of the other one. `done` are
     /// the samples that all of them have. Before all have enough of them for the picture's brightness, nothing is decided. In a pool
     /// its threads share the work.
-    pub(super) fn judge(&mut self, film: &Film, done: &[[u32; 2]], samples: u32, error: f64) {
-        let Some(brightness) = self.brightness.or_else(|| film.mean_luminance()) else { return };
+    pub(in crate::pipeline) fn judge(
+        &mut self,
+        film: &Film,
+        done: &[[u32; 2]],
+        samples: u32,
+        error: f64,
+    ) -> Option<Judgement> {
+        let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = Aim { error, brightness, convergence: film.convergence() };
         let noise =
             film.of_tiles(|tile| self.is_open(tile, done, samples).then(|| TileNoise::of(film, tile)));
@@ -78,12 +70,12 @@ impl Goals {
             self.brightness = Some(brightness);
             self.decide(&noise, done, samples, &aim);
         }
-        self.foresee(&noise, done, samples, &aim);
+        Some(Judgement { noise, samples, aim })
     }
 
     /// Tiles that have all samples which they are to have, and more noise than [`TOO_MUCH`] times the error asked for: what is in few
     /// pixels of one half alone does not hold that half up. And the noise of the worst of them.
-    pub(super) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
+    pub(in crate::pipeline) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
         let aim = Aim { error, brightness: self.brightness?, convergence: film.convergence() };
         let noise = film.of_tiles(|tile| {
             let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
@@ -101,7 +93,7 @@ impl Goals {
     }
 
     /// Whether a half in a tile has no goal yet, and has now so many samples.
-    fn is_open(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+    pub(in crate::pipeline) fn is_open(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
             .flat_map(|(goals, done)| goals.iter().zip(done))
@@ -129,47 +121,28 @@ impl Goals {
                 // Where the other half has no more samples to come, nothing more will be known.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
-                    self.expected[cell][half] = self.decided[cell][half];
-                }
-            }
-        }
-    }
-
-    /// Expect what the samples so far tell, which are a power of two: by the noise of both halves of a tile, and by how it fell.
-    /// What is decided is decided otherwise.
-    fn foresee(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &Aim) {
-        let open = |(tile, noise): (usize, &Option<TileNoise>)| {
-            noise.filter(|_| self.is_open(tile, done, samples)).map(|noise| (tile, noise))
-        };
-        let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
-        let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
-        let way = Way::of(aim.convergence, falls, samples);
-        for (tile, TileNoise { halves, fall }) in tiles {
-            let squares = halves.iter().flatten().map(|half| {
-                let noise = aim.relative(half);
-                noise * noise
-            });
-            let mean = squares.sum::<f64>() / halves.iter().flatten().count() as f64;
-            if !mean.is_finite() {
-                continue;
-            }
-            let wanted = way.samples_to(AIM * aim.error, mean.sqrt(), fall);
-            let cells = self.expected.iter_mut().zip(&self.decided).zip(done).skip(CELLS * tile).take(CELLS);
-            for ((expected, decided), done) in cells {
-                for half in (0..2).filter(|half| decided[*half] == u32::MAX) {
-                    expected[half] = wanted.max(done[half]).max(LEAST);
                 }
             }
         }
     }
 }
 
-/// What the samples of a tile tell of its noise.
+/// Noise that goals were decided by.
+#[derive(Debug)]
+pub(in crate::pipeline) struct Judgement {
+    /// Noise of each tile. `None` for a tile that has its goals, or other samples.
+    pub(in crate::pipeline) noise: Vec<Option<TileNoise>>,
+    /// Samples that the tiles had.
+    pub(in crate::pipeline) samples: u32,
+    pub(in crate::pipeline) aim: Aim,
+}
+
+/// Noise of a tile, by its samples.
 #[derive(Clone, Copy, Debug)]
-struct TileNoise {
-    halves: [Option<HalfNoise>; 2],
-    /// How many times smaller its variance got of late.
-    fall: Option<f64>,
+pub(in crate::pipeline) struct TileNoise {
+    pub(in crate::pipeline) halves: [Option<HalfNoise>; 2],
+    /// Ratio of its variance before and after the last doubling of samples.
+    pub(in crate::pipeline) fall: Option<f64>,
 }
 
 impl TileNoise {
@@ -183,14 +156,14 @@ impl TileNoise {
     }
 }
 
-/// What noise is held against.
+/// The error to reach, and the brightness that it is relative to.
 #[derive(Clone, Copy, Debug)]
-struct Aim {
-    /// The error that is asked for.
-    error: f64,
+pub(in crate::pipeline) struct Aim {
+    /// The requested error.
+    pub(in crate::pipeline) error: f64,
     /// Mean luminance of the picture.
     brightness: f64,
-    convergence: Convergence,
+    pub(in crate::pipeline) convergence: Convergence,
 }
 
 impl Aim {
@@ -211,70 +184,20 @@ impl Aim {
     }
 
     /// Noise over the brightness that it is held against.
-    fn relative(&self, noise: &HalfNoise) -> f64 {
+    pub(in crate::pipeline) fn relative(&self, noise: &HalfNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
     }
 }
 
-/// How noise is expected to fall from some samples on. What is smooth falls fast, and is below any bound soon: what is left of it then
-/// is noise that falls as that of edges and penumbras, or slower.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Way {
-    samples: u32,
-    /// Doublings of these by each of which the variance falls by `fall`; after them it falls with `power`.
-    doublings: u32,
-    /// How many times smaller the variance of the tiles got by the last doubling; none below [`LEAST`] samples, where the own fall of
-    /// each tile is taken.
-    fall: Option<f64>,
-    /// The power of the samples with which variance falls later.
-    power: f64,
-}
-
-impl Way {
-    /// By how many times smaller the variances of tiles got by their last doubling.
-    fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
-        let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
-        if convergence == Convergence::Photons {
-            return Self {
-                samples,
-                doublings,
-                fall: Some(libm::exp2(convergence.usual_power())),
-                power: convergence.usual_power(),
-            };
-        }
-        if samples < LEAST {
-            return Self { samples, doublings, fall: None, power: convergence.usual_power() };
-        }
-        falls.sort_by(f64::total_cmp);
-        let usual = libm::exp2(convergence.usual_power());
-        let fall = falls.get(falls.len() / 2).map_or(usual, |fall| fall.clamp(FALLS[0], FALLS[1]));
-        Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.usual_power()) }
-    }
-
-    /// Samples that bring the noise of a tile to a bound, where its variance fell so by its last doubling.
-    fn samples_to(&self, bound: f64, noise: f64, fall: Option<f64>) -> u32 {
-        let of_tile = || {
-            // Of the falls from two samples on, one more is known by each doubling.
-            let known = fall.map_or(0.0, |_| 1.0 - 1.0 / f64::from(self.samples.ilog2()));
-            let fall = fall.map_or(EARLY_FALL, |fall| fall.clamp(FALLS[0], FALLS[1]));
-            libm::pow(fall, known) * libm::pow(EARLY_FALL, 1.0 - known)
-        };
-        let fall = self.fall.unwrap_or_else(of_tile);
-        let noise = noise * libm::pow(fall, -0.5 * f64::from(self.doublings));
-        let samples = self.samples.saturating_mul(1 << self.doublings);
-        if noise > 0.0 { samples_by(self.power, bound / noise, samples).min(MOST) } else { self.samples }
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(in crate::pipeline) mod tests {
     use super::*;
     use crate::film::{Part, Pixels, Rect, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit;
 
     /// A film of one tile, whose halves have samples of a mean and a spread each.
-    fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
+    pub(in crate::pipeline) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");
         let mut next = unit(3);
@@ -299,7 +222,6 @@ mod tests {
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(goals.of(0, 1), 16, "the other half has no noise");
         assert_eq!(goals.of(0, 0), u32::MAX);
-        assert!((64..1000).contains(&goals.expected(0, 0)), "{}", goals.expected(0, 0));
     }
 
     #[test]
@@ -328,57 +250,6 @@ mod tests {
         let goals = judged([(1.0, 1.0); 2], 16, 0.08);
         assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
         assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
-    }
-
-    #[test]
-    fn a_few_samples_tell_how_many_there_will_be() {
-        // Independent samples of a standard deviation of √(1/12) take 833. Two of them do not tell that their noise falls slowly, each
-        // doubling tells more of it: 80, 190 and 260 by steps of the size to be expected, which 64 pixels tell to about a fifth.
-        for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
-            let goals = judged([(1.0, 1.0); 2], samples, 0.01);
-            assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
-            let ratio = f64::from(goals.expected(0, 0)) / expected;
-            assert!((0.6..1.6).contains(&ratio), "{samples}: {}", goals.expected(0, 0));
-        }
-    }
-
-    #[test]
-    fn how_noise_fell_of_late_tells_how_it_will_fall() {
-        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.usual_power());
-        let of = |falls: &[f64]| Way::of(stratified, falls.to_vec(), 64);
-        for (falls, fall, power) in [
-            (vec![], libm::exp2(usual), usual),
-            (vec![2.0, 1.0, 2.0], 2.0, 1.0),
-            (vec![9.0, 4.0, 3.0], 4.0, usual),
-            (vec![100.0, 2.2, 2.3, 2.1, 1e-3], 2.2, libm::log2(2.2)),
-        ] {
-            assert_eq!(of(&falls), Way { samples: 64, doublings: 1, fall: Some(fall), power }, "{falls:?}");
-        }
-        // Half of the noise of 64 samples, which falls by 4 and then by 2.7 at each doubling; which is nothing but that of chance.
-        let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
-        assert!(near(of(&[4.0]).samples_to(0.5, 1.0, None), 128.0));
-        assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
-        assert!(near(of(&[1.0]).samples_to(0.25, 1.0, None), 16.0 * 64.0));
-        assert!(near(Way::of(Convergence::Photons, vec![9.0], 4).samples_to(0.25, 1.0, Some(9.0)), 64.0));
-    }
-
-    #[test]
-    fn what_takes_more_samples_than_can_be_counted_is_not_taken_for_unknown() {
-        for samples in [2, 16, 64] {
-            let goals = judged([(1.0, 1.0); 2], samples, 1e-12);
-            assert_eq!((goals.of(0, 0), goals.expected(0, 0)), (u32::MAX, MOST), "{samples}");
-        }
-    }
-
-    #[test]
-    fn a_few_samples_of_what_is_smooth_tell_that_the_least_will_do() {
-        let way = Way::of(Convergence::Stratified, vec![], 4);
-        assert_eq!((way.doublings, way.fall), (2, None));
-        let [smooth, unknown, rough] =
-            [Some(8.0), None, Some(1.0)].map(|fall| way.samples_to(0.2, 1.0, fall));
-        assert!(smooth < unknown && unknown < rough, "{smooth} {unknown} {rough}");
-        // Falls of √(8 · 4) and √(2 · 4).
-        assert!((12..17).contains(&smooth) && (30..55).contains(&rough), "{smooth} {rough}");
     }
 
     #[test]

@@ -1,35 +1,35 @@
-//! Which pictures are worth being drawn.
+//! Choice of the pictures that are worth drawing.
 
 use std::time::{Duration, Instant};
 
-use super::Fidelity;
+use super::fidelity::Fidelity;
 
-/// What is known when there is a picture that was not aimed at.
+/// The moment at which there is a picture that was not aimed at yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// Bytes that the line takes in a second; none: more than anybody noticed.
+    /// Bytes per second of the line. `None` if it is faster than anybody noticed.
     pub bytes_per_second: Option<f64>,
     /// Cells of the picture.
     pub cells: u32,
-    /// Samples of a pixel of the picture at hand, in the mean over the pixels; 0: a coarse picture.
+    /// Mean samples per pixel of the current picture; 0 for a coarse picture.
     pub samples: f64,
-    /// The same of the last picture of this request that was aimed at; none: there was none.
+    /// Mean samples per pixel of this request's last picture that was aimed at. `None` if there was none.
     pub aimed_samples: Option<f64>,
     /// Since then.
     pub since_aim: Duration,
     /// Whether that picture is on the screen: sent, and, where the terminal is quick, answered for.
     pub is_shown: bool,
-    /// Whether the terminal takes what it is sent so soon that it can follow the render.
+    /// Whether the terminal takes bytes so fast that it can follow the render.
     pub is_quick: bool,
     /// Whether the picture is drawn in pixels.
     pub is_in_pixels: bool,
     /// Whether the picture stays.
     pub is_final: bool,
-    /// Until there is one that stays, where that can be told.
+    /// Time to the final picture, if known.
     pub final_in: Option<Duration>,
 }
 
-/// What to do with a picture.
+/// Advice about a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Advice {
     /// Aim at it.
@@ -95,7 +95,7 @@ impl Moment {
         (self.is_quick && self.is_shown).then(|| aimed + self.shortest())
     }
 
-    /// How long the line takes for a picture on the way.
+    /// Time of the line for a picture on the way.
     fn frame(&self) -> Duration {
         let bytes = f64::from(self.cells) * MOVING_BYTES;
         self.bytes_per_second.map_or(Duration::ZERO, |rate| {

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::super::cache::Memo;
-use super::accel::Built;
+use super::cache::Memo;
 use super::keys;
-use super::textures::Textures;
+use super::stages::accel::Built;
+use super::stages::textures::Textures;
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
 use crate::math::DVec3;
@@ -14,22 +14,18 @@ use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Bodies, Parts, World};
 
 /// A world with the key of all that its pictures depend on.
-pub(in crate::pipeline) type Keyed = (Key, Arc<World>);
+pub(super) type Keyed = (Key, Arc<World>);
 
 /// The camera of a request: the scene's, or what the request makes of it.
 #[derive(Clone, Debug)]
-pub(in crate::pipeline) struct Eye {
-    pub(in crate::pipeline) camera: Camera,
-    /// The file that the camera is in, where it is in one.
-    pub(in crate::pipeline) orbiter: Option<OrbiterCamera>,
+pub(super) struct Eye {
+    pub(super) camera: Camera,
+    /// The orbiter file, if the camera is in one.
+    pub(super) orbiter: Option<OrbiterCamera>,
 }
 
 impl Eye {
-    pub(in crate::pipeline) fn new(
-        scene: &Scene,
-        orbiter: Option<OrbiterCamera>,
-        change: &CameraChange,
-    ) -> Self {
+    pub(super) fn new(scene: &Scene, orbiter: Option<OrbiterCamera>, change: &CameraChange) -> Self {
         let own = Self { camera: scene.camera.clone(), orbiter };
         if change.is_any() {
             Self { camera: own.viewpoint().changed(change).into(), orbiter: None }
@@ -38,18 +34,18 @@ impl Eye {
         }
     }
 
-    pub(in crate::pipeline) fn viewpoint(&self) -> Viewpoint {
+    pub(super) fn viewpoint(&self) -> Viewpoint {
         world::Camera::viewpoint(&self.camera, self.orbiter.as_ref())
     }
 
-    /// Where the coordinates start in which it sees best.
-    pub(in crate::pipeline) fn origin(&self) -> DVec3 {
+    /// Origin of the coordinates in which the camera sees most precisely.
+    pub(super) fn origin(&self) -> DVec3 {
         world::origin(&self.camera, self.orbiter.as_ref())
     }
 }
 
 /// Put it together, unless the last one is of the same parts.
-pub(in crate::pipeline) fn world(
+pub(super) fn world(
     scene: &Scene,
     (surfaces, of): (&Key, &Referents<'_>),
     (built, lights, bodies): (Built, Arc<Lights>, Arc<Bodies>),

@@ -4,48 +4,51 @@ use std::cmp::Reverse;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::super::plan::Plan;
-use super::super::trace::{Cost, Job};
-use super::adaptive::Goals;
-use super::cost::{CellCost, JobCost, PixelShare};
+use super::forecast::cost::{CellCost, JobCost, PixelShare};
+use super::forecast::samples::ExpectedSamples;
 use crate::film::{CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
+use crate::pipeline::plan::Plan;
+use crate::pipeline::render::noise_goals::Goals;
+use crate::pipeline::trace::{Cost, Job};
 use crate::scene::fingerprint::Key;
 
-/// A film that is being rendered, or that was.
+/// A film that is being rendered, or a finished one.
 #[derive(Debug)]
-pub(in crate::pipeline) struct Canvas {
+pub(in crate::pipeline) struct FilmState {
     pub(in crate::pipeline) key: Key,
     pub(in crate::pipeline) film: Arc<Film>,
     /// Samples that both halves of each cell have; no more are to come for those without pixels.
-    pub(super) done: Vec<[u32; 2]>,
+    pub(in crate::pipeline) done: Vec<[u32; 2]>,
     /// Rays of each cell.
-    pub(super) rays: Vec<u64>,
+    pub(in crate::pipeline) rays: Vec<u64>,
     /// Seconds of a processor that all of them took.
     seconds: f64,
-    /// What the samples of each take of late.
+    /// Recent cost of the samples in each cell.
     costs: Vec<CellCost>,
-    /// What a pixel takes in a job, beside its samples.
+    /// Cost of a pixel in a job, beside its samples.
     pixel_share: PixelShare,
     /// Samples that they are to have at most.
-    pub(super) goals: Goals,
-    /// A first picture at the size of the preview, shown where there are no samples yet.
-    pub(super) base: Option<RadianceImage>,
-    /// What the last preview was made by.
-    pub(super) previewer: Option<Previewer>,
+    pub(in crate::pipeline) goals: Goals,
+    /// Samples that halves without a goal are expected to get.
+    expected: ExpectedSamples,
+    /// A first picture at the size of the preview, shown in pixels without samples.
+    pub(in crate::pipeline) base: Option<RadianceImage>,
+    /// The previewer of the last preview.
+    pub(in crate::pipeline) previewer: Option<Previewer>,
     /// Whether it was begun for a camera on its way.
-    pub(super) is_passing: bool,
+    pub(in crate::pipeline) is_passing: bool,
     /// The budget that ended the last render of it.
-    pub(super) ended_by: Option<f64>,
+    pub(in crate::pipeline) ended_by: Option<f64>,
     /// Seconds that it was rendered for, by all requests.
     pub(in crate::pipeline) render_seconds: f64,
 }
 
-impl Canvas {
+impl FilmState {
     /// Without samples; its film may take `most_bytes`, and its noise falls so.
     ///
     /// # Errors
     /// There is no memory for the film.
-    pub(super) fn new(
+    pub(in crate::pipeline) fn new(
         key: Key,
         plan: &Plan,
         most_bytes: u64,
@@ -67,6 +70,7 @@ impl Canvas {
             pixel_share: PixelShare::default(),
             done,
             goals,
+            expected: ExpectedSamples::unknown(film_cells),
             base: None,
             previewer: None,
             is_passing: false,
@@ -80,15 +84,15 @@ impl Canvas {
         self.is_complete_in(None, samples)
     }
 
-    /// The same of the tiles of a part; none: of all.
-    pub(super) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
+    /// Whether every pixel in the tiles of a part has this many samples, or all that it is to have. `None` means all tiles.
+    pub(in crate::pipeline) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
         self.halves()
             .filter(|(cell, _)| self.is_in(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
     }
 
     /// Whether no pixel has more samples than these.
-    pub(super) fn has_at_most(&self, samples: u32) -> bool {
+    pub(in crate::pipeline) fn has_at_most(&self, samples: u32) -> bool {
         self.halves().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
@@ -97,8 +101,8 @@ impl Canvas {
         self.samples_in(None, most)
     }
 
-    /// The same of the tiles of a part; none: of all.
-    pub(super) fn samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
+    /// Fewest samples of a pixel that is to have more, in the tiles of a part, at most `most`. `None` means all tiles.
+    pub(in crate::pipeline) fn samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
             (done < self.goals.of(tile, half).min(most)).then_some(done)
@@ -114,7 +118,7 @@ impl Canvas {
     }
 
     /// Whether there are samples.
-    pub(super) fn is_begun(&self) -> bool {
+    pub(in crate::pipeline) fn is_begun(&self) -> bool {
         self.halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
@@ -129,21 +133,26 @@ impl Canvas {
     }
 
     /// Bytes that it takes.
-    pub(super) fn memory_bytes(&self) -> u64 {
+    pub(in crate::pipeline) fn memory_bytes(&self) -> u64 {
         let base = self.base.as_ref().map_or(0, |base| size_of_val(base.pixels.as_slice()) as u64);
         let cells = size_of_val(self.done.as_slice())
             + size_of_val(self.rays.as_slice())
             + size_of_val(self.costs.as_slice())
-            + self.goals.memory_bytes();
+            + self.goals.memory_bytes()
+            + self.expected.memory_bytes();
         self.film.memory_bytes()
             + cells as u64
             + base
             + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// What brings the halves of every cell of the tiles of a part (none: of all) to as many samples, or to those that they are to
-    /// have: whole tiles, where all of them lack the same, in the film's order.
-    pub(super) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<Job> {
+    /// Jobs that bring both halves of every cell to `target` or to their goals, in the tiles of a part (`None`: in all of them).
+    /// Tiles whose cells all lack the same samples are one job. The order is the film's.
+    pub(in crate::pipeline) fn jobs(
+        &self,
+        part: Option<Rect>,
+        target: impl Fn(usize, usize) -> u32,
+    ) -> Vec<Job> {
         let missing = |cell: usize, half: usize| {
             self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))
         };
@@ -174,7 +183,7 @@ impl Canvas {
     }
 
     /// Note that a job is done, and what it took; pixels times samples that it was.
-    pub(super) fn note(&mut self, job: &Job, cost: &Cost) -> u64 {
+    pub(in crate::pipeline) fn note(&mut self, job: &Job, cost: &Cost) -> u64 {
         let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
             let rect = self.film.cell_rect(cell);
@@ -193,34 +202,37 @@ impl Canvas {
         job.pixel_count() * job.samples.len() as u64
     }
 
-    /// Decide which tiles have enough samples, of those that have this power of two of them.
-    pub(super) fn judge(&mut self, samples: u32, error: f64) {
-        self.goals.judge(&self.film, &self.done, samples, error);
+    /// Decides which tiles have enough samples, among those with `samples`, a power of two.
+    pub(in crate::pipeline) fn judge(&mut self, samples: u32, error: f64) {
+        if let Some(judgement) = self.goals.judge(&self.film, &self.done, samples, error) {
+            self.expected.predict(&judgement, &self.goals, &self.done);
+        }
     }
 
     /// Tiles whose samples ended before their noise was below the error asked for, and the noise of the worst.
-    pub(super) fn missed(&self, error: f64) -> Option<(usize, f64)> {
+    pub(in crate::pipeline) fn missed(&self, error: f64) -> Option<(usize, f64)> {
         self.goals.missed(&self.film, error)
     }
 
     /// Pixels times samples that there are.
-    pub(super) fn units(&self) -> u64 {
+    pub(in crate::pipeline) fn units(&self) -> u64 {
         self.units_of(|tile, half| self.done[tile][half])
     }
 
     /// Pixels times samples that there will be, as far as that is known, of some at most.
-    pub(super) fn units_to_come(&self, most: u32) -> u64 {
+    pub(in crate::pipeline) fn units_to_come(&self, most: u32) -> u64 {
         self.units_of(|cell, half| self.to_come(cell, half, most))
     }
 
     /// Seconds of a processor that it took.
-    pub(super) fn seconds(&self) -> f64 {
+    pub(in crate::pipeline) fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// Those that it will take from here on, as far as that is known, to some samples at most; `jobs` tells in how many jobs a pixel
-    /// gets from some samples to others. What a sample takes in a cell is told by its last ones; where it has none, by the others.
-    pub(super) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
+    /// Expected processor seconds of the samples to come, at most to `most`. `jobs` is the number of jobs in which a pixel gets
+    /// from some samples to others. The cost of a sample is that of the last ones in its cell; cells without samples take the
+    /// mean.
+    pub(in crate::pipeline) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
         for cell in (0..self.done.len()).filter(|cell| self.film.cell_rect(*cell).is_some()) {
             let lacks = |half: usize| {
@@ -243,8 +255,8 @@ impl Canvas {
         seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
-    /// Samples of the pixels that have most, now and in the end as far as that is known: as many passes of photons are sent.
-    pub(super) fn passes(&self, most: u32) -> [u32; 2] {
+    /// Samples of the pixel with most samples: now, and expected in the end. There are as many passes of photons.
+    pub(in crate::pipeline) fn passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
@@ -252,12 +264,13 @@ impl Canvas {
     }
 
     /// Whether it is known about how many samples there will be, where noise decides that.
-    pub(super) fn is_foreseen(&self) -> bool {
-        self.halves().all(|(cell, half)| self.goals.expected(cell, half) < u32::MAX)
+    pub(in crate::pipeline) fn is_foreseen(&self) -> bool {
+        self.halves().all(|(cell, half)| self.to_come(cell, half, u32::MAX) < u32::MAX)
     }
 
     fn to_come(&self, cell: usize, half: usize, most: u32) -> u32 {
-        self.goals.expected(cell, half).min(most)
+        let (goal, expected) = (self.goals.of(cell, half), self.expected.of(cell, half));
+        (if goal < u32::MAX { goal } else { expected }).min(most)
     }
 
     fn units_of(&self, samples_of: impl Fn(usize, usize) -> u32) -> u64 {
@@ -268,7 +281,7 @@ impl Canvas {
     }
 }
 
-/// What all halves of all cells lack, if it is the same.
+/// Samples that all halves of all cells lack, if they all lack the same.
 fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
@@ -282,11 +295,11 @@ mod tests {
     use crate::math::Vec3;
     use crate::scene::fingerprint::Fingerprint;
 
-    /// Of two tiles.
-    fn canvas() -> Canvas {
+    /// A film of two tiles.
+    fn canvas() -> FilmState {
         let film = Film::new(64, 32, None).expect("a film");
         let cells = film.cell_count();
-        Canvas {
+        FilmState {
             key: Fingerprint::new("test").finish(),
             film: Arc::new(film),
             done: vec![[0; 2]; cells],
@@ -295,6 +308,7 @@ mod tests {
             costs: vec![CellCost::default(); cells],
             pixel_share: PixelShare::default(),
             goals: Goals::none(cells),
+            expected: ExpectedSamples::unknown(cells),
             base: None,
             previewer: None,
             is_passing: false,
@@ -308,7 +322,7 @@ mod tests {
     }
 
     /// A tile has more samples, which took so long.
-    fn note(canvas: &mut Canvas, tile: usize, samples: Range<u32>, seconds: f64) {
+    fn note(canvas: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
         let pixels = Pixels::from(canvas.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();

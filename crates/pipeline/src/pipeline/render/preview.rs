@@ -4,19 +4,19 @@ use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
-use super::super::plan::Plan;
-use super::super::protocol::{PreviewSize, Section, Spot};
-use super::super::sink::Sink;
-use super::canvas::Canvas;
+use super::film_state::FilmState;
 use crate::control::CancelToken;
 use crate::film::stretch::Stretch;
 use crate::film::tone::{ToneMapping, develop};
 use crate::film::{Previewer, Quantity, RadianceImage, Rect};
+use crate::pipeline::plan::Plan;
+use crate::pipeline::protocol::{PreviewSize, Section, Spot};
+use crate::pipeline::sink::Sink;
 
 /// The longest that a film is taken up without a look at the orders.
 const PATIENCE: Duration = Duration::from_millis(4);
 
-/// What is shown, and where.
+/// The screen's preview: what it shows, and where it goes.
 #[derive(Clone, Copy)]
 pub(in crate::pipeline) struct Screen<'a> {
     /// None: nothing is shown.
@@ -27,13 +27,13 @@ pub(in crate::pipeline) struct Screen<'a> {
 
 impl Screen<'_> {
     /// Columns and rows of pictures of the whole.
-    pub(super) fn size(&self) -> Option<(u32, u32)> {
+    pub(in crate::pipeline) fn size(&self) -> Option<(u32, u32)> {
         let render = &self.plan.settings.render;
         self.bounds.and_then(|bounds| fit(render.width, render.height, bounds))
     }
 
     /// The whole film, unless that is cancelled. For when no tile is being rendered, as the pool helps.
-    pub(in crate::pipeline) fn show(&self, canvas: &mut Canvas, pool: &ThreadPool, token: &CancelToken) {
+    pub(in crate::pipeline) fn show(&self, canvas: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
         if self.say_section(canvas, true) {
             return;
@@ -48,7 +48,7 @@ impl Screen<'_> {
 
     /// The same between two tiles, on this thread and for a short time; what is left is for the next call. Whether a
     /// picture came of it.
-    pub(super) fn show_some(&self, canvas: &mut Canvas) -> bool {
+    pub(in crate::pipeline) fn show_some(&self, canvas: &mut FilmState) -> bool {
         let Some(size) = self.size() else { return false };
         if self.say_section(canvas, false) {
             return true;
@@ -61,7 +61,7 @@ impl Screen<'_> {
         is_whole
     }
 
-    fn say(&self, canvas: &Canvas, has_time: bool) {
+    fn say(&self, canvas: &FilmState, has_time: bool) {
         if let Some(previewer) = &canvas.previewer {
             // The first coarse picture has none of the numbers about samples.
             let base = canvas.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
@@ -70,8 +70,8 @@ impl Screen<'_> {
         }
     }
 
-    /// The picture's own pixels, if they are asked for.
-    fn say_section(&self, canvas: &Canvas, has_time: bool) -> bool {
+    /// Shows the image's own pixels, if the front end wants them.
+    fn say_section(&self, canvas: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
         let quantity = self.plan.settings.view.quantity();
         let base = canvas.base.as_ref().filter(|_| quantity == Quantity::Radiance);
@@ -84,7 +84,7 @@ impl Screen<'_> {
 
     /// Shows a picture that lacks the light of photons, which are yet to come. It is of colours: no view of numbers gathers
     /// them.
-    pub(super) fn show_without_photons(&self, image: &RadianceImage) {
+    pub(in crate::pipeline) fn show_without_photons(&self, image: &RadianceImage) {
         self.sink.preview_without_photons(develop(image, &self.plan.tone.of_picture(image)));
     }
 
@@ -93,9 +93,10 @@ impl Screen<'_> {
         self.sink.preview(develop(image, tone), range, section);
     }
 
-    /// Numbers are stretched by the range of the picture that is written, as pixels of a preview are means of distances and nothing;
-    /// where that has pixels without samples, or is large and there is no time, by the range of the preview.
-    fn tone(&self, canvas: &Canvas, image: &RadianceImage, has_time: bool) -> ToneMapping {
+    /// Tone mapping of a preview. Numbers are stretched by the range of the image that is written, since pixels of a preview
+    /// average over gaps. An image with pixels without samples, or a large one while there is no time, is stretched by the range
+    /// of the preview.
+    fn tone(&self, canvas: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Pixels that are looked through in a few milliseconds.
         const QUICK: usize = 1 << 18;
         let tone = self.plan.tone;
@@ -123,7 +124,7 @@ impl Screen<'_> {
 }
 
 /// Take up what changed, for a short time; whether that was all.
-fn catch_up(canvas: &mut Canvas, quantity: Quantity, (width, height): (u32, u32)) -> bool {
+fn catch_up(canvas: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
     canvas.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = canvas.previewer.get_or_insert_with(|| Previewer::of(quantity, width, height));
     previewer.update(&canvas.film, Some(Instant::now() + PATIENCE))

@@ -3,22 +3,21 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use super::super::plan::Plan;
-use super::super::trace::{Job, Tracer};
-use super::Stop;
 use super::preview::Screen;
-use super::render::Rendering;
 use crate::film::stretch::Stretch;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{PhotonMaps, RenderSettings};
+use crate::pipeline::plan::Plan;
+use crate::pipeline::stages::Stop;
+use crate::pipeline::trace::{Job, Tracer};
 use crate::scene::description::Render;
 
-/// What the first picture of a moved camera may take.
+/// Time for the first picture of a moved camera.
 const HASTE: Duration = Duration::from_millis(6);
 
-/// What first pictures are traced by.
+/// Inputs of first pictures.
 #[derive(Clone, Copy)]
-pub(in crate::pipeline) struct Coarse<'a> {
+pub(in crate::pipeline) struct FirstPictures<'a> {
     pub(in crate::pipeline) tracer: Tracer<'a>,
     pub(in crate::pipeline) plan: &'a Plan,
     /// Whether somebody is moving the camera.
@@ -27,22 +26,17 @@ pub(in crate::pipeline) struct Coarse<'a> {
     pub(in crate::pipeline) rate: &'a Cell<Option<f64>>,
 }
 
-impl<'a> Coarse<'a> {
-    pub(super) fn of(rendering: &Rendering<'a>) -> Self {
-        let Rendering { tracer, plan, is_moved, coarse_rate: rate, .. } = *rendering;
-        Self { tracer, plan, is_moved, rate }
-    }
-
-    /// Columns and rows of the first pictures at about the preview's own resolution, of those that are much less work than one pass: of
-    /// a moved camera a hasty one before.
-    pub(super) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
+impl<'a> FirstPictures<'a> {
+    /// Sizes of the first pictures that are much less work than one pass: about the preview's resolution, and before it a hasty
+    /// one if the camera is being moved.
+    pub(in crate::pipeline) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
         let usual = self.usual_size(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
         let hasty = rate.and_then(|rate| hasty_size(usual, rate));
         hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
     }
 
-    /// Where rays are slow, since no cache holds the trees, it has half as many pixels as the preview.
+    /// The preview's size; half as many pixels if the scene's trees exceed the caches, since rays are slow then.
     fn usual_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
         /// Triangles whose trees take some tens of megabytes.
         const LARGE: u64 = 250_000;
@@ -58,7 +52,7 @@ impl<'a> Coarse<'a> {
     }
 
     /// Traces a first picture of this size; notes how many pixels are traced in a second. `tick` is called every now and then.
-    pub(super) fn picture(
+    pub(in crate::pipeline) fn picture(
         &self,
         photons: Option<&PhotonMaps>,
         (width, height): (u32, u32),
@@ -110,8 +104,7 @@ impl<'a> Coarse<'a> {
     }
 }
 
-/// The size of a first picture that takes [`HASTE`] where so many pixels are traced in a second; none: the usual one takes
-/// hardly longer.
+/// Size of a first picture that takes [`HASTE`] at this rate of pixels a second. `None` if the usual picture takes hardly longer.
 fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     /// Pixels across of the smallest.
     const LEAST: f64 = 16.0;

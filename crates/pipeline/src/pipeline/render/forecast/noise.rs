@@ -1,32 +1,32 @@
-//! How much noise is left while a render goes on, and how fast it falls.
+//! Noise of the render now, and how fast it falls.
 
 use std::time::{Duration, Instant};
 
-use super::super::pace::Work;
-use super::super::protocol::NoiseProgress;
-use super::adaptive::LEAST;
+use super::pace::Work;
 use crate::film::{Film, PictureNoise};
+use crate::pipeline::protocol::NoiseProgress;
+use crate::pipeline::render::noise_goals::LEAST;
 
-/// Before that nobody reads it, and afterwards it is told as seldom: it is the sum of all pixels.
+/// Shortest time between two measurements, and before the first: each is a sum over all pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// A level is told that the noise is this many times above.
+/// Least ratio of the noise to the next level reported.
 const STEP: f64 = 1.5;
 
-/// The noise as it was told last.
+/// The last measurement of noise.
 #[derive(Debug)]
-pub(super) struct Outlook {
+pub(in crate::pipeline) struct NoiseForecast {
     due: Instant,
     /// And the work that was done.
     told: Option<(PictureNoise, f64)>,
 }
 
-impl Outlook {
-    pub(super) fn new() -> Self {
+impl NoiseForecast {
+    pub(in crate::pipeline) fn new() -> Self {
         Self { due: Instant::now() + INTERVAL, told: None }
     }
 
-    /// Look again, where it is time: pixels have `samples` at least, a power of two of them.
-    pub(super) fn look(&mut self, film: &Film, samples: u32, done: f64) {
+    /// Measures again, if it is time: every pixel has at least `samples`, a power of two.
+    pub(in crate::pipeline) fn look(&mut self, film: &Film, samples: u32, done: f64) {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
@@ -34,8 +34,8 @@ impl Outlook {
         self.due = Instant::now() + INTERVAL;
     }
 
-    /// What is to be expected, where something was told.
-    pub(super) fn at(&self, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
+    /// Expected noise, once it has been measured.
+    pub(in crate::pipeline) fn at(&self, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
         let (PictureNoise { relative_error, power }, done) = self.told.filter(|(_, done)| *done > 0.0)?;
         // The part of the noise that so many times the samples leave.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
@@ -43,7 +43,8 @@ impl Outlook {
     }
 }
 
-/// The noise now, the next round level below it, or what it will be in the end where that comes first, and when, by work a second.
+/// The noise now; the next round level below it, or the noise at the end of the render if that is higher; and the seconds until
+/// then, at `rate` of work a second.
 fn expected(now: f64, work: Work, rate: Option<f64>, fall: impl Fn(f64) -> f64) -> NoiseProgress {
     let Work { done, total, aside: [aside, _] } = work;
     let total = total.unwrap_or(f64::INFINITY).max(done);

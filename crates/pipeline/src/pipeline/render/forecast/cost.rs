@@ -1,8 +1,8 @@
-//! What samples take, by those before them.
+//! Cost of samples, predicted from those before them.
 
-/// What the jobs of a cell take: so much a sample of a pixel, and so much a pixel however many samples it gets.
+/// Cost of the jobs in a cell: a part for each sample of a pixel, and a part for each pixel of a job.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct CellCost {
+pub(in crate::pipeline) struct CellCost {
     seconds: f64,
     /// Pixels times samples.
     units: f64,
@@ -11,20 +11,20 @@ pub(super) struct CellCost {
     last: Option<JobCost>,
 }
 
-/// What a job took in a cell.
+/// Cost of a job in a cell.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct JobCost {
-    pub(super) seconds: f64,
-    pub(super) pixels: f64,
-    /// Of each pixel.
-    pub(super) samples: f64,
+pub(in crate::pipeline) struct JobCost {
+    pub(in crate::pipeline) seconds: f64,
+    pub(in crate::pipeline) pixels: f64,
+    /// Samples of each pixel.
+    pub(in crate::pipeline) samples: f64,
 }
 
 impl CellCost {
-    /// What is left of what came before, when more comes: the first samples take more than those of later passes.
+    /// Weight of earlier jobs beside a new one: the first samples cost more than those of later passes.
     const KEPT: f64 = 0.25;
 
-    pub(super) fn note(&mut self, job: JobCost, share: &mut PixelShare) {
+    pub(in crate::pipeline) fn note(&mut self, job: JobCost, share: &mut PixelShare) {
         share.note(self.last, job);
         self.seconds = Self::KEPT * self.seconds + job.seconds;
         self.units = Self::KEPT * self.units + job.pixels * job.samples;
@@ -33,23 +33,23 @@ impl CellCost {
     }
 
     /// Whether nothing is known of it.
-    pub(super) fn is_unknown(&self) -> bool {
+    pub(in crate::pipeline) fn is_unknown(&self) -> bool {
         !(self.units > 0.0)
     }
 
-    pub(super) fn seconds(&self) -> f64 {
+    pub(in crate::pipeline) fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// What it took its seconds for, in samples of a pixel.
-    pub(super) fn worth(&self, share: PixelShare) -> f64 {
+    /// Samples that the cell's seconds were spent on; pixels count for their share.
+    pub(in crate::pipeline) fn worth(&self, share: PixelShare) -> f64 {
         share.worth(self.units, self.pixels)
     }
 }
 
-/// What a pixel takes in a job beside its samples.
+/// Cost of a pixel in a job, beside its samples.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PixelShare {
+pub(in crate::pipeline) struct PixelShare {
     /// A cell had n' samples in s' seconds, then n > n' in s. If a pixel costs as much as b samples, s/s' = (n + b)/(n' + b), so that
     /// b = (s'n − sn')/(s − s'). The sum of the numerators.
     of_pixels: f64,
@@ -70,8 +70,8 @@ impl PixelShare {
         }
     }
 
-    /// What jobs are worth, in samples of a pixel.
-    pub(super) fn worth(self, units: f64, pixels: f64) -> f64 {
+    /// Samples that would cost as much as jobs of so many samples (`units`) and pixels.
+    pub(in crate::pipeline) fn worth(self, units: f64, pixels: f64) -> f64 {
         let share = if self.of_samples > 0.0 { self.of_pixels / self.of_samples } else { 0.0 };
         units + share.clamp(0.0, Self::MOST) * pixels
     }

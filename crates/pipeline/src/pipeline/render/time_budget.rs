@@ -1,11 +1,11 @@
-//! Where the samples of a budget of time lower the error of the picture most.
+//! Placement of samples under a budget of time: where they lower the error of the picture most.
 //!
 //! Parts of the picture, both halves of each cell, get twice the samples that they have, those first whose error falls most by each
 //! sample of these. Between powers of two the points of a pixel leave gaps: there a third more samples may be worth nothing.
 //!
-//! What is rare and bright must not get more samples where it was met: the picture would be too dark. As for [`super::adaptive`], one
-//! half goes by the noise of the other one; and by that of samples which the other half has in any case, so that it does not tell
-//! either how many the first one asked for.
+//! Rare bright samples must not bring more samples to the place where they were met: the picture would be too dark. As in
+//! [`super::noise_goals`], one half goes by the noise of the other half. It counts only samples that the other half has in any
+//! case, so that it does not learn how many the first half wanted either.
 
 use crate::film::Film;
 
@@ -15,17 +15,22 @@ const LEAST: u32 = 16;
 /// The part of the mean number of samples that every pixel has: these tell of its noise.
 const SHARE: f64 = 1.0 / 8.0;
 
-/// What is done before noise is asked for again, as a part of what was done before.
+/// Work of a round before noise is measured again, as a part of the work before.
 const ROUND: f64 = 0.4;
 
-/// What a sample costs beside its rays, in rays.
+/// Cost of a sample beside its rays, in rays.
 const BESIDE: f64 = 1.0;
 
-/// Samples that the halves of each cell are to have next, at most `most`, by those that they have and the rays that these took; none
-/// where it is too early to tell.
-pub(super) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32) -> Option<Vec<[u32; 2]>> {
+/// Samples that the halves of each cell are to have next, at most `most`, by their samples so far and the rays of these. `None`
+/// while it is too early to tell.
+pub(in crate::pipeline) fn next_round(
+    film: &Film,
+    done: &[[u32; 2]],
+    rays: &[u64],
+    most: u32,
+) -> Option<Vec<[u32; 2]>> {
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
-    // What every half has had, whatever was asked for.
+    // Every half has had these, whatever the goals were.
     let known = 1 << least.ilog2();
     let halves = halves(film, done, rays, (known, most))?;
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
@@ -56,7 +61,7 @@ struct Half {
     error: f64,
     /// The power of the samples with which that falls.
     power: f64,
-    /// What a sample costs, in rays.
+    /// Cost of a sample, in rays.
     cost: f64,
 }
 
@@ -65,7 +70,7 @@ impl Half {
         self.pixels * f64::from(samples) * self.cost
     }
 
-    /// How much all that a sample costs lowers the sum of squared errors, where pixels have so many samples on average.
+    /// Fall of the sum of squared errors per cost of a sample, if pixels have `mean` samples on average.
     fn urgency(&self, mean: f64) -> f64 {
         if f64::from(self.samples) < SHARE * mean {
             return f64::INFINITY;

@@ -1,0 +1,69 @@
+//! The terminal: its window, its colours, and the means by which pictures are shown.
+
+use super::Setup;
+use crate::tui::color::{Ansi, ColorDepth, Shades};
+use crate::tui::event::{FrameReport, Window};
+use crate::tui::graphics::Protocol;
+use crate::tui::known::Ask;
+use crate::tui::mosaic::Grid;
+use crate::tui::preview_kind::PreviewKind;
+
+/// The terminal as far as it is known.
+pub(in crate::tui) struct DisplayState {
+    pub window: Window,
+    pub kind: PreviewKind,
+    pub depth: ColorDepth,
+    pub shades: Shades,
+    /// The terminal's 16 colours.
+    pub ansi: Ansi,
+    /// Questions to the terminal.
+    pub ask: Ask,
+    /// Whether the terminal's background is light.
+    pub is_light: bool,
+    /// Cost of the last frame.
+    pub frame: Option<FrameReport>,
+}
+
+impl DisplayState {
+    pub(super) fn new(setup: &Setup) -> Self {
+        Self {
+            window: setup.window,
+            kind: setup.preview,
+            depth: setup.depth,
+            shades: Shades::new(setup.depth, &setup.ansi),
+            ansi: setup.ansi,
+            ask: setup.ask,
+            is_light: setup.is_light,
+            frame: None,
+        }
+    }
+
+    /// Pixels of the preview in the width of a cell.
+    pub(in crate::tui) fn pixels_across(&self) -> u32 {
+        /// More are not worth their bytes.
+        const MOST: u32 = 10;
+        /// Pixels of the whole window: summing, developing and encoding those of its picture takes some 45 bytes each.
+        const MOST_PIXELS: f32 = 2_400_000.0;
+        /// The same for sixels, which themselves take as much again.
+        const MOST_IN_SIXELS: f32 = 1_600_000.0;
+        match self.kind {
+            PreviewKind::Pixels(protocol) => {
+                let most = match protocol {
+                    Protocol::Sixel => MOST_IN_SIXELS,
+                    Protocol::Kitty | Protocol::Iterm => MOST_PIXELS,
+                };
+                let window = &self.window;
+                let squares = f32::from(window.columns) * f32::from(window.rows) * window.cell_aspect;
+                let affordable = (most / squares.max(1.0)).sqrt() as u32;
+                u32::from(window.cell_pixels.0).min(affordable).clamp(1, MOST)
+            }
+            kind => kind.grid().map_or(1, Grid::columns),
+        }
+    }
+
+    /// Whether colours are mixed from those that the terminal has.
+    pub(in crate::tui) fn mixes_colors(&self) -> bool {
+        matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
+            || self.kind == PreviewKind::Pixels(Protocol::Sixel)
+    }
+}

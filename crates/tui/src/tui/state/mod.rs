@@ -1,0 +1,115 @@
+//! The state of the front end, in parts. `update` alone changes it.
+
+mod display;
+mod overlays;
+mod picture;
+mod request;
+mod saving;
+mod selection;
+mod work;
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+pub(super) use self::display::DisplayState;
+pub(super) use self::overlays::{OverlayState, Pane, Problems, ViewList};
+pub(super) use self::picture::PictureState;
+pub(super) use self::request::{CameraStep, RequestState, Toggles};
+pub(super) use self::saving::{PendingChange, SavingState};
+pub(super) use self::selection::{PickPurpose, Press, SelectionState};
+pub(super) use self::work::{Activity, AssetBar, WorkState};
+use super::color::{Ansi, ColorDepth};
+use super::event::Window;
+use super::known::Ask;
+use super::preview_kind::PreviewKind;
+use crate::pipeline::settings::Overrides;
+
+/// Values that the front end starts with.
+pub(super) struct Setup {
+    pub scene: PathBuf,
+    pub overrides: Overrides,
+    pub window: Window,
+    pub preview: PreviewKind,
+    pub depth: ColorDepth,
+    /// Whether the environment says that the terminal's background is light.
+    pub is_light: bool,
+    /// Likely values of the 16 colours.
+    pub ansi: Ansi,
+    /// Questions to the terminal.
+    pub ask: Ask,
+}
+
+/// The whole state.
+pub(super) struct State {
+    pub request: RequestState,
+    pub work: WorkState,
+    pub display: DisplayState,
+    pub picture: PictureState,
+    pub saving: SavingState,
+    pub selection: SelectionState,
+    pub overlays: OverlayState,
+
+    /// The time of the newest event.
+    pub now: Instant,
+    /// Whether the screen is out of date.
+    pub dirty: bool,
+    /// Whether the next frame is the first picture of a request or the answer to a key, which do not wait for their
+    /// turn.
+    pub urgent: bool,
+}
+
+impl State {
+    pub(super) fn new(setup: Setup, now: Instant) -> Self {
+        Self {
+            display: DisplayState::new(&setup),
+            request: RequestState::new(setup.scene, setup.overrides),
+            work: WorkState::new(now),
+            picture: PictureState::default(),
+            saving: SavingState::new(),
+            selection: SelectionState::new(),
+            overlays: OverlayState::default(),
+            now,
+            dirty: true,
+            urgent: false,
+        }
+    }
+
+    /// Whether the last step of the camera has no picture yet.
+    pub(super) fn awaits_step(&self) -> bool {
+        let Self { request, work, picture, .. } = self;
+        let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
+        // While the scene is broken, the last good one is rendered.
+        let is_at_work = match work.activity {
+            Activity::Running { .. } => true,
+            Activity::Waiting | Activity::Broken => request.camera.is_some() && self.work_goes_on(),
+            Activity::Done | Activity::Cancelled => false,
+        };
+        let is_newest = request.camera_step.generation == Some(request.generation);
+        is_newest && is_at_work && request.preview_size.is_some() && !is_shown
+    }
+
+    /// Whether the scene failed, not the work.
+    fn work_goes_on(&self) -> bool {
+        self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
+    }
+
+    /// Shows the list of views for a moment more.
+    pub(super) fn list_views(&mut self) {
+        self.overlays.list_views(self.now);
+        self.dirty = true;
+    }
+
+    /// Pauses the request's clock, or lets it go on.
+    pub(super) fn set_paused(&mut self, paused: bool) {
+        self.work.set_paused(paused, self.now);
+    }
+
+    /// Time at which the state needs the next tick, if nothing else happens.
+    pub(super) fn next_tick(&self) -> Option<Instant> {
+        const CLOCK: Duration = Duration::from_millis(250);
+        let clock = (self.work.is_running() && !self.work.paused).then(|| self.now + CLOCK);
+        let bars = self.work.assets.iter().filter_map(AssetBar::end).min();
+        let views = self.overlays.views.as_ref().map(|views| views.until);
+        [clock, self.request.resize_due, bars, views].into_iter().flatten().min()
+    }
+}

@@ -1,0 +1,58 @@
+//! Text over the picture: messages, errors and warnings, the help, the list of views.
+
+use std::time::{Duration, Instant};
+
+use crate::scene::diagnostic::Diagnostic;
+
+/// Errors because of which the picture does not show the current file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::tui) struct Problems {
+    /// Errors and warnings with places.
+    pub diagnostics: Vec<Diagnostic>,
+    /// A failure without a place.
+    pub work: Option<String>,
+}
+
+/// The list of views, while it is shown.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::tui) struct ViewList {
+    /// Time at which the list closes by itself.
+    pub until: Instant,
+    /// Letters of a name, typed after `/`. `None` unless the list is being searched.
+    pub name: Option<String>,
+}
+
+/// Text over the picture that can be scrolled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(in crate::tui) struct Pane {
+    pub open: bool,
+    /// First line shown.
+    pub scroll: usize,
+}
+
+/// Texts, and the panes that show them.
+#[derive(Default)]
+pub(in crate::tui) struct OverlayState {
+    /// The last message, until the next key.
+    pub message: Option<String>,
+    /// Errors of the scene. `None` while the scene is valid.
+    pub problems: Option<Problems>,
+    /// Errors in a file that may still be being written.
+    pub unconfirmed: Option<Vec<Diagnostic>>,
+    pub warnings: Vec<Diagnostic>,
+    /// Whether the warnings belong to the newest request.
+    pub are_warnings_known: bool,
+    /// The pane of errors and warnings.
+    pub diagnostics: Pane,
+    pub help: Pane,
+    pub views: Option<ViewList>,
+}
+
+impl OverlayState {
+    /// Shows the list of views for a moment more.
+    pub(in crate::tui) fn list_views(&mut self, now: Instant) {
+        const MOMENT: Duration = Duration::from_secs(4);
+        let name = self.views.take().and_then(|views| views.name);
+        self.views = Some(ViewList { until: now + MOMENT, name });
+    }
+}

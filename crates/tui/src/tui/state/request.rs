@@ -1,0 +1,147 @@
+//! The newest request to the worker, and what it is made of.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
+use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
+use crate::scene::description::{Integrator, Shadows};
+
+/// Settings that keys changed, on top of the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::tui) struct Toggles {
+    pub shadows: Option<Shadows>,
+    pub integrator: Option<Integrator>,
+    pub dof: Option<bool>,
+    pub photons: Option<bool>,
+    pub view: Option<View>,
+    pub camera: CameraChange,
+    pub exposure: Option<f32>,
+}
+
+/// A step of the camera. Steps come faster than pictures: the newest step waits until the step before has its first picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(in crate::tui) struct CameraStep {
+    /// Generation of the step's request.
+    pub generation: Option<u64>,
+    /// Whether there is a newer step.
+    pub is_waiting: bool,
+}
+
+/// The newest request: scene, settings, and what the worker found out about them.
+pub(in crate::tui) struct RequestState {
+    pub scene: PathBuf,
+    /// Overrides of the command line.
+    pub command_line: Overrides,
+    pub toggles: Toggles,
+
+    /// Number of the newest request.
+    pub generation: u64,
+    /// Toggles of the newest request.
+    pub sent_toggles: Toggles,
+    /// Whether the newest request differs from the one before in its exposure alone.
+    pub is_exposure_only: bool,
+    /// Preview size of the newest request.
+    pub preview_size: Option<PreviewSize>,
+    /// Time at which another preview size is requested.
+    pub resize_due: Option<Instant>,
+    /// Part of the image that is rendered before the rest.
+    pub first_section: Option<Section>,
+    pub camera_step: CameraStep,
+    /// First request of a camera that keys have moved.
+    pub moved_since: Option<u64>,
+
+    /// Settings that hold, as the worker reports them.
+    pub effective: Option<Effective>,
+    /// The scene's own camera, in the newest request that was understood.
+    pub camera: Option<Viewpoint>,
+    /// The scene's own exposure, in stops.
+    pub exposure: Option<f32>,
+}
+
+impl RequestState {
+    pub(super) fn new(scene: PathBuf, command_line: Overrides) -> Self {
+        Self {
+            scene,
+            command_line,
+            toggles: Toggles::default(),
+            generation: 0,
+            sent_toggles: Toggles::default(),
+            is_exposure_only: false,
+            preview_size: None,
+            resize_due: None,
+            first_section: None,
+            camera_step: CameraStep::default(),
+            moved_since: None,
+            effective: None,
+            camera: None,
+            exposure: None,
+        }
+    }
+
+    /// The scene's settings as the command line and the keys change them.
+    pub(in crate::tui) fn overrides(&self) -> Overrides {
+        let mut overrides = self.command_line.clone();
+        overrides.shadows = self.toggles.shadows.or(overrides.shadows);
+        overrides.integrator = self.toggles.integrator.or(overrides.integrator);
+        overrides.dof = self.toggles.dof.or(overrides.dof);
+        overrides.photons = self.toggles.photons.or(overrides.photons);
+        overrides.view = self.toggles.view.or(overrides.view);
+        overrides.camera = self.toggles.camera;
+        overrides.exposure = self.toggles.exposure.or(overrides.exposure);
+        overrides
+    }
+
+    /// The camera as the keys have it. `None` until a scene has been understood.
+    pub(in crate::tui) fn viewpoint(&self) -> Option<Viewpoint> {
+        self.camera.map(|camera| camera.changed(&self.toggles.camera))
+    }
+
+    /// Changes by keys that the picture alone does not show, in words.
+    pub(in crate::tui) fn changes(&self) -> Vec<String> {
+        let moved = self.toggles.camera.is_any().then(|| "camera moved".to_owned());
+        let exposed = self.toggles.exposure.map(|stops| format!("exposure {stops:+}"));
+        moved.into_iter().chain(exposed).collect()
+    }
+
+    /// Whether the image is written without a key: the scene's own camera, in the view that the run began with.
+    pub(in crate::tui) fn is_written(&self) -> bool {
+        self.view() == self.base_view() && !self.toggles.camera.is_any()
+    }
+
+    /// The view that the run was started with: the only one that is written without a key.
+    pub(in crate::tui) fn base_view(&self) -> View {
+        self.command_line.view.unwrap_or(View::Beauty)
+    }
+
+    pub(in crate::tui) fn view(&self) -> View {
+        self.toggles.view.unwrap_or_else(|| self.base_view())
+    }
+
+    /// The shadows that hold now.
+    pub(in crate::tui) fn shadows(&self) -> Shadows {
+        let of_scene = self.effective.as_ref().map_or(Shadows::Soft, |effective| effective.shadows);
+        self.overrides().shadows.unwrap_or(of_scene)
+    }
+
+    /// Whether photons are on now.
+    pub(in crate::tui) fn photons(&self) -> bool {
+        let of_scene = self.effective.as_ref().is_some_and(|effective| effective.photons);
+        self.overrides().photons.unwrap_or(of_scene)
+    }
+
+    /// The integrator that holds now.
+    pub(in crate::tui) fn integrator(&self) -> Integrator {
+        let of_scene = self.effective.as_ref().map_or(Integrator::Whitted, |effective| effective.integrator);
+        self.overrides().integrator.unwrap_or(of_scene)
+    }
+
+    /// Aspect ratio of the image; a usual one until it is known.
+    pub(in crate::tui) fn aspect(&self) -> f32 {
+        const USUAL: f32 = 4.0 / 3.0;
+        self.effective
+            .as_ref()
+            .map_or(USUAL, |it| it.width as f32 / it.height.max(1) as f32)
+            .clamp(0.02, 50.0)
+    }
+}

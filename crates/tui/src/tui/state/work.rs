@@ -1,0 +1,98 @@
+//! The worker's progress on the newest request.
+
+use std::time::{Duration, Instant};
+
+use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
+
+/// Activity of the worker for the current generation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::tui) enum Activity {
+    /// At work since then.
+    Running { since: Instant },
+    /// Finished.
+    Done,
+    /// Failed, perhaps because the file is not whole yet.
+    Waiting,
+    /// Failed.
+    Broken,
+    /// Stopped.
+    Cancelled,
+}
+
+/// The bar of a loading asset.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::tui) struct AssetBar {
+    pub progress: AssetProgress,
+    /// Time at which the bar was full; the bar stays a moment longer, so that 100% is seen.
+    pub finished: Option<Instant>,
+}
+
+impl AssetBar {
+    const LINGER: Duration = Duration::from_millis(400);
+
+    /// Time at which the bar disappears.
+    pub(in crate::tui) fn end(&self) -> Option<Instant> {
+        self.finished.map(|finished| finished + Self::LINGER)
+    }
+}
+
+/// Progress and result of the newest request.
+pub(in crate::tui) struct WorkState {
+    pub activity: Activity,
+    pub paused: bool,
+    /// Time at which the request was paused.
+    pub paused_at: Option<Instant>,
+    pub stages: [Option<StageReport>; Stage::ALL.len()],
+    /// Seconds of each stage when it last worked before this request.
+    pub last_seconds: [Option<f64>; Stage::ALL.len()],
+    pub assets: Vec<AssetBar>,
+    pub progress: Option<RenderProgress>,
+    pub report: Option<Box<Report>>,
+    /// Whether the request changed nothing.
+    pub unchanged: bool,
+    /// Finished renders so far; another exposure is no render.
+    pub renders: u64,
+}
+
+impl WorkState {
+    pub(super) fn new(now: Instant) -> Self {
+        Self {
+            activity: Activity::Running { since: now },
+            paused: false,
+            paused_at: None,
+            stages: Default::default(),
+            last_seconds: Default::default(),
+            assets: Vec::new(),
+            progress: None,
+            report: None,
+            unchanged: false,
+            renders: 0,
+        }
+    }
+
+    pub(in crate::tui) fn is_running(&self) -> bool {
+        matches!(self.activity, Activity::Running { .. })
+    }
+
+    /// Time that the current request has been at work; it stands still during a pause.
+    pub(in crate::tui) fn running_for(&self, now: Instant) -> Option<Duration> {
+        match self.activity {
+            Activity::Running { since } => {
+                Some(self.paused_at.unwrap_or(now).saturating_duration_since(since))
+            }
+            Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => None,
+        }
+    }
+
+    /// Stops the clock of the request, or lets it go on.
+    pub(in crate::tui) fn set_paused(&mut self, paused: bool, now: Instant) {
+        self.paused = paused;
+        if paused {
+            self.paused_at = Some(now);
+        } else if let Some(held) = self.paused_at.take()
+            && let Activity::Running { since } = &mut self.activity
+        {
+            *since += now.saturating_duration_since(held);
+        }
+    }
+}
