@@ -9,7 +9,7 @@ pub fn unit(seed: u64) -> impl FnMut() -> f32 {
     }
 }
 
-/// Numbers of [`unit`], spread over [−1, 1).
+/// Numbers of [`unit()`], spread over [−1, 1).
 pub fn signed(seed: u64) -> impl FnMut() -> f32 {
     let mut unit = unit(seed);
     move || unit() * 2.0 - 1.0
