@@ -213,7 +213,7 @@ pub struct ConeSide {
     tip: DVec3,
     /// Unit vector from the tip to the base.
     axis: DVec3,
-    /// Cosine and sine of the half angle at the tip.
+    /// Sine and cosine of the half angle at the tip.
     opening: (f64, f64),
     /// Length from the tip to the border of the base.
     slant: f64,

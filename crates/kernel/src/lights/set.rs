@@ -27,9 +27,9 @@ pub struct Lights {
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Receivers {
-    /// Vertices that the camera sees, in renders of direct light alone.
+    /// Direct light in the picture, which has no other noise.
     Eye,
-    /// Vertices of paths, which have other noise as well.
+    /// Vertices of paths, whose light has other noise as well.
     Paths,
 }
 
