@@ -1,7 +1,7 @@
-//! Where nothing is near a surface: a ray that crosses it there need not ask what touches it.
+//! Tables of where a surface has nothing near it: a ray that crosses it there need not ask what touches it.
 //!
 //! It is found out where a ray first asks, of a triangle of a mesh or of a cell of the box around a shape, and kept in a byte each.
-//! What is found depends on the geometry alone, so that it does not matter who asks first. `World::contact` gives the same by it as
+//! A byte depends on the geometry alone: it does not matter which ray asks first. `World::contact` gives the same by it as
 //! by its own search.
 
 use std::sync::OnceLock;
@@ -18,13 +18,13 @@ const UNKNOWN: u8 = 0;
 /// Something may be near anywhere.
 const NEVER: u8 = u8::MAX;
 
-/// Of a triangle, nothing is near where each barycentric coordinate is at least its byte of these parts.
+/// Parts of 1 that a triangle's byte counts: nothing is near where each barycentric coordinate is at least so many of them.
 const PARTS: f32 = 256.0;
 
 /// Most of these parts.
 const MOST_PARTS: f64 = 64.0;
 
-/// How many margins the lonely part of a triangle is from the edges: neighbours at an angle of 30° and more are not near.
+/// Number of margins that the lonely part of a triangle is from the edges: neighbours at an angle of 30° and more are not near.
 const FROM_EDGES: f64 = 4.0;
 
 /// Margins between a point and what is not near: the box of a margin around the point, and room for the rounding of both.
@@ -33,7 +33,7 @@ const APART: f64 = 1.9;
 /// Cells along a side of the box around a shape.
 const CELLS: usize = 16;
 
-/// What is known of all objects.
+/// Tables of all objects.
 #[derive(Debug, Default)]
 pub(super) struct Lonely {
     /// The diagonal of the box around all objects that have an end.
@@ -41,12 +41,12 @@ pub(super) struct Lonely {
     tables: Vec<OnceLock<Table>>,
 }
 
-/// What is known of an object.
+/// Table of an object.
 #[derive(Debug)]
 struct Table {
-    /// How near is near, at least.
+    /// Largest margin that the table holds for.
     margin: f32,
-    /// Of a shape, where its cells begin, and how many of them there are along each axis in a unit of length.
+    /// Corner of a shape's first cell, and cells per unit of length along each axis.
     cells: [Vec3; 2],
     states: Box<[AtomicU8]>,
 }
@@ -100,7 +100,7 @@ enum Region {
     /// A part of a triangle.
     Triangle {
         corners: [DVec3; 3],
-        /// How far what is not near is away.
+        /// Least distance of what is not near.
         apart: f64,
     },
 }

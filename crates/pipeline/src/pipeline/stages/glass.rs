@@ -13,7 +13,7 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Key;
 use crate::world::{Bodies, OpenGlass};
 
-/// What a picture lacks where glass is open, under the place of the object.
+/// Flaw of the picture where glass is open, under the place of the object.
 const LACKS: &str = "glass refracts where a ray goes in and where it comes out; no ray that comes through the hole \
                      is refracted or tinted";
 
@@ -42,7 +42,7 @@ pub(in crate::pipeline) fn glass(
     Ok(bodies)
 }
 
-/// What is said of glass with a hole; `None` if opaque surfaces are around the hole.
+/// The warning about glass with a hole. `None` if opaque surfaces are around the hole.
 fn warning(loaded: &Loaded, open: &OpenGlass) -> Option<Diagnostic> {
     if open.is_covered {
         return None;
