@@ -1,7 +1,7 @@
-//! Where nothing is near a surface: a ray that crosses it there need not ask what touches it.
+//! Tables of where a surface has nothing near it: a ray that crosses it there need not ask what touches it.
 //!
 //! It is found out where a ray first asks, of a triangle of a mesh or of a cell of the box around a shape, and kept in a byte each.
-//! What is found depends on the geometry alone, so that it does not matter who asks first. `World::contact` gives the same by it as
+//! A byte depends on the geometry alone: it does not matter which ray asks first. `World::contact` gives the same by it as
 //! by its own search.
 
 use std::sync::OnceLock;
@@ -18,13 +18,13 @@ const UNKNOWN: u8 = 0;
 /// Something may be near anywhere.
 const NEVER: u8 = u8::MAX;
 
-/// Of a triangle, nothing is near where each barycentric coordinate is at least its byte of these parts.
+/// Parts of 1 that a triangle's byte counts: nothing is near where each barycentric coordinate is at least so many of them.
 const PARTS: f32 = 256.0;
 
 /// Most of these parts.
 const MOST_PARTS: f64 = 64.0;
 
-/// How many margins the lonely part of a triangle is from the edges: neighbours at an angle of 30° and more are not near.
+/// Number of margins that the lonely part of a triangle is from the edges: neighbours at an angle of 30° and more are not near.
 const FROM_EDGES: f64 = 4.0;
 
 /// Margins between a point and what is not near: the box of a margin around the point, and room for the rounding of both.
@@ -33,7 +33,7 @@ const APART: f64 = 1.9;
 /// Cells along a side of the box around a shape.
 const CELLS: usize = 16;
 
-/// What is known of all objects.
+/// Tables of all objects.
 #[derive(Debug, Default)]
 pub(super) struct Lonely {
     /// The diagonal of the box around all objects that have an end.
@@ -41,11 +41,13 @@ pub(super) struct Lonely {
     tables: Vec<OnceLock<Table>>,
 }
 
-/// What is known of an object.
+/// Table of an object.
 #[derive(Debug)]
 struct Table {
-    /// How near is near, at least.
+    /// Largest margin that the table holds for.
     margin: f32,
+    /// Corner of a shape's first cell, and cells per unit of length along each axis.
+    cells: [Vec3; 2],
     states: Box<[AtomicU8]>,
 }
 
@@ -59,8 +61,23 @@ impl Lonely {
 }
 
 impl Table {
-    fn new(margin: f32, count: usize) -> Self {
-        Self { margin, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
+    fn new(margin: f32, cells: [Vec3; 2], count: usize) -> Self {
+        Self { margin, cells, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
+    }
+
+    /// A cell for each place of the box around a shape.
+    fn of_cells(margin: f32, bounds: &Aabb) -> Self {
+        let dense = Vec3::splat(CELLS as f32) / bounds.extent();
+        // A flat box is one cell thick.
+        let dense = Vec3::from(dense.to_array().map(|dense| if dense.is_finite() { dense } else { 0.0 }));
+        Self::new(margin, [bounds.min, dense], CELLS * CELLS * CELLS)
+    }
+
+    /// The cell that a point is in.
+    #[inline]
+    fn cell(&self, point: Vec3) -> Cell {
+        let [start, dense] = self.cells;
+        Cell(((point - start) * dense).to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
     }
 
     #[inline]
@@ -83,7 +100,7 @@ enum Region {
     /// A part of a triangle.
     Triangle {
         corners: [DVec3; 3],
-        /// How far what is not near is away.
+        /// Least distance of what is not near.
         apart: f64,
     },
 }
@@ -104,10 +121,10 @@ impl Geometry {
                 state != NEVER && at.surface.barycentric.min_element() * PARTS >= f32::from(state)
             }
             Object::Shape(shape) => {
-                let Some(bounds) = shape.bounds() else { return false };
-                let cell = Cell::at(at.surface.point, &bounds);
+                let cell = table.cell(at.surface.point);
                 let find = || {
-                    let around = cell.bounds(&bounds).grown(Vec3::splat(table.margin));
+                    let all = shape.bounds().unwrap_or(Aabb::EMPTY);
+                    let around = cell.bounds(&all).grown(Vec3::splat(table.margin));
                     if self.is_clear(&around, &Region::Cell(around), hit.object, None) { 1 } else { NEVER }
                 };
                 table.state(cell.number(), find) != NEVER
@@ -115,20 +132,21 @@ impl Geometry {
         }
     }
 
-    /// A table for an object whose margins are such as rays have that start in the scene or not too far from it.
+    /// A table for an object. Rays that come from farther than four times the size of the scene have larger margins than its own.
     fn table(&self, object: &Object) -> Table {
-        let of_rays = self.mesh_rounding() + 32.0 * f32::EPSILON * self.lonely().reach;
+        let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.lonely().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.rounding());
-                Table::new(margin, mesh.tree.loaded().mesh.triangles.len())
+                Table::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
             }
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    Table::new(of_rays.max(64.0 * f32::EPSILON * size), CELLS * CELLS * CELLS)
+                    Table::of_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
                 }
-                None => Table::new(0.0, 0),
+                // No ray has a margin that small.
+                None => Table::new(-1.0, [Vec3::ZERO; 2], 0),
             },
         }
     }
@@ -139,7 +157,7 @@ impl Geometry {
         let [a, b, c] = corners;
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
         let height = (b - a).cross(c - a).length() / longest;
-        let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(2.0);
+        let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(1.0);
         let middle = (a + b + c) / 3.0;
         // A part further from the edges where neighbours are at a small angle.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MOST_PARTS) {
@@ -216,12 +234,6 @@ impl Region {
 struct Cell([usize; 3]);
 
 impl Cell {
-    fn at(point: Vec3, bounds: &Aabb) -> Self {
-        let place = (point - bounds.min) / bounds.extent() * CELLS as f32;
-        // In a flat box, where that is no number, it is the first.
-        Self(place.to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
-    }
-
     fn number(&self) -> usize {
         let Self([x, y, z]) = *self;
         (z * CELLS + y) * CELLS + x

@@ -218,7 +218,7 @@ pub(super) enum MeshGlass {
     Some,
 }
 
-/// Whether an object is of glass; `None` if no part of it is.
+/// The part of an object that is of glass. `None` if it has none.
 pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Option<MeshGlass> {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
@@ -257,7 +257,7 @@ fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     unmatched(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
 }
 
-/// Those edges that no other one of them closes; `place` tells vertices at one place by one of them.
+/// Edges that no other one of them closes; `place` tells vertices at one place by one of them.
 fn unmatched(
     mesh: &TriangleMesh,
     edges: impl Iterator<Item = [u32; 2]> + Clone,

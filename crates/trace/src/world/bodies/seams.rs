@@ -1,4 +1,4 @@
-//! Which rims close each other: those between the same places that go opposite ways.
+//! Seams: rims that close each other, which are those between the same places that go opposite ways.
 
 use super::pieces::{Piece, Rim};
 use crate::accel::Bvh;
@@ -21,7 +21,7 @@ pub(super) struct Seam {
     pub disagrees: bool,
 }
 
-/// What became of all rims.
+/// Rims that are joined, and those that are not.
 #[derive(Debug, Default)]
 pub(super) struct Seams {
     pub joined: Vec<Seam>,
@@ -135,7 +135,7 @@ fn around(same: &[Half]) -> impl Iterator<Item = [usize; 2]> {
 struct Sites {
     points: Vec<DVec3>,
     tolerances: Vec<f64>,
-    /// Of each end of each rim, its place.
+    /// Places of the ends of each rim.
     ends: Vec<[u32; 2]>,
 }
 
