@@ -87,7 +87,7 @@ impl World {
     /// The sides of all surfaces that touch at a point, and what is there, in an order that depends on the scene alone.
     #[inline]
     pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
-        let error = if self.geometry.is_lonely(&at.hit, at) {
+        let error = if self.geometry.is_lonely(&at.hit, &at.surface, self.geometry.margin(at)) {
             self.geometry.only(at, memory)
         } else {
             self.geometry.search(at, memory)

@@ -7,9 +7,8 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::contact::Meeting;
 use super::{Geometry, Hit, MeshInstance, Object};
-use crate::geometry::{Aabb, Shape};
+use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
 /// Nobody has asked yet.
@@ -106,11 +105,11 @@ enum Region {
 }
 
 impl Geometry {
-    /// Whether nothing but the object that was hit, and of a mesh nothing but its triangle, is near to a point of it.
-    pub(super) fn is_lonely(&self, hit: &Hit, at: &Meeting) -> bool {
+    /// Whether nothing but the object that was hit, and of a mesh nothing but its triangle, is within a margin of a point of it.
+    pub(super) fn is_lonely(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.lonely().tables[hit.object as usize].get_or_init(|| self.table(object));
-        if !(self.margin(at).max_element() <= table.margin) {
+        if !(margin.max_element() <= table.margin) {
             return false;
         }
         match object {
@@ -118,10 +117,10 @@ impl Geometry {
                 let triangle = hit.shape.primitive;
                 let find = || self.parts_from_edges(hit.object, mesh, triangle, table.margin);
                 let state = table.state(triangle as usize, find);
-                state != NEVER && at.surface.barycentric.min_element() * PARTS >= f32::from(state)
+                state != NEVER && surface.barycentric.min_element() * PARTS >= f32::from(state)
             }
             Object::Shape(shape) => {
-                let cell = table.cell(at.surface.point);
+                let cell = table.cell(surface.point);
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
                     let around = cell.bounds(&all).grown(Vec3::splat(table.margin));

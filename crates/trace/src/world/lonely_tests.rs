@@ -269,7 +269,7 @@ fn what_is_lonely_is_what_a_search_finds_nothing_at() {
                 (world.contact_of(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
-            let is_lonely = world.geometry.is_lonely(&hit, &at);
+            let is_lonely = world.geometry.is_lonely(&hit, &at.surface, world.geometry.margin(&at));
             if is_lonely {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }

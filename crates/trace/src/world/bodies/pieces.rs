@@ -86,7 +86,8 @@ impl Pieces {
                 }
                 Shape::Cone { base, tip, radius, cap: false } => {
                     let axis = (tip - base).normalize();
-                    let area = std::f64::consts::PI * radius * (radius * radius + tip.distance_squared(base)).sqrt();
+                    let area =
+                        std::f64::consts::PI * radius * (radius * radius + tip.distance_squared(base)).sqrt();
                     let shown = axis * (std::f64::consts::PI * radius * radius);
                     let volume = (tip - pieces.origin).dot(shown) / 3.0;
                     pieces.begin(number, (area, volume), radius.max(tip.distance(base)));
