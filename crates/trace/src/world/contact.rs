@@ -87,12 +87,47 @@ impl World {
     /// The sides of all surfaces that touch at a point, and what is there, in an order that depends on the scene alone.
     #[inline]
     pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
-        let error = if self.geometry.is_lonely(&at.hit, &at.surface, self.geometry.margin(at)) {
+        let margin = self.geometry.margin(at);
+        let error = if self.geometry.is_lonely(&at.hit, &at.surface, margin) {
+            if self.is_large_ball(at.hit.object, margin) {
+                return self.contact_of_ball(at, visit);
+            }
             self.geometry.only(at, memory)
         } else {
             self.geometry.search(at, memory)
         };
         self.contact_of(at, (memory, error), visit)
+    }
+
+    /// Whether an object is a sphere whose other side is far from what is near a point of it.
+    fn is_large_ball(&self, object: u32, margin: Vec3) -> bool {
+        match &self.geometry.objects()[object as usize] {
+            Object::Shape(Shape::Sphere(sphere)) => sphere.radius > 8.0 * f64::from(margin.max_element()),
+            Object::Shape(
+                Shape::Plane(_)
+                | Shape::Quad(_)
+                | Shape::Box(_)
+                | Shape::Triangle(_)
+                | Shape::Disk(_)
+                | Shape::Cylinder(_)
+                | Shape::Cone(_)
+                | Shape::Torus(_),
+            )
+            | Object::Mesh(_) => false,
+        }
+    }
+
+    /// [`World::contact_of`] a large ball of glass that nothing else is near: the side that the ray comes from tells all.
+    fn contact_of_ball(&self, at: &Meeting, mut visit: impl FnMut(Near)) -> Sides {
+        let SurfacePoint { point, error, normal, .. } = at.surface;
+        let object = at.hit.object;
+        if normal.dot(at.normal) > 0.0 {
+            visit(Near::Around { object, material: self.material_index(&at.hit) as u32 });
+        }
+        Sides {
+            before: offset_origin(point, error, at.normal, at.normal),
+            beyond: offset_origin(point, error, at.normal, -at.normal),
+        }
     }
 
     /// The same of what may be near, where points may be off by so much.
