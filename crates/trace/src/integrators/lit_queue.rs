@@ -30,8 +30,7 @@ pub struct LitQueue {
     rows: Vec<LitRow>,
     /// Rows in use; the others are memory.
     count: usize,
-    /// Index of the row for single vertices; the row is full, or there is none, if the index is not that of a row in
-    /// use.
+    /// Index of the row for single vertices. If no row in use has this index, the row is full or there is none.
     open: usize,
     /// Light of lamps at the vertex of each path of the round.
     arrived: Vec<Vec3>,

@@ -88,7 +88,11 @@ impl World {
     /// alone.
     #[inline]
     pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
-        let error = if self.geometry.is_lonely(&at.hit, at) {
+        let margin = self.geometry.margin(at);
+        let error = if self.geometry.is_lonely(&at.hit, &at.surface, margin) {
+            if self.is_large_ball(at.hit.object, margin) {
+                return self.contact_of_ball(at, visit);
+            }
             self.geometry.only(at, memory)
         } else {
             self.geometry.search(at, memory)
@@ -96,7 +100,39 @@ impl World {
         self.contact_of(at, (memory, error), visit)
     }
 
-    /// [`World::contact`] for the given candidates, with points in error by at most `margin`.
+    /// Whether an object is a sphere whose other side is far from the surfaces near a point of it.
+    fn is_large_ball(&self, object: u32, margin: Vec3) -> bool {
+        match &self.geometry.objects()[object as usize] {
+            Object::Shape(Shape::Sphere(sphere)) => sphere.radius > 8.0 * f64::from(margin.max_element()),
+            Object::Shape(
+                Shape::Plane(_)
+                | Shape::Quad(_)
+                | Shape::Box(_)
+                | Shape::Triangle(_)
+                | Shape::Disk(_)
+                | Shape::Cylinder(_)
+                | Shape::Cone(_)
+                | Shape::Torus(_),
+            )
+            | Object::Mesh(_) => false,
+        }
+    }
+
+    /// [`World::contact_of`] for a large ball of glass with nothing else near: the side from which the ray comes decides
+    /// everything.
+    fn contact_of_ball(&self, at: &Meeting, mut visit: impl FnMut(Near)) -> Sides {
+        let SurfacePoint { point, error, normal, .. } = at.surface;
+        let object = at.hit.object;
+        if normal.dot(at.normal) > 0.0 {
+            visit(Near::Around { object, material: self.material_index(&at.hit) as u32 });
+        }
+        Sides {
+            before: offset_origin(point, error, at.normal, at.normal),
+            beyond: offset_origin(point, error, at.normal, -at.normal),
+        }
+    }
+
+    /// Finds the sides among the given candidates, whose points may be in error by at most `margin`.
     pub(super) fn contact_of(
         &self,
         at: &Meeting,

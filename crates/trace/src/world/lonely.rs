@@ -1,15 +1,14 @@
 //! Lonely places: parts of surfaces with nothing near them. A ray that crosses a surface there need not search for contacts.
 //!
 //! The first ray that asks computes it, for a triangle of a mesh or for a cell of the box around a shape, and a byte each keeps the
-//! result. The result depends on the geometry alone, so that it does not matter which ray asks first. `World::contact` gives the
-//! same with it as by its own search.
+//! result. The result depends on the geometry alone: it does not matter which ray asks first. `World::contact` gives the same with
+//! it as by its own search.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::contact::Meeting;
 use super::{Geometry, Hit, MeshInstance, Object};
-use crate::geometry::{Aabb, Shape};
+use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
 /// Value before any ray has asked.
@@ -18,14 +17,13 @@ const UNKNOWN: u8 = 0;
 /// Value if something may be near anywhere.
 const NEVER: u8 = u8::MAX;
 
-/// Unit of a triangle's byte: nothing is near if each barycentric coordinate is at least its byte in these parts.
+/// Parts of 1 in a triangle's byte: nothing is near if each barycentric coordinate is at least so many of them.
 const PARTS: f32 = 256.0;
 
 /// Most of these parts.
 const MOST_PARTS: f64 = 64.0;
 
-/// Distance of the lonely part of a triangle from its edges, in margins: neighbours at an angle of 30° and more are not
-/// near.
+/// Distance of the lonely part of a triangle from its edges, in margins: neighbours at an angle of 30° and more are not near.
 const FROM_EDGES: f64 = 4.0;
 
 /// Least distance, in margins, of surfaces that are not near: the box of a margin around the point, and room for the
@@ -48,6 +46,8 @@ pub(super) struct Lonely {
 struct Table {
     /// Largest margin for which the table holds.
     margin: f32,
+    /// Corner of a shape's first cell, and cells per unit of length along each axis.
+    cells: [Vec3; 2],
     states: Box<[AtomicU8]>,
 }
 
@@ -61,8 +61,23 @@ impl Lonely {
 }
 
 impl Table {
-    fn new(margin: f32, count: usize) -> Self {
-        Self { margin, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
+    fn new(margin: f32, cells: [Vec3; 2], count: usize) -> Self {
+        Self { margin, cells, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
+    }
+
+    /// A table with a cell for each place of the box around a shape.
+    fn of_cells(margin: f32, bounds: &Aabb) -> Self {
+        let dense = Vec3::splat(CELLS as f32) / bounds.extent();
+        // A flat box is one cell thick.
+        let dense = Vec3::from(dense.to_array().map(|dense| if dense.is_finite() { dense } else { 0.0 }));
+        Self::new(margin, [bounds.min, dense], CELLS * CELLS * CELLS)
+    }
+
+    /// The cell that contains a point.
+    #[inline]
+    fn cell(&self, point: Vec3) -> Cell {
+        let [start, dense] = self.cells;
+        Cell(((point - start) * dense).to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
     }
 
     #[inline]
@@ -91,11 +106,11 @@ enum Region {
 }
 
 impl Geometry {
-    /// Whether only the object of the hit, and of a mesh only its triangle, is near a point.
-    pub(super) fn is_lonely(&self, hit: &Hit, at: &Meeting) -> bool {
+    /// Whether only the object of the hit, and of a mesh only its triangle, is within a margin of a point.
+    pub(super) fn is_lonely(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.lonely().tables[hit.object as usize].get_or_init(|| self.table(object));
-        if !(self.margin(at).max_element() <= table.margin) {
+        if !(margin.max_element() <= table.margin) {
             return false;
         }
         match object {
@@ -103,13 +118,13 @@ impl Geometry {
                 let triangle = hit.shape.primitive;
                 let find = || self.parts_from_edges(hit.object, mesh, triangle, table.margin);
                 let state = table.state(triangle as usize, find);
-                state != NEVER && at.surface.barycentric.min_element() * PARTS >= f32::from(state)
+                state != NEVER && surface.barycentric.min_element() * PARTS >= f32::from(state)
             }
             Object::Shape(shape) => {
-                let Some(bounds) = shape.bounds() else { return false };
-                let cell = Cell::at(at.surface.point, &bounds);
+                let cell = table.cell(surface.point);
                 let find = || {
-                    let around = cell.bounds(&bounds).grown(Vec3::splat(table.margin));
+                    let all = shape.bounds().unwrap_or(Aabb::EMPTY);
+                    let around = cell.bounds(&all).grown(Vec3::splat(table.margin));
                     if self.is_clear(&around, &Region::Cell(around), hit.object, None) { 1 } else { NEVER }
                 };
                 table.state(cell.number(), find) != NEVER
@@ -117,20 +132,21 @@ impl Geometry {
         }
     }
 
-    /// A table for an object, with the margin of rays that start in the scene or not too far from it.
+    /// A table for an object. Rays that come from farther than four times the size of the scene have larger margins than its own.
     fn table(&self, object: &Object) -> Table {
-        let of_rays = self.mesh_rounding() + 32.0 * f32::EPSILON * self.lonely().reach;
+        let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.lonely().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.rounding());
-                Table::new(margin, mesh.tree.loaded().mesh.triangles.len())
+                Table::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
             }
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    Table::new(of_rays.max(64.0 * f32::EPSILON * size), CELLS * CELLS * CELLS)
+                    Table::of_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
                 }
-                None => Table::new(0.0, 0),
+                // No ray has a margin that small.
+                None => Table::new(-1.0, [Vec3::ZERO; 2], 0),
             },
         }
     }
@@ -141,7 +157,7 @@ impl Geometry {
         let [a, b, c] = corners;
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
         let height = (b - a).cross(c - a).length() / longest;
-        let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(2.0);
+        let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(1.0);
         let middle = (a + b + c) / 3.0;
         // Try a part further from the edges, for neighbours at a small angle.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MOST_PARTS) {
@@ -218,12 +234,6 @@ impl Region {
 struct Cell([usize; 3]);
 
 impl Cell {
-    fn at(point: Vec3, bounds: &Aabb) -> Self {
-        let place = (point - bounds.min) / bounds.extent() * CELLS as f32;
-        // In a flat box, `along` is NaN: take the first cell.
-        Self(place.to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
-    }
-
     fn number(&self) -> usize {
         let Self([x, y, z]) = *self;
         (z * CELLS + y) * CELLS + x

@@ -269,10 +269,13 @@ fn what_is_lonely_is_what_a_search_finds_nothing_at() {
                 (world.contact_of(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
-            let is_lonely = world.geometry.is_lonely(&hit, &at);
+            let is_lonely = world.geometry.is_lonely(&hit, &at.surface, world.geometry.margin(&at));
             if is_lonely {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }
+            let mut near = Vec::new();
+            let sides = world.contact(&at, &mut NearMemory::default(), |one| near.push(one));
+            assert_eq!((sides, near), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             let is_other = |near: &Near| match near {
                 Near::Around { object, .. } | Near::Surface { hit: Hit { object, .. }, .. } => {
                     *object != hit.object

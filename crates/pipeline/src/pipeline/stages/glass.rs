@@ -14,7 +14,7 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Key;
 use crate::world::{Bodies, OpenGlass};
 
-/// What a picture lacks where glass is open, under the place of the object.
+/// Flaw of the picture where glass is open, under the place of the object.
 const LACKS: &str = "glass refracts where a ray goes in and where it comes out; no ray that comes through the hole \
                      is refracted or tinted";
 
@@ -43,7 +43,7 @@ pub(in crate::pipeline) fn glass(
     Ok(bodies)
 }
 
-/// What is said of glass with a hole; `None` if opaque surfaces are around the hole.
+/// The warning about glass with a hole. `None` if opaque surfaces are around the hole.
 fn warning(loaded: &Loaded, open: &OpenGlass) -> Option<Diagnostic> {
     if open.is_covered {
         return None;
@@ -85,5 +85,102 @@ fn percent(part: f64) -> String {
         percent if percent < 0.1 => "less than 0.1 %".to_owned(),
         percent if percent < 9.95 => format!("{percent:.1} %"),
         percent => format!("{percent:.0} %"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::pipeline::stages::meshes::KeptMesh;
+    use crate::scene::fingerprint::Fingerprint;
+
+    /// The warnings of a scene whose mesh files are this one.
+    fn warnings(text: &str, material: &str, mesh: Option<LoadedMesh>) -> Vec<Diagnostic> {
+        let text = format!(
+            "[materials.a]\ntype = '{material}'\n{text}\n[render]\nambient = [1, 1, 1]\n[camera]\nposition = [0, 1, 4]\n\
+             look_at = [0, 1, 0]\n"
+        );
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, &text).expect("written");
+        std::fs::write(folder.path().join("a.ply"), "").expect("written");
+        let loaded = crate::scene::load(&path, &[]).expect("a scene that is right");
+        let mut findings = Findings::default();
+        let meshes: Meshes = mesh
+            .into_iter()
+            .map(|mesh| {
+                let key = Fingerprint::new("test").finish();
+                Arc::new(KeptMesh::new(Arc::new(mesh), key, Vec::new()))
+            })
+            .collect();
+        let token = CancelToken::new();
+        let found = glass(&loaded, &meshes, &mut Memo::default(), &mut findings, &token);
+        assert!(found.is_ok(), "{text}");
+        let is_right = |one: &Diagnostic| {
+            let place = one.place.as_ref().map(|place| &place.source[place.span.clone()]);
+            one.help.is_some() && place.is_some_and(|place| place.starts_with("[["))
+        };
+        assert!(findings.warnings.iter().all(is_right), "{:?}", findings.warnings);
+        findings.warnings
+    }
+
+    fn messages(text: &str, material: &str, mesh: Option<LoadedMesh>) -> Vec<String> {
+        warnings(text, material, mesh).into_iter().map(|one| one.message).collect()
+    }
+
+    #[test]
+    fn shapes_without_an_inside_are_warned_about() {
+        for (shape, expected) in [
+            ("[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]", "a quad of glass has no inside"),
+            (
+                "[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 1, 0]",
+                "a triangle of glass has no inside",
+            ),
+            ("[[disk]]", "a disk of glass has no inside"),
+            ("[[cylinder]]\ncaps = false", "an open cylinder of glass has no inside"),
+            ("[[cone]]\ncap = false", "an open cone of glass has no inside"),
+        ] {
+            let shape = format!("{shape}\nmaterial = 'a'");
+            assert_eq!(messages(&shape, "glass", None), [expected]);
+            assert_eq!(messages(&shape, "phong", None), [""; 0], "{shape} that is not of glass");
+        }
+        for closed in [
+            "[[cylinder]]",
+            "[[cone]]",
+            "[[torus]]",
+            "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1",
+            "[[box]]",
+            "[[plane]]",
+            "[[disk]]\nmaterial = 'a'\n[[cone]]\ncap = false",
+        ] {
+            assert_eq!(messages(&format!("{closed}\nmaterial = 'a'"), "glass", None), [""; 0], "{closed}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_with_a_hole_is_named_and_said_how_large_the_hole_is() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let all = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let of = |triangles: &[[u32; 3]]| {
+            let mut loaded = LoadedMesh::default();
+            loaded.mesh.positions = positions.clone();
+            loaded.mesh.triangles = triangles.to_vec();
+            Some(loaded)
+        };
+        let text = "[[mesh]]\nname = 'drop'\nfile = 'a.ply'\nmaterial = 'a'";
+        assert_eq!(messages(text, "glass", of(&all)), [""; 0]);
+        // Half an area of 1 of half an area of 3 + √3.
+        let open =
+            "mesh \"drop\" of glass is not closed: 3 edges without a neighbour, 27 % of its surface missing";
+        assert_eq!(messages(text, "glass", of(&all[1..])), [open]);
+        assert_eq!(messages(text, "phong", of(&all[1..])), [""; 0]);
+        // One of them looks inwards.
+        let odd = [[0, 1, 2], all[1], all[2], all[3]];
+        let odd = &messages(text, "glass", of(&odd))[..];
+        assert_eq!(
+            odd,
+            ["mesh \"drop\" of glass is inside out in parts: 6 edges between two fronts and backs"]
+        );
     }
 }

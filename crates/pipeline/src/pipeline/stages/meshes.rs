@@ -29,7 +29,7 @@ pub(in crate::pipeline) struct KeptMesh {
 }
 
 impl KeptMesh {
-    fn new(mesh: Arc<LoadedMesh>, key: Key, companions: Vec<FileRead>) -> Self {
+    pub(super) fn new(mesh: Arc<LoadedMesh>, key: Key, companions: Vec<FileRead>) -> Self {
         Self { mesh, key, companions, bounds: OnceLock::new() }
     }
 

@@ -86,7 +86,8 @@ impl Pieces {
                 }
                 Shape::Cone { base, tip, radius, cap: false } => {
                     let axis = (tip - base).normalize();
-                    let area = std::f64::consts::PI * radius * radius.hypot(tip.distance(base));
+                    let area =
+                        std::f64::consts::PI * radius * (radius * radius + tip.distance_squared(base)).sqrt();
                     let shown = axis * (std::f64::consts::PI * radius * radius);
                     let volume = (tip - pieces.origin).dot(shown) / 3.0;
                     pieces.begin(number, (area, volume), radius.max(tip.distance(base)));
@@ -218,7 +219,7 @@ pub(super) enum MeshGlass {
     Some,
 }
 
-/// The glass of an object. `None` if no part of it is glass.
+/// The part of an object that is glass. `None` if no part is.
 pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Option<MeshGlass> {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),

@@ -21,7 +21,7 @@ pub(super) struct Seam {
     pub disagrees: bool,
 }
 
-/// Result of joining all rims.
+/// Joined rims, and rims that nothing closes.
 #[derive(Debug, Default)]
 pub(super) struct Seams {
     pub joined: Vec<Seam>,
@@ -135,7 +135,7 @@ fn around(same: &[Half]) -> impl Iterator<Item = [usize; 2]> {
 struct Sites {
     points: Vec<DVec3>,
     tolerances: Vec<f64>,
-    /// Places of both ends of each rim.
+    /// Places of the ends of each rim.
     ends: Vec<[u32; 2]>,
 }
 
