@@ -132,7 +132,7 @@ impl World {
         }
     }
 
-    /// Finds the sides among the given candidates, whose points may be in error by at most `margin`.
+    /// Finds the sides among the given candidates, whose points may be in error by at most `error`.
     pub(super) fn contact_of(
         &self,
         at: &Meeting,
