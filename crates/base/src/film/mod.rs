@@ -80,8 +80,8 @@ pub struct TileSamples {
     pub negative: Option<NegativeLobes>,
 }
 
-/// Samples where the reconstruction filter is negative. A pixel's value is (1 + `weight`) · mean of the other samples −
-/// `weight` · mean of these. A constant image therefore stays constant, wherever the samples fall.
+/// Samples where the reconstruction filter is negative. A pixel's value is (1 + `weight`) · mean of the other
+/// samples − `weight` · mean of these. A constant image therefore stays constant, wherever the samples fall.
 #[derive(Clone, Debug)]
 pub struct NegativeLobes {
     /// −∫min(f, 0)/∫f.

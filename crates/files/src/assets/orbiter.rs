@@ -28,8 +28,8 @@ const LIMIT: u64 = 1 << 20;
 /// The angle of gKit's viewer, for files from before the `f` line.
 const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 
-/// Reads an orbiter file. `c` and `s` are required; without them, `p` and `r` are 0 and `f` is 45 degrees at 1024 ×
-/// 640.
+/// Reads an orbiter file. `c` and `s` are required; without them, `p` and `r` are 0 and `f` is 45 degrees at
+/// 1024 × 640.
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line: an unknown letter, a wrong count of numbers,

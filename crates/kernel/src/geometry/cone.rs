@@ -55,10 +55,10 @@ impl Cone {
         is_rounding(distance, self.reach())
     }
 
-    /// Interval in which the line is inside the side, extended beyond the base and, by its image, beyond the tip: |p| ≤
-    /// k|z|. The quadratic A·s² − 2B·s + C is that of the foot of the tip on the line, so that B is one product. B² −
-    /// AC is a difference of squares of the line's moment about the tip, exact to the last digits also for lines that
-    /// graze the side next to the tip.
+    /// Interval in which the line is inside the side, extended beyond the base and, by its image, beyond the tip:
+    /// |p| ≤ k|z|. The quadratic A·s² − 2B·s + C is that of the foot of the tip on the line, so that B is one
+    /// product. B² − AC is a difference of squares of the line's moment about the tip, exact to the last digits also for lines
+    /// that graze the side next to the tip.
     fn side_stretch(&self, line: &Line) -> Option<Stretch> {
         let k = self.radius / self.height;
         let (p, d) = (line.foot, line.direction);

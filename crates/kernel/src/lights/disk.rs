@@ -130,9 +130,9 @@ impl DiskView {
 
     /// Direction, distance to the plane, and the inverse pdf.
     ///
-    /// In a plane before the point, perpendicular to the axis, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills a·b/(Q
-    /// + √Q) dφ, Q = 1 + a²cos²φ + b²sin²φ, and in it cosines to the axis are uniform. φ gets the density ∝ 1/(p·cos²φ +
-    /// q·sin²φ), whose denominator is Q + √Q at both axes and at least 1/1.2 of it between.
+    /// In a plane before the point, perpendicular to the axis, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills
+    /// a·b/(Q + √Q) dφ, Q = 1 + a²cos²φ + b²sin²φ, and in it cosines to the axis are uniform. φ gets the density
+    /// ∝ 1/(p·cos²φ + q·sin²φ), whose denominator is Q + √Q at both axes and at least 1/1.2 of it between.
     #[inline(always)]
     pub fn sample(&self, normal: DVec3, u: [f32; 2]) -> (DVec3, f64, f64) {
         let (sin, cos) = sin_cos(std::f32::consts::TAU * u[1]);

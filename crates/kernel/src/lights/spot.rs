@@ -56,8 +56,8 @@ impl SpotLight {
         if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
     }
 
-    /// Power over the intensity on the axis, in sr: the inner cone of the half angle (1 − blend)·H, and the integral of (H −
-    /// θ)/(blend·H) over the directions around it.
+    /// Power over the intensity on the axis, in sr: the inner cone of the half angle (1 − blend)·H, and the integral of
+    /// (H − θ)/(blend·H) over the directions around it.
     #[inline]
     pub fn solid_angle(&self) -> f64 {
         let Cones { inner, faded, .. } = self.cones();

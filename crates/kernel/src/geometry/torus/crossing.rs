@@ -7,8 +7,8 @@
 //! g(s) = (q − 1)² + z² − tube² = |p|² + 1 − tube² − 2q
 //! ```
 //!
-//! has the sign of the distance from the surface and is computed from that distance. Its second derivative is 2(1 −
-//! w/q³), with w a constant of the line: there are at most two points of inflection, known in closed form, and on each
+//! has the sign of the distance from the surface and is computed from that distance. Its second derivative is
+//! 2(1 − w/q³), with w a constant of the line: there are at most two points of inflection, known in closed form, and on each
 //! piece between them g is convex or concave. On such a piece, Newton's method from the right end goes to the nearest
 //! root without ever passing it, or shows that there is none.
 

@@ -25,8 +25,8 @@ pub struct Torus {
 }
 
 impl Torus {
-    /// A torus from its centre, an axis of any length but 0, the radius of the circle and that of the tube, 0 < tube <
-    /// radius.
+    /// A torus from its centre, an axis of any length but 0, the radius of the circle and that of the tube,
+    /// 0 < tube < radius.
     pub fn new(center: DVec3, axis: DVec3, radius: f64, tube: f64) -> Self {
         Self { frame: AxialFrame::new(center, axis), radius, tube }
     }

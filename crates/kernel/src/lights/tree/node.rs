@@ -187,8 +187,8 @@ impl LobeRow {
     const NONE: Self =
         Self { axis: [[0.0; LANES]; 3], shininess: [0.0; LANES], peak: [0.0; LANES], diffuse: [1.0; LANES] };
 
-    /// Upper bound on, and estimate of, a lobe's response to light within an angle of a direction: cosⁿ δ lies below (1
-    /// + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and never 0.
+    /// Upper bound on, and estimate of, a lobe's response to light within an angle of a direction: cosⁿ δ lies below
+    /// (1 + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and never 0.
     #[inline(always)]
     fn value(&self, i: usize, cos: f32, sin: f32) -> f32 {
         let short = 1.0 - cos - sin;

@@ -42,8 +42,8 @@ pub fn inverse_part(
     }
 }
 
-/// One if the first trial succeeds, with the probability p, and otherwise 1 + 1/p in the mean: p + (1 − p)·(1 + 1/p) =
-/// 1/p.
+/// One if the first trial succeeds, with the probability p, and otherwise 1 + 1/p in the mean:
+/// p + (1 − p)·(1 + 1/p) = 1/p.
 fn after_first(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     if succeeds(0) { 1.0 } else { 1.0 + mean_trials(|number| succeeds(number + 1)) }
 }
