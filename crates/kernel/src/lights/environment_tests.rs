@@ -107,7 +107,6 @@ fn samples_have_the_density_that_their_directions_have() {
 
 /// The light of a grey map arrives by samples of equal weight, 4π times the mean; but rows of cells at the poles are interpolated
 /// by angles and sampled by heights.
-/// angles and sampled by heights.
 #[test]
 fn samples_are_as_dense_as_the_light_between_texels() {
     let (width, height) = (64, 32);

@@ -117,6 +117,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 Shadows::Hard => light.middle().is_some(),
                 Shadows::Off => true,
             };
+            // Take the only direction, or the requested number of samples.
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
@@ -132,10 +133,12 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32, folds);
+                    // Multiply by the emission texture.
                     if let Some(pattern) = light.pattern() {
                         values = self.tinted(pattern, &samples, active, values);
                         sums.rays.lookups += u64::from(active.count_ones());
                     }
+                    // Weight against the competing technique.
                     if WEIGHED {
                         let leaves_gloss = self.shot.lobes_find_sky && light.is_from_all_around();
                         let of_light = if leaves_gloss && self.others.are_lobes() {
@@ -150,6 +153,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
                 }
             }
+            // Trace the one ray to the middle of the light.
             if waiting.active != 0 {
                 self.add_waiting(light.middle(), &waiting, sums, folds);
             }

@@ -169,6 +169,7 @@ impl LitQueue {
         let scatters = onward.filter(|onward| onward.leads_on);
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
+            // Sample the lights at each row; rays to picked lights wait in the pool.
             for number in first..end {
                 shot.token.check()?;
                 let row = &mut self.rows[number];
@@ -182,7 +183,9 @@ impl LitQueue {
                     self.pool.trace(&shot.world.geometry, &mut group);
                 }
             }
+            // Trace the rest of the pool.
             self.pool.trace(&shot.world.geometry, &mut group);
+            // Add the light by rays in lobes and by photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
                 let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
@@ -198,6 +201,7 @@ impl LitQueue {
                 rays += arrived.rays;
                 self.note(number, measure, &arrived.light);
             }
+            // Scatter the paths that go on.
             if let Some(onward) = scatters {
                 for row in &self.rows[first..end] {
                     Scattering { shot, row, used: row.used, onward }.scatter(&self.media, &self.cones, next);

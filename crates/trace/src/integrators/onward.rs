@@ -123,6 +123,7 @@ impl Loops for Scattering<'_> {
     fn run(self, folds: impl Folds) -> Ways {
         let Self { shot, row, used, onward } = self;
         let sampler = row.sampler(shot);
+        // Sample a direction for each vertex.
         let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
         let [lobe, _] =
             if row.is_glossy { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
@@ -136,6 +137,7 @@ impl Loops for Scattering<'_> {
                 set_lane(&mut directions, i, row.lobes(i).sample_diffuse([u[0][i], u[1][i]]));
             }
         }
+        // Evaluate the BSDF and the pdf there.
         let Response { f, cosines, glosses } = row.response(&directions);
         let [mut densities, mut carried] = [[0.0; LANES]; 2];
         let mut factors = f;
@@ -151,7 +153,9 @@ impl Loops for Scattering<'_> {
             let bit = 1 << i;
             alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
         }
+        // Drop directions that certainly see nothing.
         alive &= used & !row.hidden(&directions, folds);
+        // Apply Russian roulette.
         if onward.is_risked {
             let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
             for i in 0..LANES {

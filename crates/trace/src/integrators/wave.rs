@@ -72,6 +72,7 @@ pub fn trace(
     };
     wave.begin_round();
     wave.lit.expect(slots.len(), shot.pixel_spread > 0.0);
+    // Make and shade the camera rays, which are the first round.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
         shot.camera_rows(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
@@ -80,12 +81,15 @@ pub fn trace(
             wave.shade_packet(Rays::Camera(row, first, count, first - slots.start))?;
         }
     }
+    // Light their vertices, and give the light to the sink.
     wave.light()?;
     wave.lit.settle_run(slots.start, &mut wave.sink);
     wave.next_round(rays);
+    // Follow the rays that go on, round by round.
     while !rays.is_empty() {
         wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
         if wave.goes_on {
+            // Find all hits first, so that packets are of one object.
             shot.closest_hits(rays, hits)?;
             by_object.sort(hits);
             for places in by_object.places().chunks(PACKET) {
@@ -158,11 +162,13 @@ impl Wave<'_, '_> {
         let are_lit = self.depth < shot.settings.render.max_depth && self.sink.takes_reflected();
         let met = shot.meet(rays, self.sink.measure, are_lit, (self.lit.spare(), self.surfaces));
         self.counters.texture_lookups += met.lookups;
+        // Count the work of the rays, if the view shows it.
         if self.sink.measure == Measure::Work {
             for lane in 0..rays.count() {
                 self.add_work(&met.path(shot, &rays, lane), met.hit(lane));
             }
         }
+        // Queue the plain vertices for direct light.
         if are_lit {
             self.lit.keep();
             if shot.pixel_spread > 0.0 {
@@ -172,6 +178,7 @@ impl Wave<'_, '_> {
                 }
             }
         }
+        // Select the rays that find light by themselves, and those that need shading one by one.
         let render = &shot.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let plain = if render.ambient == Vec3::ZERO { met.shining } else { met.plain };
@@ -199,6 +206,7 @@ impl Wave<'_, '_> {
                 }
             }
         }
+        // Light the queued vertices while their data are in the cache.
         if self.lit.is_full() {
             self.light()?;
         }
@@ -295,11 +303,13 @@ impl Wave<'_, '_> {
                 Some(surface) => Vertex::on(shot, &path, &hit, surface),
                 None => Vertex::to_shade(shot, &path, &hit),
             };
+            // Shade an opaque surface.
             if vertex.material.bsdf.glass().is_none() {
                 let weight = if vertex.emits() { shot.lamp_weight(&path, &hit) } else { 1.0 };
                 let after = shot.without_open(path.medium);
                 return self.shade_surface(path, &vertex, (hit.shape.t, after), weight);
             }
+            // At glass, find all surfaces that touch here.
             let Crossing { sides, arrived, near, far, opaque } =
                 shot.crossing(&path, &vertex, &hit, self.crossing);
             path.medium = arrived;
@@ -309,9 +319,11 @@ impl Wave<'_, '_> {
                 let weight = if vertex.emits() { shot.touching_lamp_weight(&path, &touched) } else { 1.0 };
                 return self.shade_surface(path, &vertex, (hit.shape.t, near), weight);
             }
+            // Reflect and refract at a change of glass.
             if near.glass() != far.glass() {
                 return self.shade_glass(path, &vertex.between(sides), [near, far], hit.shape.t);
             }
+            // Pass on, as nothing changes here.
             path.throughput *= absorption(shot.world, arrived, hit.shape.t);
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
             path.history = path.history.hidden();

@@ -78,6 +78,7 @@ impl Shooting<'_> {
             shots: Shots::default(),
             counters: RayCounters::default(),
         };
+        // Emit the photons, then trace them round by round.
         let mut rays = Vec::new();
         flight.start(count, &mut rays);
         let (mut row, mut surfaces) = (LitRow::EMPTY, SurfaceRow::EMPTY);
@@ -86,6 +87,7 @@ impl Shooting<'_> {
                 self.shot.token.check()?;
                 flight.meet(packet, &mut row, &mut surfaces);
             }
+            // Scatter the single vertices, and apply Russian roulette.
             flight.scatter_open();
             flight.media.truncate(1);
             flight.spare();
@@ -148,6 +150,7 @@ impl Flight<'_> {
         for begin in (0..count).step_by(PACKET) {
             let numbers = shot.world.geometry.instructions().run(Drawing { shot, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
+                // Emit a photon, and start it behind planes of glass on its way.
                 let Some(emitted) = shooting.emission.emit(numbers) else { continue };
                 let past_planes = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
@@ -193,6 +196,7 @@ impl Flight<'_> {
             }
             self.scatter(row);
         }
+        // Shade other surfaces one by one.
         for i in lanes(met.any & !met.plain) {
             if let Some(hit) = met.hit(i) {
                 self.shade(rays[i], hit, met.surface(surfaces, i));
@@ -231,9 +235,11 @@ impl Flight<'_> {
                 let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
                 return self.shade_surface(&path, &vertex, lacks_photons);
             }
+            // Reflect or refract at a change of glass.
             if near.glass() != far.glass() {
                 return self.shade_glass(&path, &vertex.between(sides), far);
             }
+            // Pass on, as nothing changes here.
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
             lacks_photons = false;
             match shot.world.geometry.closest(&path.ray) {
@@ -305,7 +311,6 @@ impl Flight<'_> {
 
     /// Adds a photon after the adjoint of a δ lobe about a shading normal: see the top of this file. `eta` is the ratio of the
     /// index of refraction ahead of the ray to that behind it.
-    /// higher where the ray goes.
     fn push(&mut self, path: &PathRay, vertex: &Vertex<'_>, (shading, eta): (Vec3, f32), mut ray: PathRay) {
         let facet = vertex.normal;
         if shading != facet {
