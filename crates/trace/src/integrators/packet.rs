@@ -184,6 +184,7 @@ impl Loops for Meeting<'_> {
         let Self { shot, rays, measure, are_lit, row, surface } = self;
         let world = shot.world;
         row.reset();
+        // Put the rays side by side.
         let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
         let rows = match rays {
@@ -205,6 +206,7 @@ impl Loops for Meeting<'_> {
                 &of_paths
             }
         };
+        // Find their hits, or take the known ones.
         let (hits, object) = match rays {
             Rays::Camera(..) | Rays::Paths(..) => world.geometry.closest_rows(rows, &mut ends, traced, folds),
             Rays::Traced(_, known, places) => {
@@ -218,6 +220,7 @@ impl Loops for Meeting<'_> {
                 (hits, object)
             }
         };
+        // Keep the rays in air, whose surfaces may be plain.
         *surface = SurfaceRow::EMPTY;
         let any = hits.any(folds);
         let (mut left, mut plain, mut shining) = (any, 0, 0);
@@ -276,12 +279,14 @@ impl Loops for Meeting<'_> {
                 row.set_bsdf(of & !seen, &bsdf, Measure::ALL);
             }
         }
+        // Set the positions and normals of the plain vertices.
         (row.seen, row.from_gloss) = (seen, from_gloss);
         let lifts = match shot.settings.render.shadows {
             Shadows::Off => Lifts::All,
             Shadows::Hard | Shadows::Soft => Lifts::IfFree(seen),
         };
         let front = if plain == 0 { 0 } else { row.place(&rays, rows, surface, lifts, folds) };
+        // Compute the other surfaces, and the environment for rays without a hit.
         let found = shot.fill_others(surface, rows, (&hits, &object), any & !plain, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {

@@ -45,6 +45,7 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
         let Self { lighting, selection, number, pool } = self;
         let sampler = lighting.row.sampler(lighting.shot);
         let mut sums = Sums::NOTHING;
+        // Sample all lights beyond the scene, if the tree leaves them out.
         if selection.leaves_beyond {
             lighting.add_all(Light::is_beyond, &mut sums, folds);
         }
@@ -52,6 +53,7 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
         let (each, tree) = (selection.picks.count, selection.tree);
         // With many samples, the rays of one row of picks already go to one place.
         let mut pool = (samples <= TOGETHER).then_some(pool);
+        // Pick lights for several samples together, and sample the picked ones.
         for first in (0..samples).step_by(TOGETHER as usize) {
             let picks = lighting.picks(selection, &sampler, first..(first + TOGETHER).min(samples));
             for (k, pick) in (first * each..).zip(&picks) {

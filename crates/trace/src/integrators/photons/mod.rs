@@ -150,6 +150,7 @@ impl Photons {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Cancelled> {
+        // Aim photons at the mirrors and glass.
         let specular = Specular::of(world);
         let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.exists());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
@@ -157,6 +158,7 @@ impl Photons {
         let glasses = glasses_at_lights(world);
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let mut own = Self { settings: photons, most_depth, emission, glasses, radii: [photons.radius; 2] };
+        // Trace pass 0, and choose the radii by its photons.
         let sent = own.shoot((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced];
