@@ -183,17 +183,49 @@ impl Shape {
         of_any!(self, it => it.contains(point))
     }
 
-    /// Whether a point is inside, or behind a plane. `None` if the shape encloses nothing.
+    /// Whether it has an inside; the inside of a plane is behind it.
     #[inline]
-    pub fn encloses(&self, point: DVec3) -> Option<bool> {
-        let is_closed = match self {
-            Self::Sphere(_) | Self::Box(_) | Self::Torus(_) => true,
+    pub fn is_closed(&self) -> bool {
+        match self {
+            Self::Sphere(_) | Self::Box(_) | Self::Torus(_) | Self::Plane(_) => true,
             Self::Cylinder(cylinder) => cylinder.is_capped(),
             Self::Cone(cone) => cone.is_capped(),
-            Self::Plane(plane) => return Some(plane.is_behind(point)),
             Self::Quad(_) | Self::Triangle(_) | Self::Disk(_) => false,
-        };
-        is_closed.then(|| self.contains(point))
+        }
+    }
+
+    /// Whether a point is inside, or behind a plane. `None` if the shape has no inside.
+    #[inline]
+    pub fn encloses(&self, point: DVec3) -> Option<bool> {
+        match self {
+            Self::Plane(plane) => Some(plane.is_behind(point)),
+            Self::Sphere(_)
+            | Self::Box(_)
+            | Self::Torus(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Quad(_)
+            | Self::Triangle(_)
+            | Self::Disk(_) => self.is_closed().then(|| self.contains(point)),
+        }
+    }
+
+    /// [`Shape::encloses`] of several points.
+    #[inline]
+    pub fn encloses_each<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
+        match self {
+            Self::Plane(plane) => Some(points.map(|point| plane.is_behind(point))),
+            Self::Sphere(_)
+            | Self::Box(_)
+            | Self::Torus(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Quad(_)
+            | Self::Triangle(_)
+            | Self::Disk(_) => {
+                self.is_closed().then(|| of_any!(self, it => points.map(|point| it.contains(point))))
+            }
+        }
     }
 
     /// Texture coordinates of a point of its surface.

@@ -236,6 +236,7 @@ impl Loops for Meeting<'_> {
                 }
             }
         }
+        // Compute the surfaces of each plain object, and look its material up.
         while left != 0 {
             let id = object[left.trailing_zeros() as usize % PACKET];
             let mut of = [0; PACKET];

@@ -158,9 +158,11 @@ impl World {
         let mut closed_lead = false;
         for &id in &memory.objects {
             if let Object::Shape(shape) = &geometry.objects()[id as usize] {
-                closed_lead |=
-                    shape.encloses(sides.before.as_dvec3()) != shape.encloses(probe.close.as_dvec3());
-                self.near_shape(shape, id, &sides).into_iter().for_each(&mut found);
+                let points = [sides.before, probe.close, sides.beyond].map(|point| point.as_dvec3());
+                let inside = shape.encloses_each(points);
+                closed_lead |= inside.is_some_and(|[before, close, _]| before != close);
+                let is_around = inside.map(|[_, _, beyond]| beyond);
+                self.near_shape(shape, id, (&sides, is_around)).into_iter().for_each(&mut found);
             }
         }
         let ends = [sides.before, sides.beyond].map(|end| end.as_dvec3());
@@ -174,9 +176,15 @@ impl World {
         if is_led || closed_lead { sides } else { Sides { before: probe.close, ..sides } }
     }
 
-    fn near_shape(&self, shape: &Shape, object: u32, sides: &Sides) -> Option<Near> {
+    /// A shape between the sides, or around the point beyond, if that is known of it.
+    fn near_shape(
+        &self,
+        shape: &Shape,
+        object: u32,
+        (sides, is_around): (&Sides, Option<bool>),
+    ) -> Option<Near> {
         let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
-        if let (true, Some(is_around)) = (self.is_glass(material), shape.encloses(sides.beyond.as_dvec3())) {
+        if let (true, Some(is_around)) = (self.is_glass(material), is_around) {
             return is_around.then_some(Near::Around { object, material });
         }
         let ray = sides.ray().to_f64();
@@ -214,7 +222,7 @@ impl World {
     /// Whether an object by itself determines its inside; around other objects, rays must remember the glass.
     pub fn is_closed(&self, object: u32) -> bool {
         match &self.geometry.objects()[object as usize] {
-            Object::Shape(shape) => shape.encloses(DVec3::ZERO).is_some(),
+            Object::Shape(shape) => shape.is_closed(),
             Object::Mesh(_) => false,
         }
     }
