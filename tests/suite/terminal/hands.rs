@@ -85,8 +85,8 @@ fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
     assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
     terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
     terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
-    // Its own write is not an edit: the table of stages still has the first render's. A key without further effect
-    // closes the message, which covers the stages.
+    // Its own write is not an edit: the table of stages still shows those that were reused. A key without further
+    // effect closes the message, which covers the stages.
     terminal.press("??");
     terminal.wait("nothing rendered anew", |screen| screen.contents().contains("reused"));
     folder.write("scene.toml", &kept.replace(RED, GREEN));
