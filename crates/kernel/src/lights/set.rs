@@ -38,7 +38,7 @@ pub enum Receivers {
 pub struct Selection<'a> {
     /// Tree over the lights to pick from.
     pub tree: &'a LightTree,
-    /// Number of picks.
+    /// Effort of picking.
     pub picks: Picks,
     /// Whether light from beyond the scene is outside of the tree, and is sampled at every vertex: its bounds ignore what the scene
     /// occludes.
@@ -125,8 +125,8 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// Most lamps that the vertices of a path sample one and all; of more, some are picked. Measured in rooms of 1 to 32
-    /// lamps.
+    /// Most lamps of a scene whose paths sample all lamps at each vertex; of more, vertices pick some. Measured in rooms of 1 to
+    /// 32 lamps.
     const MOST_BY_PATHS: usize = 8;
 
     /// Set of lights from which vertices pick. `None` if they sample all lights.
