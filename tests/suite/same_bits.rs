@@ -143,6 +143,51 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
     assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
 }
 
+/// A grid over a square at y = 0, with its middles a little higher, in so many steps.
+fn uneven_floor(steps: u32) -> String {
+    let mut text = String::new();
+    for i in 0..=steps {
+        for j in 0..=steps {
+            let at = |k: u32| 4.0 * f64::from(k) / f64::from(steps) - 2.0;
+            text += &format!("v {} {} {}\n", at(i), 0.02 * f64::from((i * j) % 2), at(j));
+        }
+    }
+    for i in 0..steps {
+        for j in 0..steps {
+            let corner = |i: u32, j: u32| i * (steps + 1) + j + 1;
+            let [a, b, c, d] = [corner(i, j), corner(i, j + 1), corner(i + 1, j + 1), corner(i + 1, j)];
+            text += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn trees_of_boxes_and_of_planes_give_the_same_pictures_by_photons() {
+    let desk = Desk::new();
+    desk.write("fine.obj", uneven_floor(40));
+    desk.write("coarse.obj", uneven_floor(6));
+    desk.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nf 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n");
+    for floor in ["fine", "coarse"] {
+        let scene = format!(
+            "[render]\nwidth = 48\nheight = 48\nsamples = 4\nmax_depth = 6\n[photons]\nenabled = true\ncount = 20000\n\
+             [camera]\nposition = [0, 3, 4]\nlook_at = [0, 0.3, 0]\n[materials.floor]\n[materials.glass]\ntype = \"glass\"\n\
+             [[light]]\ntype = \"point\"\nposition = [1, 3, 1]\nintensity = [20, 20, 20]\n\
+             [[mesh]]\nfile = \"{floor}.obj\"\nmaterial = \"floor\"\n\
+             [[mesh]]\nfile = \"cube.obj\"\nmaterial = \"floor\"\ntranslate = [-1.6, 0, -0.4]\nrotate = [0, 20, 0]\n\
+             [[mesh]]\nfile = \"cube.obj\"\nmaterial = \"glass\"\ntranslate = [0.1, 0.1, -0.5]\nrotate = [0, 50, 0]\nsmooth = false\n"
+        );
+        desk.write("scene.toml", scene);
+        let of = |accel: &str| {
+            let output = desk.run(&format!("scene.toml --once -o all.exr --accel {accel}"));
+            assert!(output.status.success(), "{accel}: {}", String::from_utf8_lossy(&output.stderr));
+            hash(&desk, "all.exr")
+        };
+        let by_boxes = of("bvh");
+        assert_eq!([of("bvh-high"), of("kdtree")], [by_boxes; 2], "{floor}");
+    }
+}
+
 #[test]
 fn a_known_picture_with_photons_has_its_bits_by_all_threads_and_instructions() {
     const KNOWN: u64 = 0xd74c_31d8_c5c1_117c;

@@ -44,13 +44,16 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Which surfaces there are, and which of them are of glass.
+/// Which surfaces there are, and what those of glass are made of.
 pub(in crate::pipeline) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("glass");
     key.key(&shapes(scene, of));
     for object in &scene.objects {
-        let is_glass = object.material.map(|index| scene.materials[index].kind.is_glass());
-        key.flag(is_glass.is_some()).flag(is_glass.unwrap_or_default());
+        let substance = object.material.and_then(|index| scene.materials[index].kind.substance());
+        key.flag(object.material.is_some()).flag(substance.is_some());
+        for part in substance.into_iter().flatten() {
+            key.u64(part);
+        }
     }
     key.finish()
 }

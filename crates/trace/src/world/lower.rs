@@ -70,6 +70,11 @@ pub fn file_is_glass(own: &FileMaterial) -> bool {
     }
 }
 
+/// Index of refraction of a mesh file's material, and its transmittance per unit of length; `None` if it is not glass.
+pub fn file_glass(own: &FileMaterial) -> Option<(f32, DVec3)> {
+    file_is_glass(own).then(|| (own.ior.clamp(1.0, 10.0), DVec3::ONE))
+}
+
 /// Emission of the front side of a mesh file's material.
 pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     if !file_emits(own) {
@@ -82,10 +87,10 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
 
 /// A material of a mesh file. The highlight's strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
-    let bsdf = match kind(own) {
-        FileKind::Mirror => Bsdf::Mirror(Mirror { reflectance: own.specular.min(Vec3::ONE) }),
-        FileKind::Glass => Bsdf::Glass(Glass::new(own.ior.clamp(1.0, 10.0), DVec3::ONE)),
-        FileKind::Phong => return file_phong(images, own),
+    let bsdf = match (kind(own), file_glass(own)) {
+        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror { reflectance: own.specular.min(Vec3::ONE) }),
+        (FileKind::Glass, Some((ior, tint))) => Bsdf::Glass(Glass::new(ior, tint)),
+        (FileKind::Phong | FileKind::Glass, _) => return file_phong(images, own),
     };
     Material { bsdf, emission: Emission::NONE, normal_map: None }
 }

@@ -40,6 +40,7 @@ pub(in crate::pipeline) fn glass(
     };
     memo.set(key, Arc::clone(&bodies));
     findings.warnings.extend(bodies.open().iter().filter_map(|open| warning(loaded, open)));
+    findings.warnings.extend(bodies.flat().iter().map(|&object| warning_of_flat(loaded, object)));
     Ok(bodies)
 }
 
@@ -68,7 +69,7 @@ fn warning(loaded: &Loaded, open: &OpenGlass) -> Option<Diagnostic> {
         } else {
             let part = percent(open.missing);
             format!(
-                "mesh{name} of glass is not closed: {edges} without a neighbour, {part} of its surface missing"
+                "mesh{name} of glass is not closed: {edges} without a neighbour of the same glass, {part} of its surface missing"
             )
         };
     }
@@ -78,6 +79,19 @@ fn warning(loaded: &Loaded, open: &OpenGlass) -> Option<Diagnostic> {
         place.label = LACKS.to_owned();
     }
     Some(diagnostic)
+}
+
+/// The warning about a closed body that encloses nothing.
+fn warning_of_flat(loaded: &Loaded, object: u32) -> Diagnostic {
+    let object = &loaded.scene.objects[object as usize];
+    let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
+    let message = format!("glass{name} encloses nothing: its faces are there twice, facing both ways");
+    let help = "export each face once, facing outwards (not double-sided)".to_owned();
+    let mut diagnostic = loaded.diagnostic_at(object.span.clone(), Severity::Warning, message, Some(help));
+    if let Some(place) = &mut diagnostic.place {
+        place.label = "rays that come in stay inside: all behind it is tinted".to_owned();
+    }
+    diagnostic
 }
 
 fn percent(part: f64) -> String {
@@ -171,8 +185,7 @@ mod tests {
         let text = "[[mesh]]\nname = 'drop'\nfile = 'a.ply'\nmaterial = 'a'";
         assert_eq!(messages(text, "glass", of(&all)), [""; 0]);
         // Half an area of 1 of half an area of 3 + √3.
-        let open =
-            "mesh \"drop\" of glass is not closed: 3 edges without a neighbour, 27 % of its surface missing";
+        let open = "mesh \"drop\" of glass is not closed: 3 edges without a neighbour of the same glass, 27 % of its surface missing";
         assert_eq!(messages(text, "glass", of(&all[1..])), [open]);
         assert_eq!(messages(text, "phong", of(&all[1..])), [""; 0]);
         // One of them looks inwards.
@@ -182,5 +195,38 @@ mod tests {
             odd,
             ["mesh \"drop\" of glass is inside out in parts: 6 edges between two fronts and backs"]
         );
+        // Each face twice, facing both ways.
+        let both: Vec<_> = all.iter().flat_map(|&[a, b, c]| [[a, b, c], [a, c, b]]).collect();
+        let twice = "glass \"drop\" encloses nothing: its faces are there twice, facing both ways";
+        assert_eq!(messages(text, "glass", of(&both)), [twice]);
+    }
+
+    #[test]
+    fn parts_of_different_glass_do_not_close_each_other() {
+        let side = |corner: &str, u: &str, v: &str, material: &str| {
+            format!("[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = '{material}'\n")
+        };
+        let (x, y, z) = ("[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]");
+        let cube = |lid: &str| {
+            [
+                side("[0, 0, 0]", y, x, "a"),
+                side("[0, 0, 0]", z, y, "a"),
+                side("[0, 0, 0]", x, z, "a"),
+                side("[1, 0, 0]", y, z, "a"),
+                side("[0, 1, 0]", z, x, "a"),
+                side("[0, 0, 1]", x, y, lid),
+            ]
+            .concat()
+        };
+        let other = |glass: &str| format!("[materials.b]\ntype = 'glass'\n{glass}\n{}", cube("b"));
+        assert_eq!(messages(&cube("a"), "glass", None), [""; 0]);
+        assert_eq!(messages(&other("ior = 1.5\ntint = [1, 1, 1]"), "glass", None), [""; 0], "the same glass");
+        for glass in ["ior = 1.33", "tint = [0.5, 1, 1]"] {
+            assert_eq!(
+                messages(&other(glass), "glass", None).len(),
+                6,
+                "{glass}: each side has an open edge"
+            );
+        }
     }
 }

@@ -90,9 +90,14 @@ impl MaterialKind {
 
     /// Whether it is glass.
     pub fn is_glass(&self) -> bool {
-        match self {
-            Self::Glass { .. } => true,
-            Self::Phong { .. } | Self::Mirror { .. } => false,
+        self.substance().is_some()
+    }
+
+    /// The bits of what glass is made of: index of refraction and transmittance. `None` if it is not glass.
+    pub fn substance(&self) -> Option<[u64; 4]> {
+        match *self {
+            Self::Glass { ior, tint } => Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits)),
+            Self::Phong { .. } | Self::Mirror { .. } => None,
         }
     }
 }

@@ -205,17 +205,21 @@ impl Around {
         is_crowded: &mut bool,
     ) -> bool {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
-        if !mesh.around(bounds, |triangle| near.try_push(triangle).is_ok()) {
+        // Trees visit some triangles twice, and others that are only nearly there: neither may count, or trees would differ.
+        let is_told = mesh.around(bounds, |triangle| {
+            let is_known = near.contains(&triangle);
+            is_known
+                || !Aabb::around_f64(mesh.world_corners(triangle)).meets(bounds)
+                || near.try_push(triangle).is_ok()
+        });
+        if !is_told {
             *is_crowded = true;
             return false;
         }
-        // Some are visited more than once.
         near.sort_unstable();
-        let mut last = None;
         near.iter().all(|&triangle| {
-            let is_new = last.replace(triangle) != Some(triangle);
-            let piece = || mesh.world_corners(triangle).into_iter().collect();
-            !is_new || self.add_piece(&piece(), || receives(material(world, id, triangle)))
+            let piece = mesh.world_corners(triangle).into_iter().collect();
+            self.add_piece(&piece, || receives(material(world, id, triangle)))
         })
     }
 

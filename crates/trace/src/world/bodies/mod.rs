@@ -1,10 +1,11 @@
 //! Bodies of glass: which surfaces belong together.
 //!
 //! A ray that enters glass by one object and leaves it by another was in one thing only if both objects are one body. Objects of
-//! glass that enclose nothing by themselves (meshes, quads, triangles, disks, tubes) are one body if they close each other: if
-//! their rims are equal within rounding, whole or cut by the ends of others, and the surface continues from one front to the other.
-//! A piece whose front faces the other way than its neighbours' is turned, and so is a body whose front faces inwards. A body has
-//! the place of its last object in the order of the file.
+//! glass that enclose nothing by themselves (meshes, quads, triangles, disks, tubes) are one body if they close each other: if their
+//! rims are equal within rounding, whole or cut by the ends of others, and the surface continues from one front to the other. They
+//! are of one glass, with the same index of refraction and tint: the inside does not depend on the way in. A piece whose front faces
+//! the other way than its neighbours' is turned, and so is a body whose front faces inwards. A body has the place of its last object
+//! in the order of the file.
 //!
 //! A body with a hole is open, unless something opaque surrounds the hole. No ray can know whether it is inside such glass: its
 //! surface only determines the medium of a ray that arrives or leaves there (`integrators::crossing`).
@@ -15,7 +16,7 @@ mod seams;
 
 use std::collections::BTreeMap;
 
-use pieces::{Pieces, Rim};
+use pieces::{Piece, Pieces, Rim};
 use seams::{OpenRim, Seam, Seams, root};
 
 use crate::assets::LoadedMesh;
@@ -29,6 +30,9 @@ const SMALL_HOLE: f64 = 1e-3;
 /// Missing part of a body's surface below which a hole is rounding.
 const NO_HOLE: f64 = 1e-7;
 
+/// Volume of a body below which it encloses nothing, relative to a cube of about its surface.
+const NO_VOLUME: f64 = 1e-9;
+
 /// Least part of a rim that opaque surfaces must cover to close it.
 const COVERED: f64 = 0.95;
 
@@ -39,6 +43,8 @@ pub struct Bodies {
     parts: Vec<Part>,
     /// The pieces that stay open.
     open: Vec<OpenGlass>,
+    /// Objects of bodies without a hole that enclose nothing, one for each body.
+    flat: Vec<u32>,
 }
 
 /// An object's role in a body.
@@ -96,6 +102,9 @@ impl Bodies {
                 bodies.parts[object as usize] = Part { place: place.unwrap_or(object), is_turned, is_open };
                 bodies.open.extend(hole.at(piece, object, is_covered));
             }
+            if hole.part <= NO_HOLE && groups.are_flat(&pieces, &members) {
+                bodies.flat.extend(members.first().map(|&piece| pieces.list[piece as usize].object));
+            }
         }
         bodies.open.sort_by_key(|open| open.object);
         let is_plain = |(object, part): (u32, &Part)| *part == alone(object);
@@ -123,6 +132,11 @@ impl Bodies {
     /// Whether any body is open.
     pub fn has_open(&self) -> bool {
         self.parts.iter().any(|part| part.is_open)
+    }
+
+    /// Objects of bodies that have no hole and enclose nothing: each of their faces is there twice, facing both ways.
+    pub fn flat(&self) -> &[u32] {
+        &self.flat
     }
 
     /// The objects with holes in their surface, in the order of the file.
@@ -184,6 +198,17 @@ impl Groups {
     /// Whether the fronts of two pieces of one body face different ways.
     fn disagree(&self, [one, other]: [u32; 2]) -> bool {
         self.flips[one as usize] != self.flips[other as usize]
+    }
+
+    /// Whether the pieces of a closed body enclose nothing.
+    fn are_flat(&self, pieces: &Pieces, members: &[u32]) -> bool {
+        let (mut volume, mut area) = (0.0, 0.0);
+        for &piece in members {
+            let Piece { volume: own, area: surface, .. } = &pieces.list[piece as usize];
+            volume += if self.flips[piece as usize] { -own } else { *own };
+            area += surface;
+        }
+        volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
 
     /// The pieces of each body.

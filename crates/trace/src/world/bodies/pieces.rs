@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 
-use super::super::lower::file_is_glass;
+use super::super::lower::{file_glass, file_is_glass};
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
 use crate::math::transform::Transform;
-use crate::scene::description::{Mesh, Object, Scene, Shape};
+use crate::scene::description::{MaterialKind, Mesh, Object, Scene, Shape};
 
 /// Number of chords of a circular rim: they are the same points for every rim on one circle.
 const CHORDS: usize = 32;
@@ -27,7 +27,12 @@ pub(super) struct Piece {
     pub volume: f64,
     /// Tolerance of its points.
     pub tolerance: f64,
+    /// Its glass.
+    pub substance: Substance,
 }
+
+/// A glass by the bits of its index of refraction and transmittance. `None` for a mesh of several glasses.
+pub(super) type Substance = Option<[u64; 4]>;
 
 /// A straight piece of a border, in the direction that has the surface on its left, seen from the front.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +65,7 @@ impl Pieces {
             if pieces.list.is_empty() {
                 pieces.origin = start(&object.shape, meshes);
             }
+            let first = pieces.list.len();
             match object.shape {
                 Shape::Mesh(mesh) => {
                     let loaded = meshes[mesh.file];
@@ -100,12 +106,15 @@ impl Pieces {
                 | Shape::Cylinder { caps: true, .. }
                 | Shape::Cone { cap: true, .. } => {}
             }
+            for piece in &mut pieces.list[first..] {
+                piece.substance = substance_of(scene, meshes, object);
+            }
         }
         Ok(pieces)
     }
 
     fn begin(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
-        self.list.push(Piece { object, area, volume, tolerance: ROUNDING * reach });
+        self.list.push(Piece { object, area, volume, tolerance: ROUNDING * reach, substance: None });
         self.list.len() as u32 - 1
     }
 
@@ -225,6 +234,20 @@ pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
         (None, Some(mesh)) => {
             meshes[mesh.file].materials.iter().any(file_is_glass).then_some(MeshGlass::Some)
+        }
+        (None, None) => None,
+    }
+}
+
+/// The glass of an object that is of glass.
+fn substance_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Substance {
+    match (object.material, object.shape.mesh()) {
+        (Some(index), _) => scene.materials[index].kind.substance(),
+        (None, Some(mesh)) => {
+            let of = |(ior, tint)| MaterialKind::Glass { ior, tint }.substance();
+            let mut each = meshes[mesh.file].materials.iter().filter_map(file_glass).filter_map(of);
+            let first = each.next()?;
+            each.all(|other| other == first).then_some(first)
         }
         (None, None) => None,
     }

@@ -1,6 +1,6 @@
-//! Seams: rims that close each other, between the same places and in opposite directions.
+//! Seams: rims of one glass that close each other, between the same places and in opposite directions.
 
-use super::pieces::{Piece, Rim};
+use super::pieces::{Piece, Rim, Substance};
 use crate::accel::Bvh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
@@ -36,6 +36,7 @@ struct Half {
     places: [u32; 2],
     /// Whether it goes from the higher to the lower.
     is_back: bool,
+    substance: Substance,
     rim: Rim,
 }
 
@@ -60,27 +61,30 @@ impl Seams {
         let sites = Sites::of(pieces, rims, token)?;
         // Join the rims that have both ends in common.
         let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.of_rim(i)));
-        let open = seams.join(halves.collect());
+        let open = seams.join(pieces, halves.collect());
         token.check()?;
         // Cut the rest at the ends of others, and join the parts.
         let parts = sites.cut(pieces, &open, token)?;
-        seams.open = seams.join(parts);
+        seams.open = seams.join(pieces, parts);
         Ok(seams)
     }
 
-    /// Joins rims with the same places; returns the others.
-    fn join(&mut self, rims: Vec<OpenRim>) -> Vec<OpenRim> {
+    /// Joins rims of one glass with the same places; returns the others.
+    fn join(&mut self, pieces: &[Piece], rims: Vec<OpenRim>) -> Vec<OpenRim> {
         let half = |(rim, [from, to]): OpenRim| Half {
             places: [from.min(to), from.max(to)],
             is_back: from > to,
+            substance: pieces[rim.piece as usize].substance,
             rim,
         };
         let mut halves: Vec<Half> = rims.into_iter().map(half).collect();
         halves.retain(|half| half.places[0] != half.places[1]);
         // The order of the file breaks ties: the sort is stable.
-        halves.sort_by_key(|half| (half.places, half.is_back, half.rim.piece));
+        halves.sort_by_key(|half| (half.places, half.substance, half.is_back, half.rim.piece));
         let mut open = Vec::new();
-        for same in halves.chunk_by(|one, other| one.places == other.places) {
+        let is_same =
+            |one: &Half, other: &Half| (one.places, one.substance) == (other.places, other.substance);
+        for same in halves.chunk_by(is_same) {
             let mut is_closed = vec![false; same.len()];
             let mut close = |i: usize, j: usize, disagrees: bool| {
                 self.joined.push(Seam { rims: [same[i], same[j]].map(|half| half.open()), disagrees });
